@@ -1,0 +1,9 @@
+//! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
+//!
+//! Rooms in the order of the data: [`trajectory`] → [`scenario`].
+
+pub mod error;
+pub mod scenario;
+pub mod trajectory;
+
+pub use error::{Error, Place, Result};

@@ -1,0 +1,178 @@
+//! A scenario found in a recording: what `mine` writes and every parameterization reads.
+//!
+//! Fields, names and signs are those of the scenario files (JSON Lines): SI units, f64, series at the
+//! recording's rate over [frame0, frame1], `y > 0` on the side the principal vehicle comes from (cut-in)
+//! or leaves to (cut-out), relative to the centre of the ego's lane.
+
+use serde::{Deserialize, Serialize};
+
+/// The three kinds of scenario of UN R157, Annex 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Category {
+    /// Another vehicle changes into the ego's lane in front of it.
+    CutIn,
+    /// The leader leaves the ego's lane and uncovers a slower vehicle.
+    CutOut,
+    /// The leader decelerates.
+    Lvd,
+}
+
+impl Category {
+    /// All, in the order of every table.
+    pub const ALL: [Category; 3] = [Category::CutIn, Category::CutOut, Category::Lvd];
+
+    /// Name in files and keys: `cut_in`, `cut_out`, `lvd`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Category::CutIn => "cut_in",
+            Category::CutOut => "cut_out",
+            Category::Lvd => "lvd",
+        }
+    }
+
+    /// Name in running text and tables: `cut-in`, `cut-out`, `LVD`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Category::CutIn => "cut-in",
+            Category::CutOut => "cut-out",
+            Category::Lvd => "LVD",
+        }
+    }
+
+    /// From either name.
+    pub fn parse(text: &str) -> Option<Category> {
+        let folded = text.to_ascii_lowercase().replace('-', "_");
+        Category::ALL.into_iter().find(|c| c.key() == folded)
+    }
+}
+
+/// Side of the ego's lane, in the direction of travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// Left, `d > 0`.
+    Left,
+    /// Right, `d < 0`.
+    Right,
+}
+
+impl Side {
+    /// +1 left, −1 right: times this, the scenario's `y` becomes left-positive.
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Left => 1.0,
+            Side::Right => -1.0,
+        }
+    }
+}
+
+/// The ego at the start of a scenario.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ego {
+    /// Initial speed, m/s, ≥ 0.
+    pub v0: f64,
+    /// Length, m, > 0.
+    pub length: f64,
+    /// Width, m, > 0.
+    pub width: f64,
+}
+
+/// Another vehicle over the whole scenario.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Other {
+    /// Length, m, > 0.
+    pub length: f64,
+    /// Width, m, > 0.
+    pub width: f64,
+    /// Speed along the road, m/s, one value per sample.
+    pub v: Vec<f64>,
+    /// Lateral position of the centre relative to the ego's lane centre, m, one value per sample.
+    pub y: Vec<f64>,
+}
+
+/// One mined scenario. Unknown fields of a file are ignored; optional ones may be absent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Scenario {
+    /// Stable key: `{recording}_{category}_{ego}_{target}_{frame0}`.
+    pub id: String,
+    /// Kind of scenario.
+    pub category: Category,
+    /// Recording it was found in.
+    #[serde(default)]
+    pub recording: String,
+    /// Ego vehicle.
+    #[serde(default)]
+    pub ego_id: u32,
+    /// Principal other vehicle: cutter, cutting-out vehicle, leader.
+    #[serde(default)]
+    pub target_id: u32,
+    /// Cut-out only: the vehicle ahead of the cutting-out one.
+    #[serde(default)]
+    pub lead_id: Option<u32>,
+    /// First frame.
+    #[serde(default)]
+    pub frame0: i64,
+    /// Last frame of the series; the first frame without the tags.
+    #[serde(default)]
+    pub frame1: i64,
+    /// Samples per second of the series.
+    pub fps: f64,
+    /// Passed the filters of its category.
+    #[serde(default = "yes")]
+    pub kept: bool,
+    /// Why it was kept or not.
+    #[serde(default)]
+    pub reason: String,
+    /// The ego.
+    pub ego: Ego,
+    /// Width of the ego's lane, m.
+    #[serde(default = "default_lane_width")]
+    pub lane_width: f64,
+    /// Where the target comes from or leaves to; LVD: the side of the lane centre it starts on.
+    pub side: Side,
+    /// Principal other vehicle.
+    pub target: Other,
+    /// Cut-out only: the vehicle ahead of the cutting-out one.
+    #[serde(default)]
+    pub lead: Option<Other>,
+    /// Observed time headway at the start, s, bumper to bumper.
+    #[serde(default)]
+    pub thw0: Option<f64>,
+    /// Observed gap at the start, m, bumper to bumper.
+    #[serde(default)]
+    pub gap0: Option<f64>,
+    /// Cut-out only: gap from the cutting-out vehicle to the one ahead at the start, m, bumper to bumper.
+    #[serde(rename = "D", default)]
+    pub lead_gap: Option<f64>,
+    /// Largest recorded deceleration of the target over the scenario, m/s².
+    #[serde(default)]
+    pub peak_decel: Option<f64>,
+    /// The lane change began before the ego's data set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncated_start: Option<bool>,
+    /// What ended the scenario: `lc_end`, `leader`, `ego_lane`, `data_end`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_cause: Option<String>,
+    /// First frame of the second item (the target becomes or ceases to be leader).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_switch: Option<i64>,
+    /// LVD: the frames of the untrimmed tag interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag_frames: Option<[i64; 2]>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn default_lane_width() -> f64 {
+    3.5
+}
+
+impl Scenario {
+    /// Duration T = (n − 1)/fps, s.
+    pub fn duration_s(&self) -> f64 {
+        (self.target.v.len().saturating_sub(1)) as f64 / self.fps
+    }
+}

@@ -1,0 +1,9 @@
+//! Scenarios: what was found in a recording ([`Scenario`]) and what is simulated.
+//!
+//! Here live the mined scenario, its file format, and the concrete case with its motions. Here lives
+//! nothing about how scenarios are found or parameterized. Data comes from [`crate::mining`] or from a
+//! scenario file and goes to [`crate::parameterization`].
+
+mod mined;
+
+pub use mined::{Category, Ego, Other, Scenario, Side};
