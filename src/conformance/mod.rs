@@ -1,0 +1,15 @@
+//! Conformance: tables of other people's simulators, replayed lane by lane.
+//!
+//! Here live the readers of golden tables (the JRC's cases and functions, the lanes of the `paper`
+//! profile) and the comparison. Here lives no physics: every row becomes an ordinary case and an ordinary
+//! lane. Tables come from files; the comparison goes to the command line.
+
+mod functions;
+mod jrc;
+mod table;
+mod tally;
+
+pub use functions::compare_functions;
+pub use jrc::compare_jrc;
+pub use table::{Table, TableKind};
+pub use tally::{Deviation, Tally};

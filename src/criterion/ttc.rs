@@ -1,0 +1,54 @@
+//! Time to collision: gap over closing speed, 0 at contact.
+
+use crate::scalar::Real;
+
+/// The threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeToCollision<R> {
+    /// A TTC below this fails, s.
+    pub threshold: R,
+}
+
+/// Smallest TTC so far, kept as a quotient so that a step never divides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TtcMinimum<R> {
+    gap: R,
+    closing: R,
+    /// The predicate was true at some step.
+    pub failed: bool,
+}
+
+impl<R: Real> TtcMinimum<R> {
+    /// Nothing seen yet: infinite.
+    #[inline(always)]
+    pub fn new() -> Self {
+        TtcMinimum { gap: R::ONE, closing: R::ZERO, failed: false }
+    }
+
+    /// The value, s, ≥ 0; infinite where the ego never closed in.
+    #[inline(always)]
+    pub fn value(&self) -> R {
+        if self.closing > R::ZERO { self.gap.exact_div(self.closing) } else { R::INFINITY }
+    }
+}
+
+impl<R: Real> Default for TtcMinimum<R> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<R: Real> TimeToCollision<R> {
+    /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0.
+    #[inline(always)]
+    pub fn update(&self, minimum: TtcMinimum<R>, seen: bool, gap: R, closing: R) -> TtcMinimum<R> {
+        let gap = gap.larger(R::ZERO);
+        let counts = seen && closing > R::ZERO;
+        let smaller = counts && gap * minimum.closing < minimum.gap * closing;
+        TtcMinimum {
+            gap: if smaller { gap } else { minimum.gap },
+            closing: if smaller { closing } else { minimum.closing },
+            failed: minimum.failed || (counts && gap < self.threshold * closing),
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Two fuzzy surrogates — proactive
+//! (PFS) and critical (CFS) — tell how hard to brake.
+
+use serde::{Deserialize, Serialize};
+
+use super::{DriverModel, DriverState, Hazard, View, delay_steps, latched_braking};
+use crate::scalar::Real;
+
+/// Which acceleration the CFS step divides by when the ego would be slower than the other vehicle after τ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CfsStep {
+    /// The ego's present acceleration (the JRC's simulator).
+    Present,
+    /// The acceleration limited to comfort (the regulation's text).
+    Limited,
+}
+
+/// Constants of the model as a profile gives them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FsmProfile {
+    /// τ: reaction time, s (0.75).
+    pub reaction_time_s: f64,
+    /// b_comf: comfortable deceleration, m/s² (4).
+    pub comfortable_deceleration_mps2: f64,
+    /// b_max: largest deceleration the surrogates count on, m/s² (6).
+    pub max_surrogate_deceleration_mps2: f64,
+    /// b_lead: deceleration the leader may reach, m/s² (7).
+    pub lead_deceleration_mps2: f64,
+    /// d1: safety margin, m (2), used twice.
+    pub margin_m: f64,
+    /// Added to the time to reach the other vehicle in the lateral gate, s (0.1).
+    pub lateral_gate_margin_s: f64,
+    /// Jerk of the ramp, m/s³ (12.65).
+    pub jerk_mps3: f64,
+    /// Cap of the deceleration, m/s² (0.774 g; never reached with b_max = 6).
+    pub max_deceleration_mps2: f64,
+    /// Acceleration in the CFS step.
+    pub cfs_step: CfsStep,
+}
+
+/// The model at one time step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fsm<R> {
+    tau: R,
+    half_tau: R,
+    b_comf: R,
+    b_span: R,
+    half_inverse_comf: R,
+    half_inverse_max: R,
+    half_inverse_lead: R,
+    margin: R,
+    gate_margin: R,
+    limited_step: bool,
+    jerk_per_step: R,
+    max_deceleration: R,
+    delay_steps: u32,
+    dt: R,
+}
+
+impl FsmProfile {
+    /// Plain constants for a time step.
+    pub fn resolve<R: Real>(&self, dt_s: f64) -> Fsm<R> {
+        let (comf, max) = (self.comfortable_deceleration_mps2, self.max_surrogate_deceleration_mps2);
+        Fsm {
+            tau: R::from_f64(self.reaction_time_s),
+            half_tau: R::from_f64(self.reaction_time_s / 2.0),
+            b_comf: R::from_f64(comf),
+            b_span: R::from_f64(max - comf),
+            half_inverse_comf: R::from_f64(1.0 / (2.0 * comf)),
+            half_inverse_max: R::from_f64(1.0 / (2.0 * max)),
+            half_inverse_lead: R::from_f64(1.0 / (2.0 * self.lead_deceleration_mps2)),
+            margin: R::from_f64(self.margin_m),
+            gate_margin: R::from_f64(self.lateral_gate_margin_s),
+            limited_step: self.cfs_step == CfsStep::Limited,
+            jerk_per_step: R::from_f64(self.jerk_mps3 * dt_s),
+            max_deceleration: R::from_f64(self.max_deceleration_mps2),
+            delay_steps: delay_steps(self.reaction_time_s, dt_s),
+            dt: R::from_f64(dt_s),
+        }
+    }
+}
+
+/// 0 beyond the safe distance, 1 below the unsafe one, linear between.
+#[inline(always)]
+fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
+    if distance >= safe {
+        R::ZERO
+    } else if distance <= dangerous {
+        R::ONE
+    } else {
+        (distance - safe).exact_div(dangerous - safe)
+    }
+}
+
+impl<R: Real> Fsm<R> {
+    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
+    #[inline(always)]
+    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
+        let reaction = v_ego * self.tau;
+        let lead_stop = v_other * v_other * self.half_inverse_lead;
+        let d_safe = reaction + v_ego * v_ego * self.half_inverse_comf - lead_stop + self.margin;
+        let d_unsafe = reaction + v_ego * v_ego * self.half_inverse_max - lead_stop;
+        fuzzy(gap - self.margin, d_safe, d_unsafe)
+    }
+
+    /// Critical fuzzy surrogate of the present closing, 0…1.
+    #[inline(always)]
+    pub fn cfs(&self, v_ego: R, v_other: R, gap: R, a_ego: R) -> R {
+        let a_limited = a_ego.larger(-self.b_comf);
+        let v_new = v_ego + self.tau * a_limited;
+        let dv = v_ego - v_other;
+        let a_step = if self.limited_step { a_limited } else { a_ego };
+        let dv_new = v_new - v_other;
+        let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
+        let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
+        let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
+        if v_ego <= v_other {
+            R::ZERO
+        } else if v_new < v_other {
+            // g < dv²/(2|a|), multiplied out.
+            let twice = gap + gap;
+            if twice * a_step.abs() < dv * dv { R::ONE } else { R::ZERO }
+        } else {
+            fuzzy(gap, d_safe, d_unsafe)
+        }
+    }
+
+    /// Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or
+    /// while it needs longer to come in than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
+    #[inline(always)]
+    fn gate_is_open(&self, view: &View<R>) -> bool {
+        let dv = view.closing();
+        let w = view.lateral_towards;
+        let passing = view.gap + view.half_lengths + view.half_lengths;
+        let slow = view.lateral_gap * dv > w * (passing + self.gate_margin * dv);
+        let closed = w <= R::ZERO || dv < R::ZERO || (dv > R::ZERO && slow);
+        view.lateral_gap <= R::ZERO || !closed
+    }
+}
+
+impl<R: Real> DriverModel<R> for Fsm<R> {
+    #[inline(always)]
+    fn initial(&self) -> DriverState<R> {
+        DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }
+    }
+
+    /// Unsafe iff the gate is open and CFS + PFS ≠ 0; demand CFS (b_max − b_comf) + b_comf if CFS > 0, else
+    /// PFS·b_comf.
+    #[inline(always)]
+    fn check(&self, view: &View<R>) -> Hazard<R> {
+        let pfs = self.pfs(view.v_ego, view.v_other, view.gap);
+        let cfs = self.cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
+        let surrogate = pfs > R::ZERO || cfs > R::ZERO;
+        let demand = if cfs > R::ZERO { cfs * self.b_span + self.b_comf } else { pfs * self.b_comf };
+        Hazard { is_unsafe: !view.is_behind() && surrogate && self.gate_is_open(view), demand }
+    }
+
+    /// Hold the speed for τ, then the demand: reached with 12.65 m/s³ upwards, at once downwards.
+    #[inline(always)]
+    fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
+        let ramp = (state.deceleration + self.jerk_per_step).smaller(self.max_deceleration);
+        latched_braking(state, R::ZERO, ramp.smaller(hazard.demand), v_ego, self.dt)
+    }
+}

@@ -1,0 +1,166 @@
+//! The reference drivers of UN R157 and its companions: one file per model, each with its constants
+//! (unit, clause), its check and its reaction, written once over [`Real`].
+//!
+//! Here lives what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. Here lives
+//! no time loop: the latched step stands once, in [`crate::sweep`]. Parameters come from a profile;
+//! decisions go to the lane's frame.
+//!
+//! To add a model: one file here, its twin in `shaders/`, one line in [`ModelId`].
+
+mod attention;
+mod cchdm;
+mod fsm;
+mod reg157;
+mod rss;
+
+pub use attention::{Attention, Perception};
+pub use cchdm::{Cchdm, CchdmProfile};
+pub use fsm::{CfsStep, Fsm, FsmProfile};
+pub use reg157::{Reg157, Reg157Profile};
+pub use rss::{Rss, RssProfile};
+
+use crate::scalar::Real;
+
+/// The registry of driver models, in the order of every table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+pub enum ModelId {
+    /// UN R157, 5.2.5.2.
+    Reg157,
+    /// Careful and competent human driver, UN R157, Annex 3.
+    #[serde(rename = "CCHDM")]
+    Cchdm,
+    /// Responsibility-Sensitive Safety.
+    #[serde(rename = "RSS")]
+    Rss,
+    /// Fuzzy Safety Model, UN R157, Annex 3.
+    #[serde(rename = "FSM")]
+    Fsm,
+}
+
+impl ModelId {
+    /// All, in the order of every table.
+    pub const ALL: [ModelId; 4] = [ModelId::Reg157, ModelId::Cchdm, ModelId::Rss, ModelId::Fsm];
+
+    /// Name in tables, files and lane keys.
+    pub fn name(self) -> &'static str {
+        match self {
+            ModelId::Reg157 => "Reg157",
+            ModelId::Cchdm => "CCHDM",
+            ModelId::Rss => "RSS",
+            ModelId::Fsm => "FSM",
+        }
+    }
+
+    /// From its name, whatever the case; `CC` and `CC_human_driver` are the JRC's names of CCHDM.
+    pub fn parse(text: &str) -> Option<ModelId> {
+        let folded = text.to_ascii_lowercase();
+        match folded.as_str() {
+            "cc" | "cc_human_driver" => Some(ModelId::Cchdm),
+            _ => ModelId::ALL.into_iter().find(|m| m.name().to_ascii_lowercase() == folded),
+        }
+    }
+
+    /// Position in [`ModelId::ALL`].
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// What the ego's driver sees of one other vehicle at one step. The ego is in the middle of its lane.
+#[derive(Debug, Clone, Copy)]
+pub struct View<R> {
+    /// v_e, m/s.
+    pub v_ego: R,
+    /// Acceleration of the ego over the last step, m/s²; 0 at the start.
+    pub a_ego: R,
+    /// v_o, m/s.
+    pub v_other: R,
+    /// g: signed gap, bumper to bumper, m; negative when the vehicles overlap along the road.
+    pub gap: R,
+    /// h: gap across the road, m; negative when they overlap across it.
+    pub lateral_gap: R,
+    /// w: lateral speed of the other vehicle towards the ego, m/s.
+    pub lateral_towards: R,
+    /// (L_e + L_o)/2, m: the centre distance is `gap + half_lengths`.
+    pub half_lengths: R,
+}
+
+impl<R: Real> View<R> {
+    /// dv = v_e − v_o: closing speed, m/s.
+    #[inline(always)]
+    pub fn closing(&self) -> R {
+        self.v_ego - self.v_other
+    }
+
+    /// x_e > x_o: the other vehicle's centre is behind the ego's.
+    #[inline(always)]
+    pub fn is_behind(&self) -> bool {
+        self.gap + self.half_lengths < R::ZERO
+    }
+}
+
+/// The result of a check.
+#[derive(Debug, Clone, Copy)]
+pub struct Hazard<R> {
+    /// The situation is unsafe: the driver reacts.
+    pub is_unsafe: bool,
+    /// Deceleration that the driver asks for, m/s²; models without a demand ask for their largest.
+    pub demand: R,
+}
+
+/// Latched state of the ego's driver; never reset within a lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriverState<R> {
+    /// Deceleration reached so far, m/s².
+    pub deceleration: R,
+    /// Steps of the reaction time that are left; counted down on unsafe steps only.
+    pub delay_steps: u32,
+}
+
+/// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
+pub trait DriverModel<R: Real>: Copy + Send + Sync {
+    /// State at the start of a lane.
+    fn initial(&self) -> DriverState<R>;
+    /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
+    fn check(&self, view: &View<R>) -> Hazard<R>;
+    /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0.
+    fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R);
+}
+
+/// One unsafe step of any model: the reaction time is paid once, coasting; then the deceleration
+/// follows `braking`, and the speed stops at 0.
+#[inline(always)]
+fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_ego: R, dt: R) -> (DriverState<R>, R) {
+    let waiting = state.delay_steps > 0;
+    let applied = if waiting { coasting } else { braking };
+    let deceleration = if waiting { state.deceleration } else { braking };
+    let delay_steps = if waiting { state.delay_steps - 1 } else { 0 };
+    let v_next = (v_ego - applied * dt).larger(R::ZERO);
+    (DriverState { deceleration, delay_steps }, v_next)
+}
+
+/// Whole steps of a delay. Resolved in f64: in f32, 0.6 s / 0.04 s would come out as 16 steps.
+fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
+    (delay_s / dt_s - 1e-9).ceil().max(0.0) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {
+        assert_eq!(delay_steps(0.75, 0.1), 8);
+        assert_eq!(delay_steps(0.35, 0.1), 4);
+        assert_eq!(delay_steps(0.6, 0.04), 15);
+        assert_eq!(delay_steps(0.0, 0.04), 0);
+    }
+
+    #[test]
+    fn model_names_survive_a_round_trip() {
+        for model in ModelId::ALL {
+            assert_eq!(ModelId::parse(model.name()), Some(model));
+        }
+        assert_eq!(ModelId::parse("CC_human_driver"), Some(ModelId::Cchdm));
+    }
+}

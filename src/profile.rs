@@ -1,0 +1,223 @@
+//! Profiles: every constant and every named option of models, criteria and frame as data (TOML).
+//!
+//! A profile is resolved at a time step into plain constants; nothing below it knows strings.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::criterion::CriteriaProfile;
+use crate::driver::{CchdmProfile, FsmProfile, Reg157Profile, RssProfile};
+use crate::{Error, Place, Result};
+
+/// Which vehicles the ego's driver heeds in a cut-out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutOutTarget {
+    /// Both vehicles are checked each step; the nearest unsafe one drives the reaction.
+    NearestUnsafe,
+    /// Nothing until the cutting-out centre is more than 0.375 m off, then the vehicle ahead alone; a
+    /// cutting-out vehicle that hits it freezes there and becomes the target (the JRC's simulator).
+    Exposed,
+}
+
+/// The frame around the models.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameProfile {
+    /// Time step, s.
+    pub dt_s: f64,
+    /// A run ends here at the latest, s.
+    pub time_cap_s: f64,
+    /// Positions are cumulative sums: index 0 is one step after the nominal start.
+    pub start_shift: bool,
+    /// Runs stop where nothing can happen any more; otherwise they go on to the cap.
+    pub end_when_settled: bool,
+    /// Whom the driver heeds in a cut-out.
+    pub cut_out_target: CutOutTarget,
+    /// Exposure threshold of `exposed`, m.
+    pub exposure_m: f64,
+    /// Length of vehicles without a size, m.
+    pub default_length_m: f64,
+    /// Width of vehicles without a size, m.
+    pub default_width_m: f64,
+}
+
+/// A profile: everything that the lanes' physics takes from outside the cases.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Name.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Time and geometry.
+    pub frame: FrameProfile,
+    /// Criteria.
+    pub criteria: CriteriaProfile,
+    /// Reg157.
+    pub reg157: Reg157Profile,
+    /// CCHDM.
+    pub cchdm: CchdmProfile,
+    /// RSS.
+    pub rss: RssProfile,
+    /// FSM.
+    pub fsm: FsmProfile,
+}
+
+const BUILT_IN: [(&str, &str); 4] = [
+    ("paper", include_str!("../configs/profiles/paper.toml")),
+    ("paper-fit", include_str!("../configs/profiles/paper-fit.toml")),
+    ("jrc-2021", include_str!("../configs/profiles/jrc-2021.toml")),
+    ("un-r157", include_str!("../configs/profiles/un-r157.toml")),
+];
+
+impl Profile {
+    /// Names of the profiles that ship with the program.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// A profile by name, or from a TOML file where the text is a path.
+    pub fn load(name_or_path: &str) -> Result<Profile> {
+        if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
+            return Profile::parse(text, &Place::item(format!("built-in profile {name}")));
+        }
+        let path = Path::new(name_or_path);
+        if !path.exists() && !name_or_path.ends_with(".toml") {
+            let nearest = Profile::names()
+                .max_by(|a, b| strsim::jaro(a, name_or_path).total_cmp(&strsim::jaro(b, name_or_path)))
+                .unwrap_or("paper");
+            return Err(Error::usage(
+                Place::item("--profile"),
+                format!("there is no profile `{name_or_path}`"),
+                format!(
+                    "did you mean `{nearest}`? Profiles: {}; or give the path of a TOML file",
+                    Profile::names().collect::<Vec<_>>().join(", ")
+                ),
+            ));
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        Profile::parse(&text, &Place::file(path))
+    }
+
+    fn parse(text: &str, place: &Place) -> Result<Profile> {
+        let profile: Profile = toml::from_str(text).map_err(|e| {
+            let mut place = place.clone();
+            if let Some(span) = e.span() {
+                place.row = Some(1 + text[..span.start].matches('\n').count() as u64);
+            }
+            Error::usage(
+                place,
+                e.message().to_owned(),
+                "compare with configs/profiles/paper.toml, which has every key with its unit",
+            )
+        })?;
+        profile.check(place)?;
+        Ok(profile)
+    }
+
+    /// Every constant must be finite and in its range; `place` names the profile in the error.
+    pub fn check(&self, place: &Place) -> Result<()> {
+        let positive = [
+            ("frame.dt_s", self.frame.dt_s),
+            ("frame.time_cap_s", self.frame.time_cap_s),
+            ("frame.default_length_m", self.frame.default_length_m),
+            ("frame.default_width_m", self.frame.default_width_m),
+            ("criteria.ttc_threshold_s", self.criteria.ttc_threshold_s),
+            ("criteria.btn_threshold", self.criteria.btn_threshold),
+            ("criteria.max_deceleration_mps2", self.criteria.max_deceleration_mps2),
+            ("criteria.jerk_mps3", self.criteria.jerk_mps3),
+            ("reg157.deceleration_mps2", self.reg157.deceleration_mps2),
+            ("cchdm.jerk_mps3", self.cchdm.jerk_mps3),
+            ("cchdm.max_deceleration_mps2", self.cchdm.max_deceleration_mps2),
+            ("rss.ego_deceleration_mps2", self.rss.ego_deceleration_mps2),
+            ("rss.other_deceleration_mps2", self.rss.other_deceleration_mps2),
+            ("rss.lateral_acceleration_mps2", self.rss.lateral_acceleration_mps2),
+            ("rss.jerk_mps3", self.rss.jerk_mps3),
+            ("rss.max_deceleration_mps2", self.rss.max_deceleration_mps2),
+            ("fsm.comfortable_deceleration_mps2", self.fsm.comfortable_deceleration_mps2),
+            ("fsm.max_surrogate_deceleration_mps2", self.fsm.max_surrogate_deceleration_mps2),
+            ("fsm.lead_deceleration_mps2", self.fsm.lead_deceleration_mps2),
+            ("fsm.jerk_mps3", self.fsm.jerk_mps3),
+            ("fsm.max_deceleration_mps2", self.fsm.max_deceleration_mps2),
+        ];
+        let not_negative = [
+            ("frame.exposure_m", self.frame.exposure_m),
+            ("reg157.reaction_time_s", self.reg157.reaction_time_s),
+            ("reg157.margin_s", self.reg157.margin_s),
+            ("reg157.visible_lateral_movement_s", self.reg157.visible_lateral_movement_s),
+            ("cchdm.ttc_s", self.cchdm.ttc_s),
+            ("cchdm.delay_s", self.cchdm.delay_s),
+            ("cchdm.coasting_mps2", self.cchdm.coasting_mps2),
+            ("cchdm.wandering_m", self.cchdm.wandering_m),
+            ("cchdm.perception_time_s", self.cchdm.perception_time_s),
+            ("cchdm.perception_travel_m", self.cchdm.perception_travel_m),
+            ("cchdm.lead_deceleration_trigger_mps2", self.cchdm.lead_deceleration_trigger_mps2),
+            ("rss.response_time_s", self.rss.response_time_s),
+            ("rss.max_acceleration_mps2", self.rss.max_acceleration_mps2),
+            ("rss.lateral_margin_m", self.rss.lateral_margin_m),
+            ("fsm.reaction_time_s", self.fsm.reaction_time_s),
+            ("fsm.margin_m", self.fsm.margin_m),
+            ("fsm.lateral_gate_margin_s", self.fsm.lateral_gate_margin_s),
+            ("reg157.lateral_gate_m", self.reg157.lateral_gate_m + 100.0),
+            ("cchdm.lateral_gate_m", self.cchdm.lateral_gate_m + 100.0),
+        ];
+        let bad = positive
+            .iter()
+            .map(|&(key, value)| (key, value, value > 0.0, "a number above 0"))
+            .chain(not_negative.iter().map(|&(key, value)| (key, value, value >= 0.0, "a number of at least 0")))
+            .find(|&(_, value, ok, _)| !ok || !value.is_finite());
+        if let Some((key, value, _, expected)) = bad {
+            return Err(Error::usage(
+                place.clone().of(format!("`{key}`")),
+                format!("{value} is not usable; expected {expected}"),
+                "see configs/profiles/paper.toml for usual values",
+            ));
+        }
+        if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
+            return Err(Error::usage(
+                place.clone().of("`frame.dt_s`"),
+                format!("{} s with a cap of {} s is not usable", self.frame.dt_s, self.frame.time_cap_s),
+                "use a time step of at most 1 s and at most 4 million steps per run",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The same profile at another time step.
+    pub fn with_dt(mut self, dt_s: f64) -> Result<Profile> {
+        self.frame.dt_s = dt_s;
+        self.check(&Place::item("--dt"))?;
+        Ok(self)
+    }
+
+    /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
+    pub fn step_cap(&self) -> u32 {
+        (self.frame.time_cap_s / self.frame.dt_s - 1e-9).ceil() as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_profile_is_complete_and_named_as_it_is_called() {
+        for name in Profile::names() {
+            assert_eq!(Profile::load(name).unwrap().name, name);
+        }
+    }
+
+    #[test]
+    fn a_misspelt_profile_is_answered_with_the_nearest_name() {
+        let error = Profile::load("papr").unwrap_err();
+        assert!(error.help().unwrap().contains("did you mean `paper`"), "{error:?}");
+    }
+
+    #[test]
+    fn an_unusable_constant_is_named_with_its_key() {
+        let error = Profile::load("paper").unwrap().with_dt(0.0).unwrap_err();
+        assert!(error.to_string().contains("frame.dt_s"), "{error}");
+    }
+}

@@ -1,0 +1,210 @@
+//! The number a lane computes with: f64 (the reference), f32 (the lane arithmetic of every backend) and
+//! a counting type that tells the operations of a step.
+//!
+//! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
+//! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
+
+use std::cell::Cell;
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// A scalar of the lane arithmetic. Models, criteria and the frame are written once over this trait.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// +∞: "did not happen" of a minimum, "cannot be avoided" of a Brake Threat Number.
+    const INFINITY: Self;
+
+    /// The host's one rounding of an input.
+    fn from_f64(value: f64) -> Self;
+    /// Exact widening for reports.
+    fn to_f64(self) -> f64;
+    /// A step index as a number; exact below 2²⁴.
+    fn from_step(step: u32) -> Self;
+    /// Correctly rounded quotient: the only division of the lane arithmetic.
+    fn exact_div(self, divisor: Self) -> Self;
+
+    /// Magnitude.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        if self < Self::ZERO { -self } else { self }
+    }
+
+    /// The larger; the second where they are equal.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    /// The smaller; the second where they are equal.
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+}
+
+macro_rules! real_float {
+    ($float:ty) => {
+        impl Real for $float {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const INFINITY: Self = <$float>::INFINITY;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                value as $float
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self.into()
+            }
+            #[inline(always)]
+            fn from_step(step: u32) -> Self {
+                step as $float
+            }
+            #[inline(always)]
+            fn exact_div(self, divisor: Self) -> Self {
+                self / divisor
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$float>::abs(self)
+            }
+        }
+    };
+}
+real_float!(f32);
+real_float!(f64);
+
+/// Operations of the counting type, by kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct OperationCount {
+    /// Additions and subtractions.
+    pub additions: u64,
+    /// Multiplications.
+    pub multiplications: u64,
+    /// Correctly rounded divisions.
+    pub divisions: u64,
+    /// Comparisons.
+    pub comparisons: u64,
+}
+
+impl OperationCount {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.additions + self.multiplications + self.divisions + self.comparisons
+    }
+}
+
+thread_local! {
+    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0 }) };
+}
+
+fn count(update: impl FnOnce(&mut OperationCount)) {
+    COUNT.with(|cell| {
+        let mut now = cell.get();
+        update(&mut now);
+        cell.set(now);
+    });
+}
+
+/// An f64 that counts what is done with it, per thread.
+#[derive(Debug, Clone, Copy)]
+pub struct Counting(f64);
+
+impl Counting {
+    /// Runs `work` and returns its result with the operations it took on this thread.
+    pub fn measure<T>(work: impl FnOnce() -> T) -> (T, OperationCount) {
+        COUNT.with(|cell| cell.set(OperationCount::default()));
+        let result = work();
+        (result, COUNT.with(Cell::get))
+    }
+}
+
+impl Add for Counting {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        count(|c| c.additions += 1);
+        Counting(self.0 + other.0)
+    }
+}
+impl Sub for Counting {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        count(|c| c.additions += 1);
+        Counting(self.0 - other.0)
+    }
+}
+impl Mul for Counting {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        count(|c| c.multiplications += 1);
+        Counting(self.0 * other.0)
+    }
+}
+impl Neg for Counting {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Counting(-self.0)
+    }
+}
+impl PartialEq for Counting {
+    fn eq(&self, other: &Self) -> bool {
+        count(|c| c.comparisons += 1);
+        self.0 == other.0
+    }
+}
+impl PartialOrd for Counting {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        count(|c| c.comparisons += 1);
+        self.0.partial_cmp(&other.0)
+    }
+}
+impl Real for Counting {
+    const ZERO: Self = Counting(0.0);
+    const ONE: Self = Counting(1.0);
+    const INFINITY: Self = Counting(f64::INFINITY);
+
+    fn from_f64(value: f64) -> Self {
+        Counting(value)
+    }
+    fn to_f64(self) -> f64 {
+        self.0
+    }
+    fn from_step(step: u32) -> Self {
+        Counting(f64::from(step))
+    }
+    fn exact_div(self, divisor: Self) -> Self {
+        count(|c| c.divisions += 1);
+        Counting(self.0 / divisor.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counting_type_sees_every_operation() {
+        let (value, count) = Counting::measure(|| {
+            let a = Counting::from_f64(3.0);
+            let b = Counting::from_f64(2.0);
+            (a * b + a).exact_div(b).larger(b)
+        });
+        assert_eq!(value.to_f64(), 4.5);
+        assert_eq!(count, OperationCount { additions: 1, multiplications: 1, divisions: 1, comparisons: 1 });
+    }
+}

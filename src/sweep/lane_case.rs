@@ -1,0 +1,201 @@
+//! From a [`Case`] to the record that lanes read: motions encoded, sizes summed, everything that depends
+//! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
+
+use crate::driver::{Attention, ModelId, Perception};
+use crate::profile::{CutOutTarget, Profile};
+use crate::scalar::Real;
+use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
+
+/// "Never" as a step index.
+pub const NEVER: u32 = u32::MAX;
+
+/// One other vehicle of a lane.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaneOther<R> {
+    /// Its motion.
+    pub motion: Motion<R>,
+    /// (L_e + L_o)/2, m.
+    pub half_lengths: R,
+    /// (W_e + W_o)/2, m.
+    pub half_widths: R,
+    /// Added to the lane's initial gap, m: 0 for the principal vehicle, L_c + D for the one ahead of it.
+    pub gap_offset: R,
+    /// First step at which it exists for the ego.
+    pub present_from: u32,
+    /// First step at which it does no longer.
+    pub present_until: u32,
+    /// First step at which each driver model may react to it, in the order of [`ModelId::ALL`].
+    pub attend_from: [u32; 4],
+    /// 1 where the slot is used.
+    pub used: u32,
+}
+
+/// What all lanes of one case share.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaneCase<R> {
+    /// Principal vehicle, then the one ahead of it.
+    pub others: [LaneOther<R>; 2],
+    /// Initial and planned speed of the ego, m/s.
+    pub ego_speed: R,
+    /// Width of the ego, m.
+    pub ego_width: R,
+    /// Steps to the later of T and the last parameter event: the run goes on at least so long.
+    pub horizon: u32,
+    /// 1 where a second vehicle is used.
+    pub pair: u32,
+}
+
+impl LaneCase<f64> {
+    /// Encodes a case under a profile; series go to the end of `tables`.
+    pub fn encode(case: &Case, profile: &Profile, tables: &mut Tables<f64>) -> Self {
+        let dt_s = profile.frame.dt_s;
+        let exposed = case.category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed;
+        let principal = encode_other(case, &case.principal, 0.0, dt_s, tables);
+        let mut others = [principal, LaneOther { used: 0, present_until: 0, ..principal }];
+        if let Some(ahead) = &case.ahead {
+            let offset = case.principal.length_m + ahead.gap_m;
+            others[1] = encode_other(case, &ahead.vehicle, offset, dt_s, tables);
+        }
+        let series = Series::of(&others[0].motion, tables, profile.step_cap());
+        if exposed {
+            expose(case, profile, &series, &mut others, tables);
+        } else {
+            attend(case, profile, &series, &mut others);
+        }
+        LaneCase {
+            others,
+            ego_speed: case.ego_speed_mps,
+            ego_width: case.ego_width_m,
+            horizon: (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32,
+            pair: u32::from(case.ahead.is_some()),
+        }
+    }
+
+    /// The host's one rounding.
+    pub fn cast<R: Real>(&self) -> LaneCase<R> {
+        LaneCase {
+            others: self.others.map(|o| LaneOther {
+                motion: o.motion.cast(),
+                half_lengths: R::from_f64(o.half_lengths),
+                half_widths: R::from_f64(o.half_widths),
+                gap_offset: R::from_f64(o.gap_offset),
+                present_from: o.present_from,
+                present_until: o.present_until,
+                attend_from: o.attend_from,
+                used: o.used,
+            }),
+            ego_speed: R::from_f64(self.ego_speed),
+            ego_width: R::from_f64(self.ego_width),
+            horizon: self.horizon,
+            pair: self.pair,
+        }
+    }
+}
+
+fn encode_other(
+    case: &Case,
+    other: &Participant,
+    gap_offset: f64,
+    dt_s: f64,
+    tables: &mut Tables<f64>,
+) -> LaneOther<f64> {
+    LaneOther {
+        motion: Motion::encode(&other.speed, &other.lateral, dt_s, tables),
+        half_lengths: (case.ego_length_m + other.length_m) / 2.0,
+        half_widths: (case.ego_width_m + other.width_m) / 2.0,
+        gap_offset,
+        present_from: 0,
+        present_until: NEVER,
+        attend_from: [0; 4],
+        used: 1,
+    }
+}
+
+/// The principal vehicle's motion as series, for the rules that look at it.
+struct Series {
+    lateral_m: Vec<f64>,
+    speed_mps: Vec<f64>,
+}
+
+impl Series {
+    /// Long enough to see every event: motions are constant after their last event.
+    fn of(motion: &Motion<f64>, tables: &Tables<f64>, step_cap: u32) -> Series {
+        let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
+        let steps = step_cap.min(events.into_iter().max().unwrap_or(0) + 2);
+        Series {
+            lateral_m: (0..steps).map(|i| motion.lateral(tables, i).position).collect(),
+            speed_mps: (0..steps).map(|i| motion.speed(tables, i)).collect(),
+        }
+    }
+}
+
+/// Perception rules: when each model may react.
+fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
+    let attention = Attention {
+        category: case.category,
+        dt_s: profile.frame.dt_s,
+        lateral_m: &series.lateral_m,
+        speed_mps: &series.speed_mps,
+        half_widths_m: others[0].half_widths,
+    };
+    let reg157 =
+        attention.after_visible_movement(profile.reg157.visible_lateral_movement_s, profile.reg157.lateral_gate_m);
+    let cchdm = match case.category {
+        Category::Lvd => attention.after_deceleration(profile.cchdm.lead_deceleration_trigger_mps2),
+        Category::CutIn | Category::CutOut => attention.after_wandering(Perception {
+            wandering_m: profile.cchdm.wandering_m,
+            time_s: profile.cchdm.perception_time_s,
+            travel_m: profile.cchdm.perception_travel_m,
+        }),
+    };
+    others[0].attend_from[ModelId::Reg157.index()] = reg157;
+    for other in others.iter_mut() {
+        other.attend_from[ModelId::Cchdm.index()] = cchdm;
+    }
+}
+
+/// The JRC's cut-out: nothing before the exposure, then the vehicle ahead; a cutting-out vehicle that hits
+/// it freezes there and takes its place.
+fn expose(
+    case: &Case,
+    profile: &Profile,
+    series: &Series,
+    others: &mut [LaneOther<f64>; 2],
+    tables: &mut Tables<f64>,
+) {
+    let Some(ahead) = &case.ahead else { return };
+    let dt = profile.frame.dt_s;
+    let cap = profile.step_cap();
+    let exposure = series.lateral_m.iter().position(|y| y.abs() > profile.frame.exposure_m);
+    let exposure = exposure.map_or(NEVER, |k| k as u32);
+
+    let overlap_lengths = (case.principal.length_m + ahead.vehicle.length_m) / 2.0;
+    let overlap_widths = (case.principal.width_m + ahead.vehicle.width_m) / 2.0;
+    let (cutter, front) = (others[0].motion, others[1].motion);
+    let shift = if profile.frame.start_shift { front.speed(tables, 0) - cutter.speed(tables, 0) } else { 0.0 };
+    let mut distance = ahead.gap_m + overlap_lengths + shift * dt;
+    let mut freeze = NEVER;
+    for i in 0..cap {
+        if i > 0 {
+            distance += (front.speed(tables, i) - cutter.speed(tables, i)) * dt;
+        }
+        if distance.abs() < overlap_lengths && cutter.lateral(tables, i).position.abs() < overlap_widths {
+            freeze = i;
+            break;
+        }
+    }
+    others[1].present_from = exposure.min(freeze);
+    others[1].present_until = freeze;
+    others[0].present_from = freeze;
+    if freeze != NEVER {
+        // Its position at the freeze holds the step it moved; its speed from there on is 0.
+        let speed: Vec<f64> = (0..freeze).map(|i| cutter.speed(tables, i)).chain([0.0]).collect();
+        let lateral = cutter.lateral(tables, freeze).position;
+        let moved = cutter.speed(tables, freeze) * dt;
+        let frozen = Lateral::Sampled { position_m: vec![lateral], towards_mps: vec![0.0] };
+        others[0].motion = Motion::encode(&Speed::Sampled(speed), &frozen, dt, tables);
+        others[0].gap_offset += moved;
+    }
+}

@@ -1,0 +1,15 @@
+//! The sweep: cases become lanes, lanes become outcomes.
+//!
+//! Here live the lane's record and its frame (the one time loop), the lane plan, the backends, outcomes
+//! and partial results. Here lives no physics of a driver or a criterion, and nothing about scores. Cases
+//! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
+
+mod drivers;
+mod frame;
+mod lane_case;
+mod outcome;
+
+pub use drivers::Constants;
+pub use frame::{Frame, Observer, Seen, Silent, Start, Step, run_lane};
+pub use lane_case::{LaneCase, LaneOther};
+pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
