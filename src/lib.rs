@@ -7,6 +7,7 @@ pub mod conformance;
 pub mod criterion;
 pub mod driver;
 pub mod error;
+pub mod parameterization;
 pub mod profile;
 pub mod scalar;
 pub mod scenario;

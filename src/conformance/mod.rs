@@ -6,10 +6,12 @@
 
 mod functions;
 mod jrc;
+mod lanes;
 mod table;
 mod tally;
 
 pub use functions::compare_functions;
 pub use jrc::compare_jrc;
-pub use table::{Table, TableKind};
+pub use lanes::{LaneComparison, compare_lanes};
+pub use table::{Row, Table, TableKind};
 pub use tally::{Deviation, Tally};

@@ -86,11 +86,9 @@ impl Table {
 }
 
 impl<'a> Row<'a> {
-    /// Where this row's column stands, for errors.
+    /// Where this row's column stands, for errors; lines count from 1, the header's.
     pub fn place(&self, column: &str) -> Place {
-        let record = &self.table.rows[self.index];
-        let line = record.position().map_or(self.index as u64 + 2, csv::Position::line);
-        Place::file(&self.table.path).row(line).column(column)
+        Place::file(&self.table.path).row(self.index as u64 + 2).column(column)
     }
 
     /// The text of a column.
@@ -107,9 +105,8 @@ impl<'a> Row<'a> {
 
     /// A number that must be there.
     pub fn number(&self, column: &str) -> Result<f64> {
-        self.optional(column)?.ok_or_else(|| {
-            Error::input(self.place(column), "the field is empty", "expected a number")
-        })
+        self.optional(column)?
+            .ok_or_else(|| Error::input(self.place(column), "the field is empty", "expected a number"))
     }
 
     /// A number, `None` where the field is empty (the event did not happen).
@@ -118,9 +115,9 @@ impl<'a> Row<'a> {
         if text.is_empty() {
             return Ok(None);
         }
-        text.parse().map(Some).map_err(|_| {
-            Error::input(self.place(column), format!("`{text}` is no number"), "expected a number")
-        })
+        text.parse()
+            .map(Some)
+            .map_err(|_| Error::input(self.place(column), format!("`{text}` is no number"), "expected a number"))
     }
 
     /// A flag written as 0 or 1.

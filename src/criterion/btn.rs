@@ -249,11 +249,9 @@ mod tests {
             (25.0, [2.30, 2.36, 2.43]),
         ];
         for (v, [exact, delay, ratio]) in expected {
-            for (form, ttc) in [
-                (BtnForm::Exact, exact),
-                (BtnForm::EquivalentDelay, delay),
-                (BtnForm::DistanceRatio, ratio),
-            ] {
+            for (form, ttc) in
+                [(BtnForm::Exact, exact), (BtnForm::EquivalentDelay, delay), (BtnForm::DistanceRatio, ratio)]
+            {
                 let ours = critical_ttc(form, v);
                 // The specification prints two decimals, one of them rounded up (1.5348 as 1.54).
                 assert!((ours - ttc).abs() < 0.0055, "{form:?} at {v} m/s: {ours} instead of {ttc}");

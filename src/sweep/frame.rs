@@ -226,8 +226,7 @@ fn see<R: Real>(
         half_lengths: other.half_lengths,
     };
     let present = other.used != 0 && index >= other.present_from && index < other.present_until;
-    let judged =
-        present && criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral.position, ego.width);
+    let judged = present && criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral.position, ego.width);
     Seen { view, lateral: lateral.position, present, judged }
 }
 

@@ -158,13 +158,7 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
 
 /// The JRC's cut-out: nothing before the exposure, then the vehicle ahead; a cutting-out vehicle that hits
 /// it freezes there and takes its place.
-fn expose(
-    case: &Case,
-    profile: &Profile,
-    series: &Series,
-    others: &mut [LaneOther<f64>; 2],
-    tables: &mut Tables<f64>,
-) {
+fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2], tables: &mut Tables<f64>) {
     let Some(ahead) = &case.ahead else { return };
     let dt = profile.frame.dt_s;
     let cap = profile.step_cap();

@@ -4,12 +4,20 @@
 //! and partial results. Here lives no physics of a driver or a criterion, and nothing about scores. Cases
 //! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
 
+mod backend;
+mod cpu;
 mod drivers;
 mod frame;
 mod lane_case;
 mod outcome;
+mod plan;
+mod study;
 
+pub use backend::{Backend, Chunk, Session, Wanted};
+pub use cpu::CpuBackend;
 pub use drivers::Constants;
 pub use frame::{Frame, Observer, Seen, Silent, Start, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
+pub use study::{StudyOptions, StudyPlan, plan_study};

@@ -1,6 +1,7 @@
 //! What a lane says when it is over.
 
 use crate::criterion::{Contact, Criterion};
+use crate::scalar::Real;
 
 /// "Did not happen" as a step index.
 pub const NO_STEP: u32 = u32::MAX;
@@ -68,4 +69,24 @@ pub struct Outcome<R> {
     pub max_btn: R,
     /// Smallest gap to a vehicle that TTC and BTN look at, m; infinite where there was none.
     pub min_gap: R,
+}
+
+impl<R: Real> Outcome<R> {
+    /// The same in f64, exactly.
+    pub fn widen(&self) -> Outcome<f64> {
+        Outcome {
+            verdicts: self.verdicts,
+            contact: self.contact,
+            contact_with: self.contact_with,
+            end: self.end,
+            reaction_step: self.reaction_step,
+            contact_step: self.contact_step,
+            end_step: self.end_step,
+            impact_speed: self.impact_speed.to_f64(),
+            impact_closing_speed: self.impact_closing_speed.to_f64(),
+            min_ttc: self.min_ttc.to_f64(),
+            max_btn: self.max_btn.to_f64(),
+            min_gap: self.min_gap.to_f64(),
+        }
+    }
 }

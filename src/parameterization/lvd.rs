@@ -1,0 +1,49 @@
+//! LVD i and ii: the leader's speed falls linearly or along half a cosine from v0 to v1, then holds.
+
+use super::options::ParameterizationOptions;
+use super::series::{at, steps_of};
+use crate::scenario::{Case, Category, Lateral, Participant, Scenario, Speed};
+use crate::{Error, Result};
+
+pub fn case(key: &str, scenario: &Scenario, dt_s: f64, options: &ParameterizationOptions) -> Result<Case> {
+    let target = &scenario.target;
+    let duration_s = scenario.duration_s();
+    let (v0, v1) = (target.v[0].max(0.0), target.v[target.v.len() - 1].max(0.0));
+    let speed = match key {
+        "i" => Speed::Kinematic {
+            initial_mps: v0,
+            acceleration_mps2: if duration_s > 0.0 { (v1 - v0) / duration_s } else { 0.0 },
+            until_s: duration_s,
+        },
+        "ii" => {
+            let n = options.sinusoid_intervals;
+            let points: Vec<f64> =
+                (0..=n).map(|k| sinusoidal_speed(v0, v1, duration_s, duration_s * k as f64 / n as f64)).collect();
+            let value = |i: usize| match n {
+                0 => sinusoidal_speed(v0, v1, duration_s, i as f64 * dt_s),
+                _ => at(&points, n as f64 / duration_s, (i as f64 * dt_s).min(duration_s)),
+            };
+            Speed::Sampled((0..steps_of(duration_s, dt_s)).map(value).collect())
+        }
+        _ => return Err(Error::Internal(format!("LVD parameterization {key} is not kinematic"))),
+    };
+    Ok(Case {
+        category: Category::Lvd,
+        ego_length_m: scenario.ego.length,
+        ego_width_m: scenario.ego.width,
+        ego_speed_mps: v0,
+        principal: Participant { length_m: target.length, width_m: target.width, speed, lateral: Lateral::Centred },
+        ahead: None,
+        horizon_s: duration_s,
+    })
+}
+
+/// v(t) = v0 − (Δ/2)(1 − cos(πt/T)) up to T, then v1, with Δ = v0 − v1 (paper, LVD ii).
+pub(crate) fn sinusoidal_speed(v0: f64, v1: f64, duration_s: f64, t_s: f64) -> f64 {
+    if t_s >= duration_s || duration_s <= 0.0 {
+        v1
+    } else {
+        let phase = std::f64::consts::PI * t_s / duration_s;
+        v0 - (v0 - v1) / 2.0 * (1.0 - libm::cos(phase))
+    }
+}

@@ -1,0 +1,107 @@
+//! Named options where the paper is silent or leaves a choice; defaults are the specification's.
+
+use serde::{Deserialize, Serialize};
+
+/// What a constant acceleration does after the scenario's duration T.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AfterDuration {
+    /// The speed is held: only this reproduces the paper's ordering.
+    Hold,
+    /// The acceleration goes on.
+    Unlimited,
+}
+
+/// Which lateral speed a constant one stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LateralSpeed {
+    /// |y(0) − y(T)|/T: higher F1 on real cut-ins.
+    Mean,
+    /// Mean of the first 0.4 s.
+    Initial,
+}
+
+/// Where a cut-in with constant lateral speed starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LateralStart {
+    /// At 3.5 m (the paper).
+    LaneWidth,
+    /// Where the recorded one started.
+    Recorded,
+}
+
+/// Weight of a series in the decomposition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SeriesScale {
+    /// 1/(n_t σ̄), as published.
+    PerInstant,
+    /// 1/(sqrt(n_t) σ̄): a series counts as much as an extra.
+    PerSeries,
+}
+
+/// Sign of the lateral series in the decomposition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SvdLateral {
+    /// Left positive, as published; the reconstruction is mirrored by the recorded side.
+    Signed,
+    /// Positive on the side the target comes from or leaves to.
+    Mirrored,
+}
+
+/// Which scenarios the decomposition is fitted on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SvdFit {
+    /// Those that passed the filters.
+    Kept,
+    /// All mined ones that can be simulated.
+    All,
+}
+
+/// Options of all parameterizations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ParameterizationOptions {
+    /// Constant acceleration after T (2, 4, b, d).
+    pub after_duration: AfterDuration,
+    /// Constant lateral speed (1, 2, a, b).
+    pub lateral_speed: LateralSpeed,
+    /// Start of 1 and 2.
+    pub lateral_start: LateralStart,
+    /// Lateral distance of a lane change, m (3.5).
+    pub lane_change_m: f64,
+    /// Least lateral speed, m/s (1e-3).
+    pub least_lateral_speed_mps: f64,
+    /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
+    /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
+    pub sinusoid_intervals: usize,
+    /// n_t: instants of a series in the decomposition (50).
+    pub svd_instants: usize,
+    /// Weight of a series.
+    pub series_scale: SeriesScale,
+    /// Sign of the lateral series.
+    pub svd_lateral: SvdLateral,
+    /// Scenarios the decomposition is fitted on.
+    pub svd_fit: SvdFit,
+}
+
+impl Default for ParameterizationOptions {
+    fn default() -> Self {
+        ParameterizationOptions {
+            after_duration: AfterDuration::Hold,
+            lateral_speed: LateralSpeed::Mean,
+            lateral_start: LateralStart::LaneWidth,
+            lane_change_m: 3.5,
+            least_lateral_speed_mps: 1e-3,
+            sinusoid_intervals: 0,
+            svd_instants: 50,
+            series_scale: SeriesScale::PerInstant,
+            svd_lateral: SvdLateral::Signed,
+            svd_fit: SvdFit::Kept,
+        }
+    }
+}

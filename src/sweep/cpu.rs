@@ -1,0 +1,115 @@
+//! The CPU backend: every unit is a task of the rayon pool, every lane a scalar loop. f32 computes the lane
+//! arithmetic that all backends share; f64 is the reference.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::backend::{Backend, Chunk, Session, Wanted};
+use super::drivers::Constants;
+use super::frame::{Silent, Start};
+use super::outcome::{Outcome, Verdicts};
+use super::plan::LanePlan;
+use crate::Result;
+use crate::scalar::Real;
+use crate::scenario::Tables;
+
+/// Rayon over units, scalar lanes, in the arithmetic `R`.
+#[derive(Debug, Default)]
+pub struct CpuBackend<R> {
+    arithmetic: PhantomData<R>,
+}
+
+impl CpuBackend<f32> {
+    /// The lane arithmetic: binary32.
+    pub fn lane_arithmetic() -> Self {
+        CpuBackend { arithmetic: PhantomData }
+    }
+}
+
+impl CpuBackend<f64> {
+    /// The reference: binary64, same source.
+    pub fn reference() -> Self {
+        CpuBackend { arithmetic: PhantomData }
+    }
+}
+
+impl<R: Real> Backend for CpuBackend<R> {
+    fn describe(&self) -> String {
+        let bits = 8 * std::mem::size_of::<R>();
+        let threads = rayon::current_num_threads();
+        format!("CPU, {threads} thread{}, scalar binary{bits}", if threads == 1 { "" } else { "s" })
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        Ok(Box::new(CpuSession::<R> {
+            plan,
+            tables: plan.tables().cast(),
+            constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
+            starts: plan.headways.iter().map(|h| h.start()).collect(),
+        }))
+    }
+}
+
+struct CpuSession<'p, R> {
+    plan: &'p LanePlan,
+    tables: Tables<R>,
+    /// One per block.
+    constants: Vec<Constants<R>>,
+    starts: Vec<Start<R>>,
+}
+
+impl<R: Real> CpuSession<'_, R> {
+    /// All lanes of one unit, in the plan's order.
+    fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
+        let variants = self.plan.blocks[block].variants.len();
+        let mut at = 0;
+        for variant in 0..variants {
+            let case = self.plan.case(block, unit, variant).cast::<R>();
+            for &start in &self.starts {
+                for &model in &self.plan.models {
+                    each(at, self.constants[block].run(model, &case, &self.tables, start, &mut Silent));
+                    at += 1;
+                }
+            }
+        }
+    }
+}
+
+impl<R: Real> Session for CpuSession<'_, R> {
+    fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        let plan = self.plan;
+        let first_lane = plan.first_lane_of(units.start);
+        let mut verdicts = Vec::new();
+        let mut outcomes = Vec::new();
+        for (block, inside) in plan.segments(units.clone()) {
+            let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
+            let count = (inside.end - inside.start) as usize;
+            match wanted {
+                Wanted::Verdicts => {
+                    let from = verdicts.len();
+                    verdicts.resize(from + count * per_unit, Verdicts::default());
+                    verdicts[from..].par_chunks_mut(per_unit).enumerate().for_each(|(k, lanes)| {
+                        self.run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
+                    });
+                }
+                Wanted::Outcomes => {
+                    let per_units: Vec<Vec<Outcome<f64>>> = (0..count)
+                        .into_par_iter()
+                        .map(|k| {
+                            let mut lanes = Vec::with_capacity(per_unit);
+                            self.run_unit(block, inside.start + k as u64, |_, o| lanes.push(o.widen()));
+                            lanes
+                        })
+                        .collect();
+                    for lanes in per_units {
+                        verdicts.extend(lanes.iter().map(|o| o.verdicts));
+                        outcomes.extend(lanes);
+                    }
+                }
+            }
+        }
+        Ok(Chunk { units, first_lane, verdicts, outcomes })
+    }
+}

@@ -1,0 +1,264 @@
+//! The lane plan: what is swept, in which order, and everything f64 that the host computed before the
+//! lanes. Made once, hashed, never recomputed.
+//!
+//! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by
+//! mixed radix from the plan's own counts. Ranges are intervals of units, so S and its S' never part.
+
+use std::ops::Range;
+
+use sha2::{Digest, Sha256};
+
+use crate::driver::ModelId;
+use crate::profile::Profile;
+use crate::scenario::{Category, Tables};
+use crate::sweep::frame::Start;
+use crate::{Error, Place, Result};
+
+use super::lane_case::LaneCase;
+
+/// Headway of a lane.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Headway {
+    /// Time headway, s: the initial gap is this times the ego's initial speed, bumper to bumper.
+    ThwS(f64),
+    /// Initial gap, m, bumper to bumper.
+    GapM(f64),
+}
+
+impl Headway {
+    /// The paper's ten: 2.0, 1.8, … 0.2 s.
+    pub fn paper() -> Vec<Headway> {
+        (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
+    }
+
+    /// As a lane starts, rounded once.
+    pub fn start<R: crate::scalar::Real>(self) -> Start<R> {
+        match self {
+            Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
+            Headway::GapM(m) => Start::Gap(R::from_f64(m)),
+        }
+    }
+}
+
+impl std::fmt::Display for Headway {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Headway::ThwS(s) => write!(f, "{s}s"),
+            Headway::GapM(m) => write!(f, "{m}m"),
+        }
+    }
+}
+
+/// Gives the case of (unit, variant) as a pure function: a table for the study; generators and grids for
+/// sampling and maps.
+pub trait CaseSource: Send + Sync {
+    /// The case; `block` and `unit` count from 0 (unit within its block), variant 0 is S.
+    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64>;
+    /// The series that motions point into.
+    fn tables(&self) -> &Tables<f64>;
+}
+
+/// One category's part of the plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Keys of the units (scenarios), in order.
+    pub units: Vec<String>,
+    /// Names of the variants; the first is `S`.
+    pub variants: Vec<String>,
+    /// Number of units before this block.
+    pub first_unit: u64,
+    /// Number of lanes before this block.
+    pub first_lane: u64,
+}
+
+/// What is swept.
+pub struct LanePlan {
+    /// Profile, with the time step.
+    pub profile: Profile,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// Headways, in order.
+    pub headways: Vec<Headway>,
+    /// Categories, in order.
+    pub blocks: Vec<Block>,
+    source: Box<dyn CaseSource>,
+    hash: String,
+}
+
+/// Where a lane stands in its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct LaneKey {
+    /// Index into [`LanePlan::blocks`].
+    pub block: usize,
+    /// Unit within the block.
+    pub unit: u64,
+    /// Variant within the block; 0 is S.
+    pub variant: usize,
+    /// Index into [`LanePlan::headways`].
+    pub headway: usize,
+    /// Index into [`LanePlan::models`].
+    pub model: usize,
+}
+
+impl LanePlan {
+    /// Makes and hashes a plan. `blocks` need categories, units and variants only; their firsts are set here.
+    pub fn new(
+        profile: Profile,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
+        mut blocks: Vec<Block>,
+        source: Box<dyn CaseSource>,
+    ) -> Result<LanePlan> {
+        let empty = [("driver models", models.is_empty()), ("headways", headways.is_empty())];
+        if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
+            return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
+        }
+        let (mut unit, mut lane) = (0, 0);
+        for block in &mut blocks {
+            block.first_unit = unit;
+            block.first_lane = lane;
+            unit += block.units.len() as u64;
+            lane += (block.units.len() * block.variants.len() * headways.len() * models.len()) as u64;
+        }
+        let mut plan = LanePlan { profile, models, headways, blocks, source, hash: String::new() };
+        plan.hash = plan.content_hash();
+        Ok(plan)
+    }
+
+    /// The case of a unit's variant.
+    pub fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        self.source.case(block, unit, variant)
+    }
+
+    /// The series that motions point into.
+    pub fn tables(&self) -> &Tables<f64> {
+        self.source.tables()
+    }
+
+    /// SHA-256 over everything that decides the outcomes, in hexadecimal.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Number of units of all blocks.
+    pub fn unit_count(&self) -> u64 {
+        self.blocks.last().map_or(0, |b| b.first_unit + b.units.len() as u64)
+    }
+
+    /// Number of lanes of all blocks.
+    pub fn lane_count(&self) -> u64 {
+        self.blocks.last().map_or(0, |b| b.first_lane + b.units.len() as u64 * self.lanes_per_unit(b))
+    }
+
+    /// Lanes of one unit of a block.
+    pub fn lanes_per_unit(&self, block: &Block) -> u64 {
+        (block.variants.len() * self.headways.len() * self.models.len()) as u64
+    }
+
+    /// Index of the first lane of a unit (counted over all blocks), or the number of lanes at the end.
+    pub fn first_lane_of(&self, unit: u64) -> u64 {
+        let found = self.blocks.iter().rev().find(|b| b.first_unit <= unit && !b.units.is_empty());
+        found.map_or(0, |b| b.first_lane + (unit - b.first_unit).min(b.units.len() as u64) * self.lanes_per_unit(b))
+    }
+
+    /// Splits an interval of units (over all blocks) at the blocks' borders: (block, units within it).
+    pub fn segments(&self, units: Range<u64>) -> Vec<(usize, Range<u64>)> {
+        let mut segments = Vec::new();
+        for (index, block) in self.blocks.iter().enumerate() {
+            let end = block.first_unit + block.units.len() as u64;
+            let (from, to) = (units.start.max(block.first_unit), units.end.min(end));
+            if from < to {
+                segments.push((index, from - block.first_unit..to - block.first_unit));
+            }
+        }
+        segments
+    }
+
+    /// Lane index of a key.
+    pub fn lane(&self, key: &LaneKey) -> u64 {
+        let block = &self.blocks[key.block];
+        let inner = (key.variant * self.headways.len() + key.headway) * self.models.len() + key.model;
+        block.first_lane + key.unit * self.lanes_per_unit(block) + inner as u64
+    }
+
+    /// Key of a lane index; `None` beyond the plan.
+    pub fn key(&self, lane: u64) -> Option<LaneKey> {
+        if lane >= self.lane_count() {
+            return None;
+        }
+        let block = self.blocks.iter().rposition(|b| b.first_lane <= lane && !b.units.is_empty())?;
+        let inside = lane - self.blocks[block].first_lane;
+        let per_unit = self.lanes_per_unit(&self.blocks[block]);
+        let rest = (inside % per_unit) as usize;
+        let (models, headways) = (self.models.len(), self.headways.len());
+        Some(LaneKey {
+            block,
+            unit: inside / per_unit,
+            variant: rest / (models * headways),
+            headway: rest / models % headways,
+            model: rest % models,
+        })
+    }
+
+    /// A lane's key as text: `01_cut_in_81_74_836/2/1.8s/FSM`. Errors and tables print it.
+    pub fn key_text(&self, key: &LaneKey) -> String {
+        let block = &self.blocks[key.block];
+        format!(
+            "{}/{}/{}/{}",
+            block.units[key.unit as usize],
+            block.variants[key.variant],
+            self.headways[key.headway],
+            self.models[key.model].name()
+        )
+    }
+
+    /// The key that a text stands for.
+    pub fn parse_key(&self, text: &str) -> Option<LaneKey> {
+        let parts: Vec<&str> = text.rsplitn(4, '/').collect();
+        let [model, headway, variant, unit] = parts[..] else { return None };
+        let model = ModelId::parse(model)?;
+        let model = self.models.iter().position(|m| *m == model)?;
+        let headway = self.headways.iter().position(|h| h.to_string() == headway)?;
+        self.blocks.iter().enumerate().find_map(|(at, block)| {
+            let unit = block.units.iter().position(|u| u == unit)? as u64;
+            let variant = block.variants.iter().position(|v| v == variant)?;
+            Some(LaneKey { block: at, unit, variant, headway, model })
+        })
+    }
+
+    fn content_hash(&self) -> String {
+        let mut digest = Sha256::new();
+        let mut text = |part: &str| {
+            digest.update((part.len() as u64).to_le_bytes());
+            digest.update(part.as_bytes());
+        };
+        text("lanesweep plan 1");
+        // Debug of f64 is the shortest text that reads back to the same bits.
+        text(&format!("{:?}", self.profile));
+        text(&format!("{:?}", self.models));
+        text(&format!("{:?}", self.headways));
+        for block in &self.blocks {
+            text(&format!("{block:?}"));
+        }
+        let tables = self.tables();
+        for value in tables.speed.iter().chain(tables.lateral.iter().flatten()) {
+            digest.update(value.to_bits().to_le_bytes());
+        }
+        for (at, block) in self.blocks.iter().enumerate() {
+            for unit in 0..block.units.len() as u64 {
+                for variant in 0..block.variants.len() {
+                    digest.update(format!("{:?}", self.case(at, unit, variant)).as_bytes());
+                }
+            }
+        }
+        hex(&digest.finalize())
+    }
+}
+
+/// Bytes in hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
