@@ -1,0 +1,205 @@
+//! One recording's three files into the internal model. Only the columns that the model needs are
+//! looked at, each line once, and nothing is kept but the model itself.
+
+use super::columns::{Column, FileChecksum, Table};
+use super::inventory::HighdFiles;
+use super::meta::{self, RecordingMeta, Vehicle};
+use crate::trajectory::{NO_LANE, Recording, Track};
+use crate::{Error, Result};
+
+/// A recording as read, with what a run's record says about its files.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The recording.
+    pub recording: Recording,
+    /// Content of the three files, in the order tracks, tracksMeta, recordingMeta.
+    pub checksum_sha256: Vec<FileChecksum>,
+    /// Number of data lines in `tracks`.
+    pub rows: u64,
+    /// Size of the three files together, bytes.
+    pub bytes: u64,
+    /// What was decided while reading and the user may want to know, as sentences.
+    pub notes: Vec<String>,
+}
+
+/// Reads one recording. Each file is read once, from start to end.
+///
+/// The lines of `tracks` may be grouped by vehicle or by frame; each vehicle's frames must ascend by
+/// one. Sizes come from `tracksMeta`; velocities and accelerations are the given ones.
+///
+/// # Errors
+/// Anything that is not as it must be, with file, line and column or vehicle.
+pub fn read(files: &HighdFiles) -> Result<Loaded> {
+    let recording_meta = meta::read_recording_meta(files)?;
+    let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta)?;
+    let mut table = Table::open(&files.tracks)?;
+    let (tracks, notes) = read_tracks(&mut table, &recording_meta, vehicles)?;
+    let rows = table.rows();
+    let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
+    let recording = Recording {
+        id: files.id.clone(),
+        frame_rate_hz: recording_meta.frame_rate_hz,
+        carriageways: recording_meta.carriageways,
+        tracks,
+    };
+    let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
+    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
+}
+
+struct TrackColumns {
+    frame: Column,
+    id: Column,
+    x: Column,
+    y: Column,
+    velocity_x: Column,
+    velocity_y: Column,
+    acceleration_x: Column,
+    lane: Option<Column>,
+}
+
+impl TrackColumns {
+    fn of(table: &Table) -> Result<Self> {
+        Ok(TrackColumns {
+            frame: table.column("frame")?,
+            id: table.column("id")?,
+            x: table.column("x")?,
+            y: table.column("y")?,
+            velocity_x: table.column("xVelocity")?,
+            velocity_y: table.column("yVelocity")?,
+            acceleration_x: table.column("xAcceleration")?,
+            lane: table.optional_column("laneId")?,
+        })
+    }
+}
+
+/// Frames that are further away from zero are damage; the bound keeps every difference of two frames small.
+const FRAME_LIMIT: i64 = 1_000_000_000_000;
+
+fn read_tracks(table: &mut Table, meta: &RecordingMeta, vehicles: Vec<Vehicle>) -> Result<(Vec<Track>, Vec<String>)> {
+    let columns = TrackColumns::of(table)?;
+    let mut notes = Vec::new();
+    if columns.lane.is_none() {
+        notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
+    }
+    let mut tracks: Vec<Track> = vehicles.iter().map(empty_track).collect();
+    let mut at = 0;
+    while table.next_row()? {
+        at = find_vehicle(table, columns.id, &vehicles, at)?;
+        add_sample(table, &columns, meta, &vehicles[at], &mut tracks[at])?;
+    }
+    check_counts(table, &vehicles, &tracks)?;
+    tracks.retain(|track| !track.is_empty());
+    Ok((tracks, notes))
+}
+
+fn empty_track(vehicle: &Vehicle) -> Track {
+    // The announced length saves growing, up to a bound: a damaged number must not take the memory.
+    let samples = vehicle.samples.unwrap_or(0).min(1 << 12) as usize;
+    Track {
+        id: vehicle.id,
+        class: vehicle.class,
+        length_m: vehicle.length_m,
+        width_m: vehicle.width_m,
+        carriageway: vehicle.carriageway,
+        first_frame: 0,
+        s_m: Vec::with_capacity(samples),
+        d_m: Vec::with_capacity(samples),
+        v_s_mps: Vec::with_capacity(samples),
+        v_d_mps: Vec::with_capacity(samples),
+        a_s_mps2: Vec::with_capacity(samples),
+        lane: Vec::with_capacity(samples),
+    }
+}
+
+/// Index of the present line's vehicle. Lines come grouped by vehicle or by frame, so it is mostly the
+/// same as before or the next one.
+fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
+    let id = table.integer(column)?;
+    let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
+    if is(before) {
+        return Ok(before);
+    }
+    if is(before + 1) {
+        return Ok(before + 1);
+    }
+    vehicles.binary_search_by_key(&id, |vehicle| i64::from(vehicle.id)).map_err(|_| {
+        table.bad(
+            column,
+            format!("vehicle {id} is not in the tracksMeta file"),
+            "add its line there, or remove its lines here; check that the files belong to the same recording",
+        )
+    })
+}
+
+fn add_sample(
+    table: &Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicle: &Vehicle,
+    track: &mut Track,
+) -> Result<()> {
+    let frame = table.integer(columns.frame)?;
+    if track.is_empty() {
+        if frame.abs() > FRAME_LIMIT {
+            return Err(table.bad(columns.frame, format!("{frame} is no sensible frame number"), "correct the value"));
+        }
+        track.first_frame = frame;
+    } else if frame != track.last_frame() + 1 {
+        return Err(out_of_step(table, columns.frame, track, frame));
+    }
+    let direction = vehicle.direction;
+    let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
+    track.s_m.push(direction.s_of(table.real(columns.x)?, vehicle.length_m));
+    track.d_m.push(d_m);
+    track.v_s_mps.push(direction.forward(table.real(columns.velocity_x)?));
+    track.v_d_mps.push(direction.leftward(table.real(columns.velocity_y)?));
+    track.a_s_mps2.push(direction.forward(table.real(columns.acceleration_x)?));
+    track.lane.push(match columns.lane {
+        Some(column) => meta.lane_numbers.lane_of(direction, table.integer(column)?),
+        None => meta.carriageways[vehicle.carriageway].lane_at(d_m).map_or(NO_LANE, |lane| lane as u16),
+    });
+    Ok(())
+}
+
+/// A frame that is not the one after the last.
+fn out_of_step(table: &Table, column: Column, track: &Track, frame: i64) -> Error {
+    let (first, last) = (track.first_frame, track.last_frame());
+    let (problem, help) = if (first..=last).contains(&frame) {
+        (format!("frame {frame} appears twice"), "remove one of the two lines")
+    } else if frame < first {
+        (
+            format!("frame {frame} follows frame {last}; expected {}: the frames are out of order", last + 1),
+            "sort the lines by id and frame",
+        )
+    } else {
+        (
+            format!("frame {frame} follows frame {last}; expected {}: a gap, or the frames are out of order", last + 1),
+            "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
+        )
+    };
+    Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, {
+        let _ = column;
+        help
+    })
+}
+
+/// The meta file says how many lines each vehicle has: the only way to notice that a file ends early.
+fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
+    let wrong = |(vehicle, track): &(&Vehicle, &Track)| match vehicle.samples {
+        Some(samples) => samples != track.len() as u64,
+        None => track.is_empty(),
+    };
+    let mut mismatches = vehicles.iter().zip(tracks).filter(wrong);
+    let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
+    let more = match mismatches.count() {
+        0 => String::new(),
+        more => format!(" ({more} more vehicles alike)"),
+    };
+    let expected =
+        vehicle.samples.map_or("at least one".to_owned(), |samples| format!("{samples} (numFrames of tracksMeta)"));
+    Err(Error::input(
+        table.file_place().of(format!("vehicle {}", vehicle.id)),
+        format!("{} lines; expected {expected}{more}: is the file truncated?", track.len()),
+        "copy or export the file again; check that the files belong to the same recording",
+    ))
+}
