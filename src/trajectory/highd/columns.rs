@@ -36,9 +36,12 @@ pub(super) struct Column {
 pub(super) struct Table {
     path: PathBuf,
     reader: Reader<Hashing<File>>,
+    known: &'static [&'static str],
     header: Vec<String>,
     record: ByteRecord,
     line: u64,
+    /// Line on which the last record ended.
+    last_line: u64,
     rows: u64,
 }
 
@@ -46,11 +49,12 @@ pub(super) struct Table {
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
 impl Table {
-    /// Opens a file and reads its header.
+    /// Opens a file and reads its header. `known` are the names that the format gives its columns: a
+    /// column that bears one of them is never suggested as another one misspelt.
     ///
     /// # Errors
     /// If it cannot be read, is empty, or has no comma-separated header in UTF-8.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, known: &'static [&'static str]) -> Result<Self> {
         let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
         let reader = ReaderBuilder::new()
             .has_headers(false)
@@ -59,8 +63,16 @@ impl Table {
             .terminator(Terminator::Any(b'\n'))
             .buffer_capacity(READ_AHEAD_BYTES)
             .from_reader(Hashing::new(file));
-        let mut table =
-            Table { path: path.to_path_buf(), reader, header: Vec::new(), record: ByteRecord::new(), line: 0, rows: 0 };
+        let mut table = Table {
+            path: path.to_path_buf(),
+            reader,
+            known,
+            header: Vec::new(),
+            record: ByteRecord::new(),
+            line: 0,
+            last_line: 0,
+            rows: 0,
+        };
         if !table.read_line()? {
             return Err(Error::input(
                 Place::file(path),
@@ -99,7 +111,7 @@ impl Table {
     /// If the header has none, or two; names the most similar column that is there.
     pub fn column(&self, name: &'static str) -> Result<Column> {
         self.optional_column(name)?.ok_or_else(|| {
-            let problem = format!("the column is missing; the header has {}", list(&self.header));
+            let problem = format!("the column is missing{}", self.strange_names_for_message());
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
                 None => format!("add the column `{name}`, or export the file again in the highD format"),
@@ -129,9 +141,8 @@ impl Table {
     pub fn similar_name(&self, name: &str) -> Option<&str> {
         let plain = |text: &str| text.to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
         let likeness = |header: &str| strsim::jaro_winkler(&plain(header), &plain(name));
-        self.header
-            .iter()
-            .map(|header| (likeness(header), header.as_str()))
+        self.strange_names()
+            .map(|header| (likeness(header), header))
             .filter(|&(likeness, _)| likeness > 0.75)
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, header)| header)
@@ -140,7 +151,9 @@ impl Table {
     /// The bytes of a field.
     pub fn bytes(&self, column: Column) -> &[u8] {
         // Every line has as many fields as the header, so the field is there.
-        self.record.get(column.index).unwrap_or_default()
+        let field = self.record.get(column.index).unwrap_or_default();
+        // Windows line ends leave this in the last field.
+        field.strip_suffix(b"\r").unwrap_or(field)
     }
 
     /// A field as text, without blanks around it.
@@ -158,17 +171,20 @@ impl Table {
         }
     }
 
-    /// A field as a finite number.
+    /// A field as a number between ±10¹²: finite, and what is computed from it stays finite.
     ///
     /// # Errors
-    /// If it is no number, infinite or NaN.
+    /// If it is no number, infinite, NaN or beyond the bounds.
     pub fn real(&self, column: Column) -> Result<f64> {
         match number::real(self.bytes(column)) {
-            Some(value) if value.is_finite() => Ok(value),
+            Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
+            Some(value) if value.is_finite() => {
+                Err(self.bad(column, format!("{} is out of range", self.shown(column)), "correct the value"))
+            }
             Some(_) => Err(self.bad(
                 column,
                 format!("{} is not finite; expected a finite number", self.shown(column)),
-                "correct the value, or remove the vehicle from all three files",
+                "correct the value, or remove the vehicle from the recording",
             )),
             None => Err(self.not_a_number(column, "a number")),
         }
@@ -209,14 +225,9 @@ impl Table {
         Place::file(&self.path)
     }
 
-    /// A field as it is shown in messages: quoted, without control characters, not too long.
+    /// A field as messages show it.
     pub fn shown(&self, column: Column) -> String {
-        let text = String::from_utf8_lossy(self.bytes(column));
-        let mut shown: String = text.chars().take(40).flat_map(char::escape_debug).collect();
-        if text.chars().nth(40).is_some() {
-            shown.push('…');
-        }
-        format!("`{shown}`")
+        quoted(&String::from_utf8_lossy(self.bytes(column)))
     }
 
     /// Closes the file; the checksum is of what was read, which is all of it after the last row.
@@ -237,9 +248,9 @@ impl Table {
             if !found {
                 return Ok(false);
             }
-            let end = self.reader.position();
-            self.line = end.line() - u64::from(!self.ends_open());
-            self.strip_carriage_return();
+            let end_line = self.reader.position().line() - u64::from(!self.ends_open());
+            self.line = if end_line > self.last_line + 1 { end_line - self.inner_line_ends() } else { end_line };
+            self.last_line = end_line;
             if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
                 return Ok(true);
             }
@@ -252,15 +263,23 @@ impl Table {
         hashing.at_end && self.reader.position().byte() == hashing.bytes && hashing.last != b'\n'
     }
 
-    fn strip_carriage_return(&mut self) {
-        let fields = self.record.len();
-        if let Some(last) = fields.checked_sub(1).and_then(|last| self.record.get(last))
-            && last.ends_with(b"\r")
-        {
-            let stripped = last[..last.len() - 1].to_vec();
-            self.record.truncate(fields - 1);
-            self.record.push_field(&stripped);
+    /// Line ends inside the fields of the record, where quotes allow them.
+    fn inner_line_ends(&self) -> u64 {
+        self.record.as_slice().iter().filter(|&&byte| byte == b'\n').count() as u64
+    }
+
+    /// Header names that the format does not know.
+    fn strange_names(&self) -> impl Iterator<Item = &str> {
+        self.header.iter().map(String::as_str).filter(|name| !self.known.contains(name))
+    }
+
+    /// What of the header helps to find a misnamed column.
+    fn strange_names_for_message(&self) -> String {
+        let strange: Vec<&str> = self.strange_names().collect();
+        if strange.is_empty() {
+            return String::new();
         }
+        format!("; the header has names that the format does not have: {}", list(&strange))
     }
 
     fn check_header(&self) -> Result<()> {
@@ -288,6 +307,13 @@ impl Table {
         let place = self.place();
         let (found, expected) = (self.record.len(), self.header.len());
         let problem = format!("the line has {found} fields; expected {expected}, as many as the header");
+        if self.inner_line_ends() > 0 {
+            return Error::input(
+                place,
+                format!("{problem}: a quotation mark is opened and not closed on this line"),
+                "remove the quotation mark; the format needs none",
+            );
+        }
         if found > expected {
             return Error::input(
                 place,
@@ -326,18 +352,21 @@ fn header_name(field: &[u8]) -> String {
     String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
 }
 
-/// Column names for a message, the first few of many.
-fn list(names: &[String]) -> String {
-    const SHOWN: usize = 25;
-    let mut text = names.iter().take(SHOWN).map(|name| format!("`{}`", name.escape_debug())).collect::<Vec<_>>();
+/// Column names for a message, the first few of many, without control characters.
+fn list(names: &[&str]) -> String {
+    const SHOWN: usize = 10;
+    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
     if names.len() > SHOWN {
-        text.push(format!("{} more", names.len() - SHOWN));
+        shown.push(format!("{} more", names.len() - SHOWN));
     }
-    let mut text = text.join(", ");
-    if text.chars().count() > 600 {
-        text = text.chars().take(600).chain("…".chars()).collect();
-    }
-    text
+    shown.join(", ")
+}
+
+/// Text of a user's file as messages show it: in quotes, without control characters, not too long.
+pub(super) fn quoted(text: &str) -> String {
+    const SHOWN: usize = 40;
+    let end = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
+    format!("`{}{end}`", text.chars().take(SHOWN).flat_map(char::escape_debug).collect::<String>())
 }
 
 fn hex(digest: &[u8]) -> String {

@@ -26,11 +26,11 @@ impl Direction {
         }
     }
 
-    /// As `drivingDirection`, and as the carriageway's name.
-    pub fn number(self) -> i64 {
+    /// As `drivingDirection` and as the carriageway's name.
+    pub fn name(self) -> &'static str {
         match self {
-            Direction::Upper => 1,
-            Direction::Lower => 2,
+            Direction::Upper => "1",
+            Direction::Lower => "2",
         }
     }
 
@@ -95,8 +95,8 @@ impl LaneNumbers {
     pub fn lane_of(self, direction: Direction, lane_id: i64) -> u16 {
         let lane = match direction {
             // Driving towards −x with y down, the left is the greater y.
-            Direction::Upper => self.upper_lines as i64 - lane_id,
-            Direction::Lower => lane_id - self.upper_lines as i64 - 2,
+            Direction::Upper => (self.upper_lines as i64).saturating_sub(lane_id),
+            Direction::Lower => lane_id.saturating_sub(self.upper_lines as i64 + 2),
         };
         let lanes = self.lines(direction).saturating_sub(1) as i64;
         if (0..lanes).contains(&lane) { lane as u16 } else { NO_LANE }

@@ -85,7 +85,10 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
         // A name that is no text cannot become part of a scenario's key; names with a leading point are
         // what some systems leave beside the real files.
         let Ok(name) = entry.file_name().into_string() else { continue };
-        if name.starts_with('.') || !entry.path().is_file() {
+        // Not `Path::is_file`: it says no to everything in a folder that may be listed but not entered.
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        let leads_nowhere = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && !entry.path().exists();
+        if name.starts_with('.') || is_folder || leads_nowhere {
             continue;
         }
         for (file, suffix) in SUFFIXES.iter().enumerate() {

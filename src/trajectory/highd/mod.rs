@@ -6,6 +6,7 @@
 //! folder knows a column name of the format.
 
 mod columns;
+mod format;
 mod frame;
 mod inventory;
 mod meta;

@@ -11,6 +11,10 @@ const EXACT_POWERS: [f64; 23] = [
 /// Digits below which any integer is exact in `f64` (10^15 < 2^53).
 const EXACT_DIGITS: usize = 15;
 
+/// Largest magnitude that a recording's numbers may have. Nothing on a road comes near it; sums and
+/// products of a few numbers below it stay finite, and hundredths of it are exact.
+pub(super) const REAL_LIMIT: f64 = 1e12;
+
 /// The number a field spells, `None` if it spells none. Infinities and NaN are numbers here: the caller
 /// says what it thinks of them. Blanks around the number are allowed.
 pub(super) fn real(field: &[u8]) -> Option<f64> {

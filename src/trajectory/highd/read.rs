@@ -2,6 +2,7 @@
 //! looked at, each line once, and nothing is kept but the model itself.
 
 use super::columns::{Column, FileChecksum, Table};
+use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
 use super::inventory::HighdFiles;
 use super::meta::{self, RecordingMeta, Vehicle};
 use crate::trajectory::{NO_LANE, Recording, Track};
@@ -18,22 +19,25 @@ pub struct Loaded {
     pub rows: u64,
     /// Size of the three files together, bytes.
     pub bytes: u64,
-    /// What was decided while reading and the user may want to know, as sentences.
+    /// What the data leaves open or what looks wrong without being an error, as sentences.
     pub notes: Vec<String>,
 }
 
 /// Reads one recording. Each file is read once, from start to end.
 ///
 /// The lines of `tracks` may be grouped by vehicle or by frame; each vehicle's frames must ascend by
-/// one. Sizes come from `tracksMeta`; velocities and accelerations are the given ones.
+/// one. Sizes come from `tracksMeta`; velocities and accelerations are the given ones; lanes come from
+/// `laneId` or, where that column is absent, from position and lane lines.
 ///
 /// # Errors
 /// Anything that is not as it must be, with file, line and column or vehicle.
 pub fn read(files: &HighdFiles) -> Result<Loaded> {
     let recording_meta = meta::read_recording_meta(files)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta)?;
-    let mut table = Table::open(&files.tracks)?;
-    let (tracks, notes) = read_tracks(&mut table, &recording_meta, vehicles)?;
+    let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let columns = TrackColumns::of(&table)?;
+    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles)?;
+    let notes = notes(&columns, &vehicles, &tracks);
     let rows = table.rows();
     let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
@@ -59,6 +63,11 @@ struct TrackColumns {
 
 impl TrackColumns {
     fn of(table: &Table) -> Result<Self> {
+        let lane = match table.optional_column("laneId")? {
+            // The geometry can stand in for an absent column, but not for a misspelt one.
+            None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
+            lane => lane,
+        };
         Ok(TrackColumns {
             frame: table.column("frame")?,
             id: table.column("id")?,
@@ -67,29 +76,34 @@ impl TrackColumns {
             velocity_x: table.column("xVelocity")?,
             velocity_y: table.column("yVelocity")?,
             acceleration_x: table.column("xAcceleration")?,
-            lane: table.optional_column("laneId")?,
+            lane,
         })
     }
 }
 
-/// Frames that are further away from zero are damage; the bound keeps every difference of two frames small.
-const FRAME_LIMIT: i64 = 1_000_000_000_000;
-
-fn read_tracks(table: &mut Table, meta: &RecordingMeta, vehicles: Vec<Vehicle>) -> Result<(Vec<Track>, Vec<String>)> {
-    let columns = TrackColumns::of(table)?;
-    let mut notes = Vec::new();
-    if columns.lane.is_none() {
-        notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
-    }
+/// The tracks, ascending by id, without those that the meta file announces with no sample.
+fn read_tracks(
+    table: &mut Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicles: &[Vehicle],
+) -> Result<Vec<Track>> {
     let mut tracks: Vec<Track> = vehicles.iter().map(empty_track).collect();
     let mut at = 0;
     while table.next_row()? {
-        at = find_vehicle(table, columns.id, &vehicles, at)?;
-        add_sample(table, &columns, meta, &vehicles[at], &mut tracks[at])?;
+        at = find_vehicle(table, columns.id, vehicles, at)?;
+        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at])?;
     }
-    check_counts(table, &vehicles, &tracks)?;
+    check_counts(table, vehicles, &tracks)?;
     tracks.retain(|track| !track.is_empty());
-    Ok((tracks, notes))
+    if tracks.is_empty() {
+        return Err(Error::input(
+            table.file_place(),
+            "the recording has no vehicle: no line follows the header",
+            "remove the three files of this recording from the folder, or copy them again",
+        ));
+    }
+    Ok(tracks)
 }
 
 fn empty_track(vehicle: &Vehicle) -> Track {
@@ -126,7 +140,7 @@ fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usi
         table.bad(
             column,
             format!("vehicle {id} is not in the tracksMeta file"),
-            "add its line there, or remove its lines here; check that the files belong to the same recording",
+            "add its line there or remove its lines here; check that the files belong to the same recording",
         )
     })
 }
@@ -140,66 +154,97 @@ fn add_sample(
 ) -> Result<()> {
     let frame = table.integer(columns.frame)?;
     if track.is_empty() {
-        if frame.abs() > FRAME_LIMIT {
-            return Err(table.bad(columns.frame, format!("{frame} is no sensible frame number"), "correct the value"));
+        if !(-FRAME_LIMIT..=FRAME_LIMIT).contains(&frame) {
+            return Err(table.bad(columns.frame, format!("{frame} is out of range"), "correct the frame number"));
         }
         track.first_frame = frame;
     } else if frame != track.last_frame() + 1 {
-        return Err(out_of_step(table, columns.frame, track, frame));
+        return Err(out_of_step(table, track, frame));
     }
     let direction = vehicle.direction;
     let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
-    track.s_m.push(direction.s_of(table.real(columns.x)?, vehicle.length_m));
-    track.d_m.push(d_m);
-    track.v_s_mps.push(direction.forward(table.real(columns.velocity_x)?));
-    track.v_d_mps.push(direction.leftward(table.real(columns.velocity_y)?));
-    track.a_s_mps2.push(direction.forward(table.real(columns.acceleration_x)?));
-    track.lane.push(match columns.lane {
+    // Everything is parsed before anything is stored: the series keep the same length.
+    let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
+    let v_s_mps = direction.forward(table.real(columns.velocity_x)?);
+    let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
+    let a_s_mps2 = direction.forward(table.real(columns.acceleration_x)?);
+    let lane = match columns.lane {
         Some(column) => meta.lane_numbers.lane_of(direction, table.integer(column)?),
         None => meta.carriageways[vehicle.carriageway].lane_at(d_m).map_or(NO_LANE, |lane| lane as u16),
-    });
+    };
+    track.s_m.push(s_m);
+    track.d_m.push(d_m);
+    track.v_s_mps.push(v_s_mps);
+    track.v_d_mps.push(v_d_mps);
+    track.a_s_mps2.push(a_s_mps2);
+    track.lane.push(lane);
     Ok(())
 }
 
-/// A frame that is not the one after the last.
-fn out_of_step(table: &Table, column: Column, track: &Track, frame: i64) -> Error {
+/// The error for a frame that is not the one after the vehicle's last.
+fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
     let (first, last) = (track.first_frame, track.last_frame());
     let (problem, help) = if (first..=last).contains(&frame) {
-        (format!("frame {frame} appears twice"), "remove one of the two lines")
+        (
+            format!("frame {frame} of this vehicle is there twice"),
+            "remove one of the two lines, or give the second vehicle an id of its own",
+        )
     } else if frame < first {
         (
-            format!("frame {frame} follows frame {last}; expected {}: the frames are out of order", last + 1),
+            format!("the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
             "sort the lines by id and frame",
         )
     } else {
         (
-            format!("frame {frame} follows frame {last}; expected {}: a gap, or the frames are out of order", last + 1),
+            format!("a gap, or the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
             "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
         )
     };
-    Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, {
-        let _ = column;
-        help
-    })
+    Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
 }
 
-/// The meta file says how many lines each vehicle has: the only way to notice that a file ends early.
+/// The meta file says how many lines each vehicle has: the only way to notice a file that ends early.
 fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
-    let wrong = |(vehicle, track): &(&Vehicle, &Track)| match vehicle.samples {
+    let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
         Some(samples) => samples != track.len() as u64,
         None => track.is_empty(),
-    };
-    let mut mismatches = vehicles.iter().zip(tracks).filter(wrong);
+    });
     let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
-    let more = match mismatches.count() {
-        0 => String::new(),
-        more => format!(" ({more} more vehicles alike)"),
+    let (found, more) = (track.len() as u64, mismatches.count());
+    let expected = match vehicle.samples {
+        Some(samples) => format!("the tracksMeta file announces {samples}"),
+        None => "it is in the tracksMeta file".to_owned(),
     };
-    let expected =
-        vehicle.samples.map_or("at least one".to_owned(), |samples| format!("{samples} (numFrames of tracksMeta)"));
+    let more = if more == 0 { String::new() } else { format!(" ({more} more vehicles do not fit either)") };
+    let truncated = if vehicle.samples.is_none_or(|samples| found < samples) { ": is the file truncated?" } else { "" };
     Err(Error::input(
         table.file_place().of(format!("vehicle {}", vehicle.id)),
-        format!("{} lines; expected {expected}{more}: is the file truncated?", track.len()),
-        "copy or export the file again; check that the files belong to the same recording",
+        format!("the vehicle has {found} frames, but {expected}{more}{truncated}"),
+        "copy or export the files again; check that the three belong to the same recording",
     ))
 }
+
+/// What a user should hear of although the data can be used.
+fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if columns.lane.is_none() {
+        notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
+    }
+    if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
+        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file would not be noticed".to_owned());
+    }
+    let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
+        let mut affected = tracks.iter().filter(|track| applies(track));
+        if let Some(first) = affected.next() {
+            notes.push(format!("{} vehicle(s) {what}, the first is vehicle {}", affected.count() + 1, first.id));
+        }
+    };
+    note("move against their drivingDirection", &|track| {
+        track.s_m.last().zip(track.s_m.first()).is_some_and(|(last, first)| last - first < -BACKWARDS_M)
+    });
+    note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
+    notes
+}
+
+/// Way backwards, in metres, that is more than noise of a standing vehicle.
+const BACKWARDS_M: f64 = 5.0;
