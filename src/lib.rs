@@ -1,12 +1,15 @@
 //! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
 //!
-//! Rooms in the order of the data: [`trajectory`] → [`scenario`] → [`driver`] and [`criterion`] →
-//! [`sweep`].
+//! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
+//! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
+//! (the number a lane computes with), [`conformance`] (other simulators' tables) and [`cli`].
 
+pub mod cli;
 pub mod conformance;
 pub mod criterion;
 pub mod driver;
 pub mod error;
+pub mod mining;
 pub mod parameterization;
 pub mod profile;
 pub mod scalar;

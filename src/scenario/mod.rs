@@ -5,9 +5,11 @@
 //! scenario file and goes to [`crate::parameterization`].
 
 mod case;
+mod jsonl;
 mod mined;
 mod motion;
 
 pub use case::{Ahead, Case, Participant};
+pub use jsonl::read_scenarios;
 pub use mined::{Category, Ego, Other, Scenario, Side};
 pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};

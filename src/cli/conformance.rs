@@ -1,0 +1,121 @@
+//! `lanesweep conformance`: other simulators' tables against our lanes.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use comfy_table::{Table as TextTable, presets};
+
+use super::{Exit, console};
+use crate::conformance::{Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
+use crate::profile::Profile;
+use crate::scenario::read_scenarios;
+use crate::{Error, Place, Result};
+
+/// Compare golden tables of simulated cases with our own lanes
+///
+/// JRC case tables and function tables are run under the profile jrc-2021 in f64; lanes of the paper
+/// profile (--scenarios with --lanes) in f64 and in f32. Ends with code 5 if a collision label differs,
+/// or on a robust row a type, a verdict or a value (by more than 1e-6).
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep conformance cutin.csv lvd.csv cutout.csv functions.csv")]
+pub struct Conformance {
+    /// JRC case tables or function tables (CSV)
+    #[arg(value_name = "FILE")]
+    tables: Vec<PathBuf>,
+    /// Scenarios that the lanes were run on (JSON Lines)
+    #[arg(long, value_name = "FILE", requires = "lanes")]
+    scenarios: Option<PathBuf>,
+    /// Lanes of the paper profile (CSV)
+    #[arg(long, value_name = "FILE", requires = "scenarios")]
+    lanes: Option<PathBuf>,
+}
+
+impl Conformance {
+    pub fn run(&self) -> Result<Exit> {
+        if self.tables.is_empty() && self.lanes.is_none() {
+            return Err(Error::usage(
+                Place::item("conformance"),
+                "there is nothing to compare",
+                "give JRC tables, or --scenarios and --lanes",
+            ));
+        }
+        let mut tallies = Vec::new();
+        let jrc = Profile::load("jrc-2021")?;
+        for path in &self.tables {
+            let table = Table::read(path)?;
+            tallies.extend(match table.kind()? {
+                TableKind::JrcCases => compare_jrc(&table, &jrc)?,
+                TableKind::Functions => compare_functions(&table, &jrc)?,
+            });
+        }
+        let mut text = String::new();
+        if let (Some(scenarios), Some(lanes)) = (&self.scenarios, &self.lanes) {
+            let compared = compare_lanes(&read_scenarios(scenarios)?, &Table::read(lanes)?, &Profile::load("paper")?)?;
+            let _ = writeln!(
+                text,
+                "{} lanes of profile paper in f64 and f32: {} verdicts differ between the two; {} ties (rounding \
+                 decides; equal once the gap moves by 1e-9 m); the end time differs in {} (information).",
+                compared.lanes,
+                compared.f32_different.len(),
+                compared.ties.len(),
+                compared.end_differs
+            );
+            for lane in compared.ties.iter().map(|l| format!("  tie: {l}\n")) {
+                text += &lane;
+            }
+            for lane in compared.f32_different.iter().map(|l| format!("  f32 differs: {l}\n")) {
+                text += &lane;
+            }
+            tallies.extend(compared.tallies);
+        }
+        console::print(&(render(&tallies) + &text))?;
+        let failed: Vec<&Tally> = tallies.iter().filter(|t| !t.passes()).collect();
+        if failed.is_empty() {
+            return Ok(Exit::Ok);
+        }
+        let complaints = failed.iter().flat_map(|t| &t.complaints).take(20);
+        let list: String = complaints.map(|c| format!("\n  {c}")).collect();
+        Err(Error::Verification(format!("{} of {} groups do not agree:{list}", failed.len(), tallies.len())))
+    }
+}
+
+fn render(tallies: &[Tally]) -> String {
+    let mut table = TextTable::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(["what", "model", "rows", "robust", "reacted", "collided", "labels", "types", "fragile", "ok"]);
+    for t in tallies {
+        table.add_row([
+            t.label.clone(),
+            t.model.map_or("-".to_owned(), |m| m.name().to_owned()),
+            t.rows.to_string(),
+            t.robust.to_string(),
+            t.reacted.to_string(),
+            t.collided.to_string(),
+            format!("{}/{}", t.labels_equal, t.rows),
+            format!("{}/{}", t.types_equal, t.robust),
+            t.fragile_different.to_string(),
+            if t.passes() { "yes" } else { "NO" }.to_owned(),
+        ]);
+    }
+    let mut text = format!("{table}\n\nLargest deviations on robust rows:\n");
+    let mut largest: Vec<(&str, u64, f64, &str)> = Vec::new();
+    for deviation in tallies.iter().flat_map(|t| &t.deviations) {
+        match largest.iter_mut().find(|l| l.0 == deviation.quantity) {
+            Some(entry) => {
+                entry.1 += deviation.compared;
+                if deviation.largest > entry.2 {
+                    (entry.2, entry.3) = (deviation.largest, &deviation.place);
+                }
+            }
+            None => largest.push((deviation.quantity, deviation.compared, deviation.largest, &deviation.place)),
+        }
+    }
+    for (quantity, compared, value, place) in largest {
+        let at = if value > 0.0 { format!("  at {place}") } else { String::new() };
+        let _ = writeln!(text, "  {quantity:<28} {compared:>7} values  {value:.2e}{at}");
+    }
+    text += "labels: equal collision labels (verdicts, for lanes); fragile: rows in which rounding decides and that \
+             differ (information).\n";
+    text
+}

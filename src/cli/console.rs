@@ -1,0 +1,80 @@
+//! Data on stdout, everything else on stderr; a reader that goes away is no error.
+
+use std::io::{self, IsTerminal, Write};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use tracing::Level;
+
+use crate::{Error, Result};
+
+/// How much is said on stderr.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verbosity {
+    /// Errors only.
+    Quiet,
+    /// What is being done.
+    Normal,
+    /// Everything.
+    Verbose,
+}
+
+/// Sets up the log. Colours only on a terminal and without `NO_COLOR`.
+pub fn start_log(verbosity: Verbosity) {
+    let level = match verbosity {
+        Verbosity::Quiet => Level::ERROR,
+        Verbosity::Normal => Level::INFO,
+        Verbosity::Verbose => Level::DEBUG,
+    };
+    // A second start (a test in the same process) keeps the first log.
+    let _ = tracing_subscriber::fmt()
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+        .with_max_level(level)
+        .with_target(false)
+        .without_time()
+        .try_init();
+}
+
+/// Writes data to stdout.
+pub fn print(text: &str) -> Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(|e| Error::io("standard output", "write", e)),
+    }
+}
+
+/// A progress bar on stderr; silent unless stderr is a terminal.
+pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    if verbosity == Verbosity::Quiet || !io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {eta}") {
+        bar.set_style(style);
+    }
+    bar.set_message(what.to_owned());
+    bar
+}
+
+/// Draws an error with its help on stderr.
+pub fn complain(error: &Error) {
+    let report = miette::Report::new(Drawn { text: error.to_string(), help: error.help() });
+    let mut stderr = io::stderr().lock();
+    // Where stderr is gone there is nobody to tell.
+    let _ = writeln!(stderr, "{report:?}");
+}
+
+/// A library error as miette draws it.
+#[derive(Debug, thiserror::Error)]
+#[error("{text}")]
+struct Drawn {
+    text: String,
+    help: Option<String>,
+}
+
+impl miette::Diagnostic for Drawn {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+    }
+}

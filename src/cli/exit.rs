@@ -1,0 +1,73 @@
+//! How the program ends: one documented exit code per kind of ending.
+
+use std::process::ExitCode;
+
+use crate::Error;
+
+/// Exit codes of every verb.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Everything was done.
+    Ok = 0,
+    /// A flag, a key or a profile cannot be used; nothing was done.
+    Usage = 2,
+    /// The data cannot be used; nothing was written.
+    BadInput = 3,
+    /// A result was written, but parts of the input were left out; each is named on stderr.
+    Incomplete = 4,
+    /// A check that was asked for did not pass (conformance).
+    VerificationFailed = 5,
+    /// The system refused to read or write.
+    Io = 6,
+    /// A defect of the program.
+    Internal = 70,
+}
+
+impl Exit {
+    /// All, for documentation.
+    pub const ALL: [Exit; 7] =
+        [Exit::Ok, Exit::Usage, Exit::BadInput, Exit::Incomplete, Exit::VerificationFailed, Exit::Io, Exit::Internal];
+
+    /// The number.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// What it means, in a few words.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Exit::Ok => "done",
+            Exit::Usage => "a flag, key or profile cannot be used; nothing was done",
+            Exit::BadInput => "the data cannot be used; nothing was written",
+            Exit::Incomplete => "a result was written, but parts of the input were left out",
+            Exit::VerificationFailed => "a check did not pass",
+            Exit::Io => "the system refused to read or write",
+            Exit::Internal => "a defect of the program",
+        }
+    }
+
+    /// The table for `--help`.
+    pub fn table() -> String {
+        let lines = Exit::ALL.iter().map(|exit| format!("  {:>2}  {}\n", exit.code(), exit.meaning()));
+        format!("Exit codes:\n{}", lines.collect::<String>())
+    }
+}
+
+impl From<&Error> for Exit {
+    fn from(error: &Error) -> Exit {
+        match error {
+            Error::Input { .. } => Exit::BadInput,
+            Error::Usage { .. } => Exit::Usage,
+            Error::Io { .. } => Exit::Io,
+            Error::Verification(_) => Exit::VerificationFailed,
+            Error::Internal(_) => Exit::Internal,
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> ExitCode {
+        ExitCode::from(exit.code())
+    }
+}

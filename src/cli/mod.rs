@@ -1,0 +1,141 @@
+//! The command line: one file per verb. What was typed is parsed here; what it means is decided in the
+//! library. Data goes to stdout, log and progress to stderr.
+
+mod conformance;
+mod console;
+mod exit;
+mod simulate;
+
+pub use exit::Exit;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use console::Verbosity;
+
+use crate::profile::Profile;
+use crate::{Error, Place, Result};
+
+#[derive(Parser)]
+#[command(
+    name = "lanesweep",
+    version,
+    about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios",
+    long_about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios and tells how \
+                  far the parameterized ones agree with the recorded ones.\n\nStart with: lanesweep study",
+    after_help = Exit::table(),
+    arg_required_else_help = true
+)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Flags of every verb.
+#[derive(Debug, Clone, Args)]
+struct Common {
+    /// Errors only
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// Threads; results do not depend on it [default: all cores]
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+}
+
+impl Common {
+    fn verbosity(&self) -> Verbosity {
+        if self.quiet {
+            Verbosity::Quiet
+        } else if self.verbose {
+            Verbosity::Verbose
+        } else {
+            Verbosity::Normal
+        }
+    }
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Simulate(simulate::Simulate),
+    Conformance(conformance::Conformance),
+}
+
+/// Profile flags of every verb that simulates.
+#[derive(Debug, Clone, Args)]
+struct ProfileFlags {
+    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file
+    #[arg(long, default_value = "paper", value_name = "NAME|FILE")]
+    profile: String,
+    /// Time step, s [default: the profile's]
+    #[arg(long, value_name = "SECONDS")]
+    dt: Option<f64>,
+}
+
+impl ProfileFlags {
+    fn load(&self) -> Result<Profile> {
+        let profile = Profile::load(&self.profile)?;
+        match self.dt {
+            Some(dt) => profile.with_dt(dt),
+            None => Ok(profile),
+        }
+    }
+}
+
+/// Parses the command line, runs the verb and tells how it ended.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let asked_for = !error.use_stderr();
+            // A closed pipe on `--help | head` is success.
+            let _ = error.print();
+            return if asked_for { Exit::Ok } else { Exit::Usage }.into();
+        }
+    };
+    console::start_log(cli.common.verbosity());
+    // A defect must not look like a crash of the user's making.
+    let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(&cli)));
+    let exit = match ended {
+        Ok(Ok(exit)) => exit,
+        Ok(Err(error)) => {
+            console::complain(&error);
+            Exit::from(&error)
+        }
+        Err(_) => {
+            console::complain(&Error::Internal("the program panicked; see the message above".to_owned()));
+            Exit::Internal
+        }
+    };
+    exit.into()
+}
+
+fn run(cli: &Cli) -> Result<Exit> {
+    if let Some(threads) = cli.common.threads {
+        if threads == 0 {
+            return Err(Error::usage(Place::item("--threads"), "0 threads cannot work", "use at least 1"));
+        }
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|e| Error::Internal(format!("the thread pool did not start: {e}")))?;
+    }
+    match &cli.verb {
+        Verb::Simulate(verb) => verb.run(),
+        Verb::Conformance(verb) => verb.run(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_flags_do_not_contradict_one_another() {
+        super::Cli::command().debug_assert();
+    }
+}
