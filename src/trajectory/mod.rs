@@ -4,6 +4,7 @@
 //! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
 //! scenarios. Data comes from files or from the generator and goes to [`crate::mining`].
 
+pub mod generator;
 mod recording;
 
 pub use recording::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
