@@ -1,8 +1,9 @@
 //! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
 //!
-//! Rooms in the order of the data: [`trajectory`] → [`scenario`].
+//! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`].
 
 pub mod error;
+pub mod mining;
 pub mod scenario;
 pub mod trajectory;
 

@@ -4,7 +4,10 @@
 //! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
 //! scenarios. Data comes from files or from the generator and goes to [`crate::mining`].
 
+mod ego;
 pub mod generator;
+pub mod highd;
 mod recording;
 
+pub use ego::{EgoView, EgoViewOptions, Encounter, LIMIT_TOLERANCE_M, Sighting};
 pub use recording::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};

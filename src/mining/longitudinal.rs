@@ -1,0 +1,141 @@
+//! Longitudinal activities: when a vehicle accelerates, decelerates or cruises (method.md §3).
+//!
+//! Plain f64 of the speeds as they were read, no tolerance: one golden rests on an exact tie.
+
+use super::options::{LongitudinalOptions, window_samples};
+use super::window::trailing_min;
+
+/// What a vehicle does with its speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Longitudinal {
+    /// Neither of the others.
+    Cruising,
+    /// Speeding up.
+    Accelerating,
+    /// Slowing down.
+    Decelerating,
+}
+
+/// An activity from sample `start` until the next event, or to the end of the track.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LongitudinalEvent {
+    /// First sample.
+    pub start: usize,
+    /// What begins there.
+    pub activity: Longitudinal,
+}
+
+/// Activities of a whole track with speeds `v_mps` in m/s. The first event starts at sample 0; events
+/// ascend; two in a row differ. Empty for an empty track.
+pub fn longitudinal_events(v_mps: &[f64], frame_rate_hz: f64, options: &LongitudinalOptions) -> Vec<LongitudinalEvent> {
+    if v_mps.is_empty() {
+        return Vec::new();
+    }
+    let events = detect(v_mps, window_samples(options.window_s, frame_rate_hz), options);
+    remove_short_cruising(v_mps, &events, options.min_cruise_s * frame_rate_hz)
+}
+
+/// A series seen as rising: for deceleration the negated speed, which is exact, so both activities are
+/// found by the same lines.
+struct Rise {
+    x: Vec<f64>,
+    /// Least value over the trailing window.
+    least: Vec<f64>,
+    /// `calm_from[j]`: first sample ≥ j from which the next window rises by less than the threshold.
+    calm_from: Vec<Option<usize>>,
+    window: usize,
+    threshold: f64,
+}
+
+impl Rise {
+    fn new(x: Vec<f64>, window: usize, threshold: f64) -> Self {
+        let least = trailing_min(&x, window);
+        let mut calm_from = vec![None; x.len() + 1];
+        for j in (0..x.len().saturating_sub(window)).rev() {
+            let end = j + window;
+            calm_from[j] = if x[end] - least[end] < threshold { Some(j) } else { calm_from[j + 1] };
+        }
+        Rise { x, least, calm_from, window, threshold }
+    }
+
+    /// If an activity starts at `k`: its end, `None` inside for the end of the track.
+    fn start(&self, k: usize, min_change: f64) -> Option<Option<usize>> {
+        let ahead = k + self.window;
+        let starts = k >= self.window
+            && ahead < self.x.len()
+            && self.x[k] - self.least[k] >= self.threshold
+            && self.least[ahead] == self.x[k]
+            && self.x[ahead] - self.least[ahead] > 0.0;
+        if !starts {
+            return None;
+        }
+        let end = self.calm_from[k + 1];
+        let last = end.unwrap_or(self.x.len() - 1);
+        ((self.x[last] - self.x[k]).abs() > min_change).then_some(end)
+    }
+}
+
+fn detect(v: &[f64], window: usize, options: &LongitudinalOptions) -> Vec<LongitudinalEvent> {
+    use Longitudinal::{Accelerating, Cruising, Decelerating};
+    let threshold = options.cruise_acceleration_mps2 * options.window_s;
+    let rise = Rise::new(v.to_vec(), window, threshold);
+    let fall = Rise::new(v.iter().map(|v| -v).collect(), window, threshold);
+
+    let mut events = vec![LongitudinalEvent { start: 0, activity: Cruising }];
+    let mut now = Cruising;
+    let mut end = None;
+    for k in window..v.len() {
+        let tests = [(Accelerating, &rise), (Decelerating, &fall)];
+        let begun = tests.into_iter().find_map(|(activity, series)| {
+            if activity == now {
+                return None;
+            }
+            series.start(k, options.min_speed_change_mps).map(|end| (activity, end))
+        });
+        if let Some((activity, its_end)) = begun {
+            now = activity;
+            end = its_end;
+        } else if end == Some(k) {
+            now = Cruising;
+            end = None;
+        } else {
+            continue;
+        }
+        events.push(LongitudinalEvent { start: k, activity: now });
+    }
+    events
+}
+
+/// Cruising shorter than `min_cruise` samples between two activities disappears: equal ones merge,
+/// opposite ones meet at the last extremum of the speed inside.
+fn remove_short_cruising(v: &[f64], events: &[LongitudinalEvent], min_cruise: f64) -> Vec<LongitudinalEvent> {
+    let mut kept: Vec<LongitudinalEvent> = Vec::with_capacity(events.len());
+    let mut i = 0;
+    while i < events.len() {
+        let event = events[i];
+        let (Some(before), Some(&after)) = (kept.last().copied(), events.get(i + 1)) else {
+            kept.push(event);
+            i += 1;
+            continue;
+        };
+        // Whole samples against a product of two numbers that may be rounded (4 s at 29.97 Hz).
+        let short = ((after.start - event.start) as f64) < min_cruise - 1e-6;
+        if event.activity != Longitudinal::Cruising || !short {
+            kept.push(event);
+            i += 1;
+            continue;
+        }
+        if before.activity != after.activity {
+            let start = last_extremum(v, event.start, after.start, after.activity);
+            kept.push(LongitudinalEvent { start, ..after });
+        }
+        i += 2;
+    }
+    kept
+}
+
+/// Where the speed last has its minimum (before an acceleration) or maximum in `first..=last`.
+fn last_extremum(v: &[f64], first: usize, last: usize, next: Longitudinal) -> usize {
+    let sign = if next == Longitudinal::Accelerating { 1.0 } else { -1.0 };
+    (first..=last).fold(first, |best, k| if sign * v[k] <= sign * v[best] { k } else { best })
+}

@@ -1,0 +1,54 @@
+//! LVD, leading vehicle decelerates: one item, the leader decelerates (method.md §3). The ego need not
+//! keep its lane, and there is no pause between two.
+//!
+//! The interval of the tags is trimmed to the first maximum and the first minimum of the leader's speed,
+//! so that it holds the whole loss of speed and nothing else.
+
+use super::data_set::DataSet;
+use super::found::Found;
+use super::options::LvdOptions;
+use super::search::{Item, Match};
+use super::tags::Tags;
+use crate::scenario::{Category, Scenario, Side};
+
+/// The items, in order.
+pub const ITEMS: [Item<'static, Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER | Tags::DECELERATES)];
+
+/// The scenario of one match, with the verdict of the filter; `None` where too little is left after
+/// trimming. `first` is the ego's sample of the first tags of the match's stretch.
+pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, first: usize) -> Option<Scenario> {
+    let target = &set.scene.recording.tracks[target_index];
+    let options = set.scene.options;
+    let offset = set.ego.first_frame - target.first_frame;
+    let v = |k: usize| target.v_s_mps[(k as i64 + offset) as usize];
+    let tagged = matched.last_item();
+    let (mut start, mut end) = (first + tagged.start, first + tagged.start);
+    for k in first + tagged.start..first + tagged.end {
+        if v(k) > v(start) {
+            start = k;
+        }
+        if v(k) < v(end) {
+            end = k;
+        }
+    }
+    let duration_s = (end as f64 - start as f64) / set.scene.recording.frame_rate_hz;
+    if end <= start || duration_s < options.lvd.min_duration_s - options.tolerance {
+        return None;
+    }
+    let found = Found { set, target, category: Category::Lvd, start, end };
+    let d_m = target.d_m[found.sample_of(target, start)?];
+    let side = if d_m < found.lane()?.centre_m() - options.tolerance { Side::Right } else { Side::Left };
+    let mut scenario = found.scenario(side)?;
+    scenario.tag_frames = Some([found.frame(first + matched.start()), found.frame(first + matched.end)]);
+    (scenario.kept, scenario.reason) = verdict(&scenario, &options.lvd, options.tolerance);
+    Some(scenario)
+}
+
+/// The filter of the paper, over the trimmed interval.
+fn verdict(scenario: &Scenario, options: &LvdOptions, tolerance: f64) -> (bool, String) {
+    let limit = options.min_peak_deceleration_mps2;
+    match scenario.peak_decel.is_some_and(|peak| peak > limit + tolerance) {
+        true => (true, format!("peak deceleration > {limit}")),
+        false => (false, format!("peak deceleration <= {limit}")),
+    }
+}

@@ -1,0 +1,76 @@
+//! Search for a sequence of items in tags (method.md §3: *scenario = sequence of items*).
+//!
+//! An item is a test on the tags of all actors at one sample; it holds over a whole interval; item
+//! i + 1 begins exactly when item i ends. Intervals are half open: first sample with the item to the
+//! first without, clamped to the last sample there is.
+
+/// A test on the tags of one sample.
+pub type Item<'a, T> = &'a dyn Fn(&T) -> bool;
+
+/// Where a sequence was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Match {
+    /// First sample of each item.
+    pub starts: Vec<usize>,
+    /// First sample after the last item; the last sample of the tags where the item still holds there.
+    pub end: usize,
+    /// The last item holds to the end of the tags, so `end` is one sample with the item.
+    pub clamped: bool,
+}
+
+impl Match {
+    /// First sample.
+    pub fn start(&self) -> usize {
+        self.starts[0]
+    }
+
+    /// Samples from start to end.
+    pub fn len(&self) -> usize {
+        self.end - self.start()
+    }
+
+    /// True if it starts and ends at the same sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The samples at which the last item holds.
+    pub fn last_item(&self) -> std::ops::Range<usize> {
+        let from = self.starts[self.starts.len() - 1];
+        from..if self.clamped { self.end + 1 } else { self.end }
+    }
+}
+
+/// First sequence that begins at `from` or later. Tags before `from` do not exist for the search: an
+/// item that already holds at `from` begins there.
+pub fn find<T>(tags: &[T], items: &[Item<T>], from: usize) -> Option<Match> {
+    let mut k = from;
+    let first = items.first()?;
+    while k < tags.len() {
+        if !first(&tags[k]) {
+            k += 1;
+            continue;
+        }
+        let mut starts = Vec::with_capacity(items.len());
+        let mut at = k;
+        for item in items {
+            let end = run_end(tags, *item, at);
+            if end == at {
+                break;
+            }
+            starts.push(at);
+            at = end;
+        }
+        if starts.len() == items.len() {
+            let clamped = at == tags.len();
+            return Some(Match { starts, end: at.min(tags.len() - 1), clamped });
+        }
+        k = run_end(tags, *first, k);
+    }
+    None
+}
+
+/// First sample from `k` on without the item.
+fn run_end<T>(tags: &[T], item: Item<T>, k: usize) -> usize {
+    tags[k..].iter().position(|t| !item(t)).map_or(tags.len(), |n| k + n)
+}

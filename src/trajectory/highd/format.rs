@@ -1,0 +1,84 @@
+//! Column names of the three highD files in the order of the format (spec section 1).
+
+/// `NN_tracks.csv`: one line per vehicle and frame.
+pub(super) const TRACKS_COLUMNS: [&str; 25] = [
+    "frame",
+    "id",
+    "x",
+    "y",
+    "width",
+    "height",
+    "xVelocity",
+    "yVelocity",
+    "xAcceleration",
+    "yAcceleration",
+    "frontSightDistance",
+    "backSightDistance",
+    "dhw",
+    "thw",
+    "ttc",
+    "precedingXVelocity",
+    "precedingId",
+    "followingId",
+    "leftPrecedingId",
+    "leftAlongsideId",
+    "leftFollowingId",
+    "rightPrecedingId",
+    "rightAlongsideId",
+    "rightFollowingId",
+    "laneId",
+];
+
+/// `NN_tracksMeta.csv`: one line per vehicle.
+pub(super) const TRACKS_META_COLUMNS: [&str; 16] = [
+    "id",
+    "width",
+    "height",
+    "initialFrame",
+    "finalFrame",
+    "numFrames",
+    "class",
+    "drivingDirection",
+    "traveledDistance",
+    "minXVelocity",
+    "maxXVelocity",
+    "meanXVelocity",
+    "minDHW",
+    "minTHW",
+    "minTTC",
+    "numLaneChanges",
+];
+
+/// `NN_recordingMeta.csv`: one line.
+pub(super) const RECORDING_META_COLUMNS: [&str; 15] = [
+    "id",
+    "frameRate",
+    "locationId",
+    "speedLimit",
+    "month",
+    "weekDay",
+    "startTime",
+    "duration",
+    "totalDrivenDistance",
+    "totalDrivenTime",
+    "numVehicles",
+    "numCars",
+    "numTrucks",
+    "upperLaneMarkings",
+    "lowerLaneMarkings",
+];
+
+/// What the header line of a file is.
+pub(super) fn header(columns: &[&str]) -> String {
+    columns.join(",") + "\n"
+}
+
+/// Frame rates outside these bounds are mistakes (a period instead of a rate, for one), and the counts
+/// that follow from them would not fit anywhere.
+pub(super) const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;
+
+/// Most lane lines of one carriageway; more is damage.
+pub(super) const LANE_LINES_LIMIT: usize = 256;
+
+/// Frames farther from zero are damage; the bound keeps every difference of two frames small.
+pub(super) const FRAME_LIMIT: i64 = 1_000_000_000_000;

@@ -1,0 +1,18 @@
+//! The highD format: a recording is three comma-separated files, `NN_tracks.csv`, `NN_tracksMeta.csv`
+//! and `NN_recordingMeta.csv` (spec section 1).
+//!
+//! Here live the inventory of a folder, the reader and the writer, and the two frames' translation that
+//! both share. Paths come in, [`Recording`](super::Recording)s go out, and back. Nothing outside this
+//! folder knows a column name of the format.
+
+mod columns;
+mod format;
+mod frame;
+mod inventory;
+mod meta;
+mod number;
+mod read;
+
+pub use columns::FileChecksum;
+pub use inventory::{HighdFiles, Inventory, inventory};
+pub use read::{Loaded, read};

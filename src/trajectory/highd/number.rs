@@ -1,0 +1,122 @@
+//! Numbers out of bytes. Most of reading a recording is this, so the plain decimals that highD consists
+//! of take a short way; every other spelling goes to the standard library. Both round correctly, so the
+//! way taken never shows in a value.
+
+/// Powers of ten that `f64` holds exactly.
+const EXACT_POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// Digits below which any integer is exact in `f64` (10^15 < 2^53).
+const EXACT_DIGITS: usize = 15;
+
+/// Largest magnitude that a recording's numbers may have. Nothing on a road comes near it; sums and
+/// products of a few numbers below it stay finite, and hundredths of it are exact.
+pub(super) const REAL_LIMIT: f64 = 1e12;
+
+/// The number a field spells, `None` if it spells none. Infinities and NaN are numbers here: the caller
+/// says what it thinks of them. Blanks around the number are allowed.
+pub(super) fn real(field: &[u8]) -> Option<f64> {
+    short_decimal(field).or_else(|| std::str::from_utf8(field).ok()?.trim().parse().ok())
+}
+
+/// The whole number a field spells; `7.0` counts as 7, because tables that went through a data frame
+/// often spell it so.
+pub(super) fn integer(field: &[u8]) -> Option<i64> {
+    short_integer(field).or_else(|| {
+        let text = std::str::from_utf8(field).ok()?.trim();
+        text.parse().ok().or_else(|| {
+            let value: f64 = text.parse().ok()?;
+            (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64)
+        })
+    })
+}
+
+/// Clinger's exact case: a mantissa and a power of ten that `f64` both holds exactly give, by one
+/// division, the correctly rounded value.
+fn short_decimal(field: &[u8]) -> Option<f64> {
+    let (negative, digits) = match field {
+        [b'-', rest @ ..] => (true, rest),
+        _ => (false, field),
+    };
+    // One more byte than digits, for the point.
+    if digits.is_empty() || digits.len() > EXACT_DIGITS + 1 {
+        return None;
+    }
+    let mut mantissa = 0u64;
+    let mut point = None;
+    for (at, &byte) in digits.iter().enumerate() {
+        let digit = byte.wrapping_sub(b'0');
+        if digit < 10 {
+            mantissa = mantissa * 10 + u64::from(digit);
+        } else if byte == b'.' && point.is_none() {
+            point = Some(at);
+        } else {
+            return None;
+        }
+    }
+    let decimals = match point {
+        Some(_) if digits.len() == 1 => return None,
+        Some(at) => digits.len() - 1 - at,
+        None if digits.len() > EXACT_DIGITS => return None,
+        None => 0,
+    };
+    let value = mantissa as f64 / EXACT_POWERS[decimals];
+    Some(if negative { -value } else { value })
+}
+
+fn short_integer(field: &[u8]) -> Option<i64> {
+    if field.is_empty() || field.len() > EXACT_DIGITS {
+        return None;
+    }
+    let mut value = 0i64;
+    for &byte in field {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            return None;
+        }
+        value = value * 10 + i64::from(digit);
+    }
+    Some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_short_decimal_has_the_same_bits_as_the_standard_librarys(
+            negative: bool, whole in 0u64..10_000_000_000, places in 0usize..8, part: u64,
+        ) {
+            let part = part % 10u64.pow(places as u32);
+            let text = format!("{}{whole}.{part:0places$}", if negative { "-" } else { "" });
+            let text = if places == 0 { text.trim_end_matches(['.', '0']).to_owned() } else { text };
+            prop_assume!(!text.is_empty());
+            let expected = text.parse::<f64>().ok();
+            prop_assert_eq!(real(text.as_bytes()).map(f64::to_bits), expected.map(f64::to_bits));
+        }
+
+        #[test]
+        fn any_bytes_are_read_as_the_standard_library_reads_them(bytes in "[-+0-9.eEnaif ]{0,20}") {
+            let expected = bytes.trim().parse::<f64>().ok();
+            prop_assert_eq!(real(bytes.as_bytes()).map(f64::to_bits), expected.map(f64::to_bits));
+        }
+
+        #[test]
+        fn a_whole_number_survives(value: i64) {
+            prop_assert_eq!(integer(value.to_string().as_bytes()), Some(value));
+        }
+    }
+
+    #[test]
+    fn a_whole_number_may_carry_an_empty_fraction_but_no_other() {
+        assert_eq!(integer(b"7.0"), Some(7));
+        assert_eq!(integer(b" -3 "), Some(-3));
+        assert_eq!(integer(b"7.5"), None);
+        assert_eq!(integer(b""), None);
+        assert_eq!(integer(b"nan"), None);
+    }
+}

@@ -1,0 +1,250 @@
+//! One recording's three files into the internal model. Only the columns that the model needs are
+//! looked at, each line once, and nothing is kept but the model itself.
+
+use super::columns::{Column, FileChecksum, Table};
+use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
+use super::inventory::HighdFiles;
+use super::meta::{self, RecordingMeta, Vehicle};
+use crate::trajectory::{NO_LANE, Recording, Track};
+use crate::{Error, Result};
+
+/// A recording as read, with what a run's record says about its files.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The recording.
+    pub recording: Recording,
+    /// Content of the three files, in the order tracks, tracksMeta, recordingMeta.
+    pub checksum_sha256: Vec<FileChecksum>,
+    /// Number of data lines in `tracks`.
+    pub rows: u64,
+    /// Size of the three files together, bytes.
+    pub bytes: u64,
+    /// What the data leaves open or what looks wrong without being an error, as sentences.
+    pub notes: Vec<String>,
+}
+
+/// Reads one recording. Each file is read once, from start to end.
+///
+/// The lines of `tracks` may be grouped by vehicle or by frame; each vehicle's frames must ascend by
+/// one. Sizes come from `tracksMeta`; velocities and accelerations are the given ones; lanes come from
+/// `laneId` or, where that column is absent, from position and lane lines.
+///
+/// # Errors
+/// Anything that is not as it must be, with file, line and column or vehicle.
+pub fn read(files: &HighdFiles) -> Result<Loaded> {
+    let recording_meta = meta::read_recording_meta(files)?;
+    let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta)?;
+    let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let columns = TrackColumns::of(&table)?;
+    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles)?;
+    let notes = notes(&columns, &vehicles, &tracks);
+    let rows = table.rows();
+    let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
+    let recording = Recording {
+        id: files.id.clone(),
+        frame_rate_hz: recording_meta.frame_rate_hz,
+        carriageways: recording_meta.carriageways,
+        tracks,
+    };
+    let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
+    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
+}
+
+struct TrackColumns {
+    frame: Column,
+    id: Column,
+    x: Column,
+    y: Column,
+    velocity_x: Column,
+    velocity_y: Column,
+    acceleration_x: Column,
+    lane: Option<Column>,
+}
+
+impl TrackColumns {
+    fn of(table: &Table) -> Result<Self> {
+        let lane = match table.optional_column("laneId")? {
+            // The geometry can stand in for an absent column, but not for a misspelt one.
+            None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
+            lane => lane,
+        };
+        Ok(TrackColumns {
+            frame: table.column("frame")?,
+            id: table.column("id")?,
+            x: table.column("x")?,
+            y: table.column("y")?,
+            velocity_x: table.column("xVelocity")?,
+            velocity_y: table.column("yVelocity")?,
+            acceleration_x: table.column("xAcceleration")?,
+            lane,
+        })
+    }
+}
+
+/// The tracks, ascending by id, without those that the meta file announces with no sample.
+fn read_tracks(
+    table: &mut Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicles: &[Vehicle],
+) -> Result<Vec<Track>> {
+    let mut tracks: Vec<Track> = vehicles.iter().map(empty_track).collect();
+    let mut at = 0;
+    while table.next_row()? {
+        at = find_vehicle(table, columns.id, vehicles, at)?;
+        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at])?;
+    }
+    check_counts(table, vehicles, &tracks)?;
+    tracks.retain(|track| !track.is_empty());
+    if tracks.is_empty() {
+        return Err(Error::input(
+            table.file_place(),
+            "the recording has no vehicle: no line follows the header",
+            "remove the three files of this recording from the folder, or copy them again",
+        ));
+    }
+    Ok(tracks)
+}
+
+fn empty_track(vehicle: &Vehicle) -> Track {
+    // The announced length saves growing, up to a bound: a damaged number must not take the memory.
+    let samples = vehicle.samples.unwrap_or(0).min(1 << 12) as usize;
+    Track {
+        id: vehicle.id,
+        class: vehicle.class,
+        length_m: vehicle.length_m,
+        width_m: vehicle.width_m,
+        carriageway: vehicle.carriageway,
+        first_frame: 0,
+        s_m: Vec::with_capacity(samples),
+        d_m: Vec::with_capacity(samples),
+        v_s_mps: Vec::with_capacity(samples),
+        v_d_mps: Vec::with_capacity(samples),
+        a_s_mps2: Vec::with_capacity(samples),
+        lane: Vec::with_capacity(samples),
+    }
+}
+
+/// Index of the present line's vehicle. Lines come grouped by vehicle or by frame, so it is mostly the
+/// same as before or the next one.
+fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
+    let id = table.integer(column)?;
+    let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
+    if is(before) {
+        return Ok(before);
+    }
+    if is(before + 1) {
+        return Ok(before + 1);
+    }
+    vehicles.binary_search_by_key(&id, |vehicle| i64::from(vehicle.id)).map_err(|_| {
+        table.bad(
+            column,
+            format!("vehicle {id} is not in the tracksMeta file"),
+            "add its line there or remove its lines here; check that the files belong to the same recording",
+        )
+    })
+}
+
+fn add_sample(
+    table: &Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicle: &Vehicle,
+    track: &mut Track,
+) -> Result<()> {
+    let frame = table.integer(columns.frame)?;
+    if track.is_empty() {
+        if !(-FRAME_LIMIT..=FRAME_LIMIT).contains(&frame) {
+            return Err(table.bad(columns.frame, format!("{frame} is out of range"), "correct the frame number"));
+        }
+        track.first_frame = frame;
+    } else if frame != track.last_frame() + 1 {
+        return Err(out_of_step(table, track, frame));
+    }
+    let direction = vehicle.direction;
+    let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
+    // Everything is parsed before anything is stored: the series keep the same length.
+    let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
+    let v_s_mps = direction.forward(table.real(columns.velocity_x)?);
+    let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
+    let a_s_mps2 = direction.forward(table.real(columns.acceleration_x)?);
+    let lane = match columns.lane {
+        Some(column) => meta.lane_numbers.lane_of(direction, table.integer(column)?),
+        None => meta.carriageways[vehicle.carriageway].lane_at(d_m).map_or(NO_LANE, |lane| lane as u16),
+    };
+    track.s_m.push(s_m);
+    track.d_m.push(d_m);
+    track.v_s_mps.push(v_s_mps);
+    track.v_d_mps.push(v_d_mps);
+    track.a_s_mps2.push(a_s_mps2);
+    track.lane.push(lane);
+    Ok(())
+}
+
+/// The error for a frame that is not the one after the vehicle's last.
+fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
+    let (first, last) = (track.first_frame, track.last_frame());
+    let (problem, help) = if (first..=last).contains(&frame) {
+        (
+            format!("frame {frame} of this vehicle is there twice"),
+            "remove one of the two lines, or give the second vehicle an id of its own",
+        )
+    } else if frame < first {
+        (
+            format!("the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
+            "sort the lines by id and frame",
+        )
+    } else {
+        (
+            format!("a gap, or the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
+            "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
+        )
+    };
+    Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
+}
+
+/// The meta file says how many lines each vehicle has: the only way to notice a file that ends early.
+fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
+    let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
+        Some(samples) => samples != track.len() as u64,
+        None => track.is_empty(),
+    });
+    let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
+    let (found, more) = (track.len() as u64, mismatches.count());
+    let expected = match vehicle.samples {
+        Some(samples) => format!("the tracksMeta file announces {samples}"),
+        None => "it is in the tracksMeta file".to_owned(),
+    };
+    let more = if more == 0 { String::new() } else { format!(" ({more} more vehicles do not fit either)") };
+    let truncated = if vehicle.samples.is_none_or(|samples| found < samples) { ": is the file truncated?" } else { "" };
+    Err(Error::input(
+        table.file_place().of(format!("vehicle {}", vehicle.id)),
+        format!("the vehicle has {found} frames, but {expected}{more}{truncated}"),
+        "copy or export the files again; check that the three belong to the same recording",
+    ))
+}
+
+/// What a user should hear of although the data can be used.
+fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if columns.lane.is_none() {
+        notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
+    }
+    if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
+        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file would not be noticed".to_owned());
+    }
+    let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
+        let mut affected = tracks.iter().filter(|track| applies(track));
+        if let Some(first) = affected.next() {
+            notes.push(format!("{} vehicle(s) {what}, the first is vehicle {}", affected.count() + 1, first.id));
+        }
+    };
+    note("move against their drivingDirection", &|track| {
+        track.s_m.last().zip(track.s_m.first()).is_some_and(|(last, first)| last - first < -BACKWARDS_M)
+    });
+    note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
+    notes
+}
+
+/// Way backwards, in metres, that is more than noise of a standing vehicle.
+const BACKWARDS_M: f64 = 5.0;
