@@ -5,6 +5,7 @@
 //! scenarios. Data comes from files or from the generator and goes to [`crate::mining`].
 
 mod ego;
+pub mod generator;
 pub mod highd;
 mod recording;
 

@@ -1,0 +1,120 @@
+//! A leader's braking that the traffic around it does not explain: one or two phases, each with a rise,
+//! a hold and a release of their own.
+
+use super::random::Stream;
+
+/// Weakest peak of a scheduled braking, m/s². Weaker ones come about by themselves in the traffic, so
+/// only those from here on are raised by the rate factor.
+pub(super) const WEAKEST_PEAK_MPS2: f64 = 1.4;
+/// Mean excess of the peak over the weakest. Published: 482 of 20,351 leader decelerations exceed
+/// 2 m/s², an exponential tail of about this mean.
+const PEAK_EXCESS_MPS2: f64 = 0.45;
+/// Hardest peak, m/s² (dry road, no full braking in these recordings).
+const HARDEST_PEAK_MPS2: f64 = 6.0;
+/// Share of brakings with a second phase.
+const SECOND_PHASE: f64 = 0.35;
+
+/// One rise, hold and release.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Phase {
+    peak_mps2: f64,
+    start_s: f64,
+    rise_s: f64,
+    hold_s: f64,
+    release_s: f64,
+    /// Change of the deceleration over the hold, as a share of the peak.
+    sag: f64,
+}
+
+impl Phase {
+    fn end_s(&self) -> f64 {
+        self.start_s + self.rise_s + self.hold_s + self.release_s
+    }
+
+    fn deceleration(&self, elapsed_s: f64) -> f64 {
+        let half_cosine = |share: f64| 0.5 * (1.0 - libm::cos(std::f64::consts::PI * share));
+        let t = elapsed_s - self.start_s;
+        let held = t - self.rise_s;
+        let released = held - self.hold_s;
+        if t <= 0.0 || released >= self.release_s {
+            0.0
+        } else if held <= 0.0 {
+            self.peak_mps2 * half_cosine(t / self.rise_s)
+        } else if released <= 0.0 {
+            self.peak_mps2 * (1.0 - self.sag * held / self.hold_s)
+        } else {
+            self.peak_mps2 * (1.0 - self.sag) * (1.0 - half_cosine(released / self.release_s))
+        }
+    }
+}
+
+/// A scheduled braking.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Braking {
+    first: Phase,
+    second: Option<Phase>,
+    /// Time since the start, s.
+    pub elapsed_s: f64,
+}
+
+impl Braking {
+    /// Draws peak and shape.
+    pub fn draw(stream: &mut Stream) -> Braking {
+        let peak = (WEAKEST_PEAK_MPS2 + stream.exponential(PEAK_EXCESS_MPS2)).min(HARDEST_PEAK_MPS2);
+        let first = Self::phase(peak, 0.0, stream);
+        let second = stream.chance(SECOND_PHASE).then(|| {
+            // Starts between the middle of the first release and a second after it.
+            let start = first.end_s() - 0.5 * first.release_s + stream.between(0.0, 1.5);
+            Self::phase(peak * stream.between(0.35, 0.95), start, stream)
+        });
+        Braking { first, second, elapsed_s: 0.0 }
+    }
+
+    fn phase(peak_mps2: f64, start_s: f64, stream: &mut Stream) -> Phase {
+        Phase {
+            peak_mps2,
+            start_s,
+            rise_s: stream.lognormal_within(0.9, 0.35, 0.4, 2.5),
+            hold_s: stream.exponential(0.6).min(2.5) + 0.04,
+            release_s: stream.lognormal_within(1.3, 0.4, 0.5, 4.0),
+            sag: stream.between(-0.05, 0.35).max(0.0),
+        }
+    }
+
+    /// Commanded acceleration now, ≤ 0, m/s².
+    pub fn acceleration(&self) -> f64 {
+        let first = self.first.deceleration(self.elapsed_s);
+        let second = self.second.map_or(0.0, |phase| phase.deceleration(self.elapsed_s));
+        -first.max(second)
+    }
+
+    /// Over for good.
+    pub fn is_over(&self) -> bool {
+        self.elapsed_s >= self.second.unwrap_or(self.first).end_s()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Purpose;
+    use super::*;
+
+    #[test]
+    fn a_braking_rises_to_its_peak_without_jumps_and_ends() {
+        let mut stream = Stream::new(5, 0, 0, Purpose::Decision);
+        for _ in 0..500 {
+            let mut braking = Braking::draw(&mut stream);
+            let (mut before, mut peak) = (0.0, 0.0_f64);
+            while !braking.is_over() {
+                let a = braking.acceleration();
+                assert!((a - before).abs() < 1.0, "jump from {before} to {a}");
+                assert!(a <= 0.0);
+                (before, peak) = (a, peak.max(-a));
+                braking.elapsed_s += 0.04;
+                assert!(braking.elapsed_s < 25.0);
+            }
+            assert!(peak > 0.95 * WEAKEST_PEAK_MPS2 && peak <= HARDEST_PEAK_MPS2, "{peak}");
+            assert_eq!(braking.acceleration(), 0.0);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Car-following: the Intelligent Driver Model with the constant-acceleration heuristic.
+//!
+//! Free and interacting terms are joined by their minimum, so that a driver settles at his own time
+//! headway (with the original product he settles far behind it near the desired speed). The heuristic
+//! (Kesting, Treiber, Helbing 2010, "Enhanced intelligent driver model", eq. 11.3 ff.) keeps the IDM's
+//! smooth approach but removes its full braking when somebody merges at a short gap, which real drivers
+//! answer by a slow opening of the gap.
+
+/// Parameters of one driver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DriverParameters {
+    /// Desired speed v0, m/s.
+    pub desired_speed_mps: f64,
+    /// Desired time headway T, s.
+    pub time_headway_s: f64,
+    /// Standstill gap s0, m.
+    pub standstill_gap_m: f64,
+    /// Largest acceleration a, m/s².
+    pub acceleration_mps2: f64,
+    /// Comfortable deceleration b, m/s².
+    pub comfortable_mps2: f64,
+}
+
+/// What a driver sees of the vehicle ahead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LeaderView {
+    /// Bumper to bumper, m.
+    pub gap_m: f64,
+    /// Its speed, m/s.
+    pub speed_mps: f64,
+    /// Its acceleration as perceived, m/s².
+    pub acceleration_mps2: f64,
+}
+
+/// Hardest braking that any driver commands, m/s².
+pub(super) const HARDEST_BRAKING_MPS2: f64 = 8.0;
+
+/// Share of the heuristic in the mix ("coolness").
+const COOLNESS: f64 = 0.95;
+
+/// Acceleration on a free road, m/s².
+pub(super) fn free_acceleration(speed_mps: f64, driver: &DriverParameters) -> f64 {
+    let ratio = speed_mps / driver.desired_speed_mps;
+    let squared = ratio * ratio;
+    // Above the desired speed the fourth power would brake hard; drivers let it roll out instead.
+    (driver.acceleration_mps2 * (1.0 - squared * squared)).max(-0.5 * driver.comfortable_mps2)
+}
+
+/// Acceleration behind a leader, m/s², never harder than [`HARDEST_BRAKING_MPS2`].
+///
+/// `headway_s` is the headway in force: the driver's own or, after a cut-in, the shorter one he tolerates.
+pub(super) fn following_acceleration(
+    speed_mps: f64,
+    headway_s: f64,
+    leader: LeaderView,
+    driver: &DriverParameters,
+) -> f64 {
+    let gap_m = leader.gap_m.max(0.1);
+    let closing_mps = speed_mps - leader.speed_mps;
+    let root = 2.0 * (driver.acceleration_mps2 * driver.comfortable_mps2).sqrt();
+    let dynamic_m = (speed_mps * headway_s + speed_mps * closing_mps / root).max(0.0);
+    let ratio = (driver.standstill_gap_m + dynamic_m) / gap_m;
+    let free = free_acceleration(speed_mps, driver);
+    let idm = free.min(driver.acceleration_mps2 * (1.0 - ratio * ratio));
+
+    let heuristic = constant_acceleration_heuristic(speed_mps, gap_m, leader, driver.acceleration_mps2);
+    let mixed = if idm >= heuristic {
+        idm
+    } else {
+        let b = driver.comfortable_mps2;
+        (1.0 - COOLNESS) * idm + COOLNESS * (heuristic + b * libm::tanh((idm - heuristic) / b))
+    };
+
+    // Last resort: what stops the closing before the bumpers meet.
+    let needed = if closing_mps > 0.0 { closing_mps * closing_mps / (2.0 * (gap_m - 1.0).max(0.5)) } else { 0.0 };
+    let guarded = if needed > 2.0 * driver.comfortable_mps2 { mixed.min(-1.2 * needed) } else { mixed };
+    guarded.max(-HARDEST_BRAKING_MPS2)
+}
+
+/// Deceleration that avoids a collision if the leader keeps its acceleration, m/s².
+fn constant_acceleration_heuristic(speed_mps: f64, gap_m: f64, leader: LeaderView, own_max: f64) -> f64 {
+    let leader_acceleration = leader.acceleration_mps2.min(own_max);
+    let closing_mps = speed_mps - leader.speed_mps;
+    let stops_first = leader.speed_mps * closing_mps <= -2.0 * gap_m * leader_acceleration;
+    if stops_first {
+        let denominator = leader.speed_mps * leader.speed_mps - 2.0 * gap_m * leader_acceleration;
+        if denominator > 1e-6 { speed_mps * speed_mps * leader_acceleration / denominator } else { 0.0 }
+    } else {
+        let approach = closing_mps.max(0.0);
+        leader_acceleration - approach * approach / (2.0 * gap_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn driver() -> DriverParameters {
+        DriverParameters {
+            desired_speed_mps: 36.0,
+            time_headway_s: 1.5,
+            standstill_gap_m: 3.4,
+            acceleration_mps2: 0.55,
+            comfortable_mps2: 1.5,
+        }
+    }
+
+    #[test]
+    fn a_driver_settles_at_his_own_headway() {
+        let leader = LeaderView { gap_m: 3.4 + 1.5 * 28.0, speed_mps: 28.0, acceleration_mps2: 0.0 };
+        assert!(following_acceleration(28.0, 1.5, leader, &driver()).abs() < 1e-9);
+        let closer = LeaderView { gap_m: 35.0, ..leader };
+        assert!(following_acceleration(28.0, 1.5, closer, &driver()) < -0.1);
+    }
+
+    #[test]
+    fn a_merge_at_a_short_gap_is_no_reason_for_full_braking() {
+        let merged = LeaderView { gap_m: 18.0, speed_mps: 30.0, acceleration_mps2: 0.0 };
+        let a = following_acceleration(30.0, 1.5, merged, &driver());
+        assert!((-2.0..0.0).contains(&a), "{a}");
+    }
+
+    #[test]
+    fn a_follower_stops_behind_a_hard_braking_leader() {
+        let (dt, d) = (0.04, driver());
+        let (mut gap, mut v, mut lead) = (25.0, 30.0_f64, 30.0_f64);
+        for _ in 0..1000 {
+            let view =
+                LeaderView { gap_m: gap, speed_mps: lead, acceleration_mps2: if lead > 0.0 { -6.0 } else { 0.0 } };
+            let a = following_acceleration(v, 0.8, view, &d);
+            gap += (lead - v) * dt;
+            v = (v + a * dt).max(0.0);
+            lead = (lead - 6.0 * dt).max(0.0);
+            assert!(gap > 0.0, "collision at {v} m/s");
+        }
+        assert!(v < 0.5);
+    }
+}

@@ -1,0 +1,127 @@
+//! Motion across the road: the lane change as a quintic, and the wander within a lane.
+
+use super::random::Stream;
+
+/// Published span of lane-change durations, s.
+const DURATION_S: [f64; 2] = [2.9, 7.3];
+/// Median of the durations before the span cuts them off, s.
+const DURATION_MEDIAN_S: f64 = 5.0;
+/// Spread of the duration's logarithm.
+const DURATION_SIGMA: f64 = 0.28;
+/// Spread of the asymmetry: 0 is the symmetric quintic, and at ±1.5 the crossing comes
+/// about a tenth of the duration earlier or later.
+const ASYMMETRY_SD: f64 = 0.7;
+
+/// One lane change, from start to end.
+///
+/// `d(t) = from + (to − from) q(φ(t/T))` with the quintic `q(τ) = 10τ³ − 15τ⁴ + 6τ⁵` (rest to rest in
+/// speed and acceleration) and a mild distortion of time `φ(τ) = τ + κ τ²(1−τ)²`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LaneChange {
+    /// Lane it leaves.
+    pub from_lane: usize,
+    /// Lane it enters.
+    pub to_lane: usize,
+    /// Time since the start, s.
+    pub elapsed_s: f64,
+    /// Duration T, s.
+    pub duration_s: f64,
+    from_m: f64,
+    to_m: f64,
+    asymmetry: f64,
+}
+
+impl LaneChange {
+    /// Draws duration and shape of a change between two lateral positions.
+    pub fn draw(from_lane: usize, to_lane: usize, from_m: f64, to_m: f64, stream: &mut Stream) -> LaneChange {
+        let duration_s = stream.lognormal_within(DURATION_MEDIAN_S, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
+        let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
+        LaneChange { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
+    }
+
+    /// Share of the duration that has passed, 0 to 1.
+    pub fn phase(&self) -> f64 {
+        (self.elapsed_s / self.duration_s).min(1.0)
+    }
+
+    /// Lateral position and lateral speed now, m and m/s.
+    pub fn position_and_speed(&self) -> (f64, f64) {
+        let t = self.phase();
+        let rest = 1.0 - t;
+        let warped = t + self.asymmetry * t * t * rest * rest;
+        let warp_rate = 1.0 + 2.0 * self.asymmetry * t * rest * (1.0 - 2.0 * t);
+        let shape = warped * warped * warped * (10.0 - 15.0 * warped + 6.0 * warped * warped);
+        let slope = 30.0 * warped * warped * (1.0 - warped) * (1.0 - warped);
+        let way = self.to_m - self.from_m;
+        (self.from_m + way * shape, way * slope * warp_rate / self.duration_s)
+    }
+}
+
+/// Wander about the intended line: a damped oscillator driven by white noise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Wander {
+    /// Deviation, m, left positive.
+    pub offset_m: f64,
+    /// Its rate, m/s.
+    pub rate_mps: f64,
+}
+
+impl Wander {
+    /// Spread of the deviation, m.
+    const SD_M: f64 = 0.10;
+    /// Natural frequency of a driver's steering corrections, rad/s.
+    const FREQUENCY_RADPS: f64 = 0.5;
+    /// Damping ratio.
+    const DAMPING: f64 = 0.8;
+
+    /// Advances by `dt_s` with one standard normal number.
+    pub fn step(&mut self, dt_s: f64, normal: f64) {
+        const W: f64 = Wander::FREQUENCY_RADPS;
+        let drive = Self::SD_M * (4.0 * Self::DAMPING * W * W * W * dt_s).sqrt();
+        let rate = self.rate_mps - (2.0 * Self::DAMPING * W * self.rate_mps + W * W * self.offset_m) * dt_s;
+        // Position uses the old rate, as the samples' speed is the one at their own time.
+        self.offset_m += self.rate_mps * dt_s;
+        self.rate_mps = rate + drive * normal;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Purpose;
+    use super::*;
+
+    #[test]
+    fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
+        let mut stream = Stream::new(3, 0, 0, Purpose::Decision);
+        for _ in 0..200 {
+            let mut change = LaneChange::draw(1, 0, -5.6, -1.9, &mut stream);
+            assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
+            assert_eq!(change.position_and_speed(), (-5.6, 0.0));
+            let dt = 1e-4;
+            let mut before = -5.6;
+            while change.elapsed_s < change.duration_s {
+                let (_, speed) = change.position_and_speed();
+                change.elapsed_s += dt;
+                let (position, after) = change.position_and_speed();
+                assert!(position > before - 1e-12, "moves back");
+                assert!(((position - before) / dt - 0.5 * (speed + after)).abs() < 1e-3);
+                before = position;
+            }
+            let (position, speed) = change.position_and_speed();
+            assert!((position + 1.9).abs() < 1e-12 && speed.abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn wander_keeps_its_spread() {
+        let mut stream = Stream::new(3, 0, 0, Purpose::Noise);
+        let mut wander = Wander::default();
+        let (mut squares, n) = (0.0, 200_000);
+        for _ in 0..n {
+            wander.step(0.04, stream.normal());
+            squares += wander.offset_m * wander.offset_m;
+        }
+        let sd = (squares / f64::from(n)).sqrt();
+        assert!((sd - Wander::SD_M).abs() < 0.02, "{sd}");
+    }
+}

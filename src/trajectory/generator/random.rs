@@ -1,0 +1,129 @@
+//! Random numbers of the generator: a counter-based stream cipher keyed by everything that names the
+//! draw's purpose, so that no recording depends on another, on the number of threads or on the machine.
+//!
+//! Transcendentals come from `libm`: the system's own differ in their last bits between platforms.
+
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+
+/// What a stream is for; streams of different purposes never share a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// Lane counts, flows and truck share of a recording.
+    Site = 1,
+    /// Headways, drivers and vehicles at the upstream end.
+    Inflow = 2,
+    /// Acceleration noise and wander within the lane.
+    Noise = 3,
+    /// Decisions: lane changes, brakings.
+    Decision = 4,
+}
+
+/// A stream of random numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Stream {
+    rng: ChaCha8Rng,
+    spare_normal: Option<f64>,
+}
+
+impl Stream {
+    /// The stream of one purpose in one carriageway of one recording.
+    pub fn new(seed: u64, recording: usize, carriageway: usize, purpose: Purpose) -> Stream {
+        let mut key = [0_u8; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        key[8..16].copy_from_slice(&(recording as u64).to_le_bytes());
+        key[16..24].copy_from_slice(&(carriageway as u64).to_le_bytes());
+        let mut rng = ChaCha8Rng::from_seed(key);
+        rng.set_stream(purpose as u64);
+        Stream { rng, spare_normal: None }
+    }
+
+    /// Uniform in [0, 1), 53 bits.
+    pub fn uniform(&mut self) -> f64 {
+        const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+        (self.rng.next_u64() >> 11) as f64 * STEP
+    }
+
+    /// Uniform in [low, high).
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.uniform() < probability
+    }
+
+    /// Standard normal (Box and Muller; both values of a pair are used).
+    pub fn normal(&mut self) -> f64 {
+        if let Some(z) = self.spare_normal.take() {
+            return z;
+        }
+        // 1 − u lies in (0, 1], so the logarithm is finite.
+        let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
+        let (sin, cos) = libm::sincos(2.0 * std::f64::consts::PI * self.uniform());
+        self.spare_normal = Some(radius * sin);
+        radius * cos
+    }
+
+    /// Normal with this mean and spread, redrawn until inside [low, high] (which must hold some mass).
+    pub fn normal_within(&mut self, mean: f64, sd: f64, low: f64, high: f64) -> f64 {
+        self.redraw(low, high, |s| mean + sd * s.normal())
+    }
+
+    /// Lognormal with this median and this spread of the logarithm, redrawn until inside [low, high].
+    pub fn lognormal_within(&mut self, median: f64, sigma: f64, low: f64, high: f64) -> f64 {
+        self.redraw(low, high, |s| median * libm::exp(sigma * s.normal()))
+    }
+
+    /// Exponential with this mean, ≥ 0.
+    pub fn exponential(&mut self, mean: f64) -> f64 {
+        -mean * libm::log(1.0 - self.uniform())
+    }
+
+    /// Draws until inside; gives up after many tries and clamps, so that odd options cannot hang it.
+    fn redraw(&mut self, low: f64, high: f64, draw: impl Fn(&mut Stream) -> f64) -> f64 {
+        let mut value = draw(self);
+        for _ in 0..1000 {
+            if (low..=high).contains(&value) {
+                return value;
+            }
+            value = draw(self);
+        }
+        value.clamp(low, high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_is_named_by_seed_recording_carriageway_and_purpose() {
+        let first =
+            |seed, recording, carriageway, purpose| Stream::new(seed, recording, carriageway, purpose).uniform();
+        let base = first(1, 0, 0, Purpose::Noise);
+        assert_eq!(base, first(1, 0, 0, Purpose::Noise));
+        assert_ne!(base, first(2, 0, 0, Purpose::Noise));
+        assert_ne!(base, first(1, 1, 0, Purpose::Noise));
+        assert_ne!(base, first(1, 0, 1, Purpose::Noise));
+        assert_ne!(base, first(1, 0, 0, Purpose::Inflow));
+    }
+
+    #[test]
+    fn normal_and_exponential_have_their_moments() {
+        let mut stream = Stream::new(7, 0, 0, Purpose::Site);
+        let n = 40_000;
+        let (mut sum, mut squares, mut waiting) = (0.0, 0.0, 0.0);
+        for _ in 0..n {
+            let z = stream.normal();
+            sum += z;
+            squares += z * z;
+            waiting += stream.exponential(3.0);
+        }
+        let n = f64::from(n);
+        assert!((sum / n).abs() < 0.02, "mean {}", sum / n);
+        assert!((squares / n - 1.0).abs() < 0.03, "variance {}", squares / n);
+        assert!((waiting / n - 3.0).abs() < 0.06, "mean wait {}", waiting / n);
+    }
+}

@@ -1,0 +1,297 @@
+//! The simulation of one carriageway: a straight road, longer than the camera's view, with vehicles that
+//! arrive upstream, follow, change lanes, brake and leave downstream. All decisions and accelerations of
+//! a step read the state at its start; then every vehicle moves.
+
+use super::events::{DECISION_S, Hazards, SETTLE_S};
+use super::idm::{LeaderView, following_acceleration, free_acceleration};
+use super::inflow::{Inflow, LaneDemand};
+use super::lane_change::{LaneView, Neighbour};
+use super::random::{Purpose, Stream};
+use super::vehicle::{Samples, Vehicle};
+
+/// Road before the camera's view, m. Long enough for followers to settle behind their leaders and for
+/// motives to arise, short enough that the view does not get only what is left when all have sorted
+/// themselves by speed.
+const UPSTREAM_M: f64 = 350.0;
+/// Road behind it, m: the last vehicles in view still have leaders.
+const DOWNSTREAM_M: f64 = 250.0;
+/// Spread of the acceleration noise as commanded, m/s²; the lag below leaves 0.22 of it, the middle of
+/// the published 0.20 to 0.24.
+const NOISE_SD_MPS2: f64 = 0.235;
+/// Published correlation time of the noise, s.
+const NOISE_CORRELATION_S: f64 = 1.5;
+/// Lag from the command to the vehicle's acceleration, s (pedal, drivetrain, brakes).
+const ACTUATION_LAG_S: f64 = 0.25;
+/// Time over which drivers take in the leader's acceleration, s.
+const PERCEPTION_S: f64 = 0.6;
+/// Time over which a headway shortened by a cut-in opens again, s.
+const RELAXATION_S: f64 = 15.0;
+/// Shortest headway tolerated right after a cut-in, s.
+const TOLERATED_HEADWAY_S: f64 = 0.25;
+/// Share of the headway kept to a leader whose lane is about to be left.
+const LEAVING_HEADWAY: f64 = 0.5;
+
+/// Where and how long.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Setting {
+    /// m.
+    pub lane_width_m: f64,
+    /// m.
+    pub window_m: f64,
+    /// s.
+    pub step_s: f64,
+    /// Steps from one sample to the next.
+    pub steps_per_sample: usize,
+    /// Multiplies the rates of lane changes and hard brakings in the camera's view.
+    pub event_rate_factor: f64,
+}
+
+/// One carriageway.
+pub(super) struct Traffic {
+    pub(super) setting: Setting,
+    pub(super) lanes: usize,
+    pub(super) vehicles: Vec<Vehicle>,
+    /// Vehicles on the road, front first.
+    pub(super) order: Vec<usize>,
+    inflows: Vec<Inflow>,
+    arrivals: Stream,
+    noise: Stream,
+    pub(super) decisions: Stream,
+    pub(super) step: usize,
+    pub(super) decision_steps: usize,
+    pub(super) hazards_in_view: Hazards,
+    /// Factors of one step of the noise, the lag, the perception and the relaxation.
+    noise_keep: f64,
+    noise_kick: f64,
+    lag: f64,
+    perception: f64,
+    relaxation: f64,
+}
+
+impl Traffic {
+    /// An empty road. `key` is (seed, recording, carriageway).
+    pub fn new(setting: Setting, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
+        let stream = |purpose| Stream::new(key.0, key.1, key.2, purpose);
+        let mut arrivals = stream(Purpose::Inflow);
+        let lanes = demand.len();
+        let width = setting.lane_width_m;
+        let inflows = demand
+            .into_iter()
+            .enumerate()
+            .map(|(lane, demand)| Inflow::new(demand, lane, centre_of(lane, width), width, &mut arrivals))
+            .collect();
+        let dt = setting.step_s;
+        let keep = libm::exp(-dt / NOISE_CORRELATION_S);
+        Traffic {
+            lanes,
+            vehicles: Vec::new(),
+            order: Vec::new(),
+            inflows,
+            arrivals,
+            noise: stream(Purpose::Noise),
+            decisions: stream(Purpose::Decision),
+            step: 0,
+            decision_steps: ((DECISION_S / dt).round() as usize).max(1),
+            noise_keep: keep,
+            noise_kick: NOISE_SD_MPS2 * (1.0 - keep * keep).sqrt(),
+            lag: 1.0 - libm::exp(-dt / ACTUATION_LAG_S),
+            perception: 1.0 - libm::exp(-dt / PERCEPTION_S),
+            relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
+            hazards_in_view: Hazards::raised(setting.event_rate_factor),
+            setting,
+        }
+    }
+
+    /// Runs until the road is full, then for `samples` samples; gives what the camera saw of each
+    /// vehicle, in the order of their arrival.
+    pub fn run(mut self, samples: usize) -> Vec<Vehicle> {
+        // The slowest trucks pass the whole road once.
+        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / 21.0;
+        let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;
+        let steps = warm_up + (samples.max(1) - 1) * self.setting.steps_per_sample + 1;
+        for step in 0..steps {
+            self.inject();
+            self.sort();
+            self.decide();
+            self.accelerate();
+            let since = step.checked_sub(warm_up);
+            let sample = since.filter(|s| s.is_multiple_of(self.setting.steps_per_sample));
+            self.advance(sample.map(|s| s / self.setting.steps_per_sample));
+        }
+        self.vehicles.retain(|vehicle| !vehicle.samples.s_m.is_empty());
+        self.vehicles
+    }
+
+    fn inject(&mut self) {
+        let now_s = self.step as f64 * self.setting.step_s;
+        for lane in 0..self.lanes {
+            let last = self.order.iter().rev().find(|&&i| self.vehicles[i].is_in(lane));
+            let last = last.map(|&i| (self.vehicles[i].rear_m(), self.vehicles[i].speed_mps));
+            if let Some(vehicle) = self.inflows[lane].arrive(now_s, -UPSTREAM_M, last, &mut self.arrivals) {
+                self.order.push(self.vehicles.len());
+                self.vehicles.push(vehicle);
+            }
+        }
+    }
+
+    /// Front first. The order hardly changes between steps, where insertion sort is linear; ties keep
+    /// the order of arrival.
+    fn sort(&mut self) {
+        for k in 1..self.order.len() {
+            let moving = self.order[k];
+            let mut place = k;
+            while place > 0 && self.vehicles[self.order[place - 1]].s_m < self.vehicles[moving].s_m {
+                self.order[place] = self.order[place - 1];
+                place -= 1;
+            }
+            self.order[place] = moving;
+        }
+    }
+
+    /// Next vehicles ahead and behind in a lane, seen from the vehicle at this place of the order.
+    pub(super) fn view(&self, place: usize, lane: usize) -> LaneView {
+        let own = &self.vehicles[self.order[place]];
+        let vehicle = |k: &usize| &self.vehicles[*k];
+        let ahead = self.order[..place].iter().rev().map(vehicle).find(|v| v.is_in(lane));
+        let behind = self.order[place + 1..].iter().map(vehicle).find(|v| v.is_in(lane));
+        LaneView {
+            ahead: ahead.map(|v| Neighbour { gap_m: v.rear_m() - own.front_m(), speed_mps: v.speed_mps }),
+            behind: behind.map(|v| Neighbour { gap_m: own.rear_m() - v.front_m(), speed_mps: v.speed_mps }),
+        }
+    }
+
+    /// Commands of all drivers, from one sweep from the front.
+    fn accelerate(&mut self) {
+        let mut last_in: [Option<usize>; 8] = [None; 8];
+        for place in 0..self.order.len() {
+            let i = self.order[place];
+            let own = &self.vehicles[i];
+            let target_lane = own.change.map_or(own.lane, |change| change.to_lane);
+            let leader = last_in[target_lane];
+            let view_of = |k: usize, perceived_mps2: f64| {
+                let v = &self.vehicles[k];
+                LeaderView {
+                    gap_m: v.rear_m() - own.front_m(),
+                    speed_mps: v.speed_mps,
+                    acceleration_mps2: perceived_mps2,
+                }
+            };
+
+            // A new leader at a short distance (somebody cut in, or the own change) is tolerated.
+            let mut headway_s = own.headway_s + (own.driver.time_headway_s - own.headway_s) * self.relaxation;
+            let mut perceived = own.perceived_mps2;
+            if let Some(k) = leader {
+                let leader_now = self.vehicles[k].acceleration_mps2;
+                if own.leader != leader {
+                    let gap_m = view_of(k, 0.0).gap_m - own.driver.standstill_gap_m;
+                    let found_s = (gap_m / own.speed_mps.max(1.0)).max(TOLERATED_HEADWAY_S);
+                    headway_s = headway_s.min(found_s);
+                    perceived = leader_now.min(0.0);
+                }
+                perceived += (leader_now - perceived) * self.perception;
+            }
+
+            let mut command = leader.map_or_else(
+                || free_acceleration(own.speed_mps, &own.driver),
+                |k| following_acceleration(own.speed_mps, headway_s, view_of(k, perceived), &own.driver),
+            );
+            if let Some(change) = own.change
+                && own.is_in(change.from_lane)
+                && let Some(k) = last_in[change.from_lane]
+                && leader != Some(k)
+            {
+                let view = view_of(k, self.vehicles[k].acceleration_mps2);
+                command =
+                    command.min(following_acceleration(own.speed_mps, LEAVING_HEADWAY * headway_s, view, &own.driver));
+            }
+            if let Some(braking) = own.braking {
+                command = command.min(braking.acceleration());
+            }
+            let occupied = own.occupied;
+            let own = &mut self.vehicles[i];
+            own.headway_s = headway_s;
+            own.perceived_mps2 = perceived;
+            own.leader = leader;
+            own.command_mps2 = command + own.noise_mps2;
+            for (lane, slot) in last_in.iter_mut().enumerate().take(self.lanes) {
+                if occupied & (1 << lane) != 0 {
+                    *slot = Some(i);
+                }
+            }
+        }
+    }
+
+    /// Writes the sample, if this step is one, and moves every vehicle by one step.
+    fn advance(&mut self, sample: Option<usize>) {
+        let dt = self.setting.step_s;
+        let width = self.setting.lane_width_m;
+        for &i in &self.order {
+            let own = &mut self.vehicles[i];
+            let mut a = own.acceleration_mps2 + (own.command_mps2 - own.acceleration_mps2) * self.lag;
+            if own.speed_mps + a * dt < 0.0 {
+                a = -own.speed_mps / dt;
+            }
+            own.acceleration_mps2 = a;
+            let (d_m, v_d_mps) = own.lateral();
+            if let Some(sample) = sample
+                && (0.0..=self.setting.window_m).contains(&own.s_m)
+            {
+                own.samples.push(sample, own.s_m, d_m, own.speed_mps, v_d_mps, a);
+            }
+
+            own.s_m += own.speed_mps * dt + 0.5 * a * dt * dt;
+            own.speed_mps = (own.speed_mps + a * dt).max(0.0);
+            own.noise_mps2 = own.noise_mps2 * self.noise_keep + self.noise_kick * self.noise.normal();
+            own.wander.step(dt, self.noise.normal());
+            own.settle_s = (own.settle_s - dt).max(0.0);
+            if let Some(braking) = &mut own.braking {
+                braking.elapsed_s += dt;
+                if braking.is_over() {
+                    own.braking = None;
+                }
+            }
+            if let Some(change) = &mut own.change {
+                change.elapsed_s += dt;
+                let (d_m, _) = change.position_and_speed();
+                own.lane = lane_of(d_m, width, self.lanes);
+                // The lane it leaves is free once the whole body is out of it.
+                let from_m = centre_of(change.from_lane, width);
+                if (d_m - from_m).abs() > 0.5 * (width + own.width_m) + 0.1 {
+                    own.occupied = 1 << change.to_lane;
+                }
+                if change.phase() >= 1.0 {
+                    own.occupied = 1 << change.to_lane;
+                    own.lane = change.to_lane;
+                    own.change = None;
+                    own.settle_s = SETTLE_S;
+                }
+            }
+        }
+        let end_m = self.setting.window_m + DOWNSTREAM_M;
+        let vehicles = &self.vehicles;
+        self.order.retain(|&i| vehicles[i].s_m < end_m);
+        self.step += 1;
+    }
+}
+
+impl Samples {
+    fn push(&mut self, sample: usize, s_m: f64, d_m: f64, v_s_mps: f64, v_d_mps: f64, a_s_mps2: f64) {
+        if self.s_m.is_empty() {
+            self.first = sample;
+        }
+        self.s_m.push(s_m);
+        self.d_m.push(d_m);
+        self.v_s_mps.push(v_s_mps);
+        self.v_d_mps.push(v_d_mps);
+        self.a_s_mps2.push(a_s_mps2);
+    }
+}
+
+/// Lateral position of a lane's centre: the leftmost line is 0, left is positive.
+pub(super) fn centre_of(lane: usize, lane_width_m: f64) -> f64 {
+    -(lane as f64 + 0.5) * lane_width_m
+}
+
+fn lane_of(d_m: f64, lane_width_m: f64, lanes: usize) -> usize {
+    ((-d_m / lane_width_m).floor().max(0.0) as usize).min(lanes - 1)
+}
