@@ -15,6 +15,7 @@
 //! lengths in a mined scenario are rounded to 1e-6 m: a recording turned by 180° gives the same
 //! scenarios to the last bit. Longitudinal activities compare speeds as they were read.
 
+mod collection;
 pub mod cut_in;
 pub mod cut_out;
 mod data_set;
@@ -29,6 +30,7 @@ pub mod search;
 pub mod tags;
 mod window;
 
+pub use collection::{Collection, RecordingSummary, count, mine_folder, mine_generated};
 pub use miner::{CategoryCount, Mined, mine};
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,

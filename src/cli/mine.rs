@@ -1,0 +1,55 @@
+//! `lanesweep mine`: recordings in, scenarios out.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::console::Verbosity;
+use super::source::{self, Source};
+use super::{Exit, console};
+use crate::Result;
+use crate::scenario::{write_scenarios, write_scenarios_to};
+
+/// Mine cut-ins, cut-outs and leader decelerations from recordings
+///
+/// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with
+/// its series; `study --scenarios FILE` reads it.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep mine recordings -o scenarios.jsonl")]
+pub struct Mine {
+    /// Folder of highD-format recordings
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// File to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Mining options (TOML) [default: the paper's]
+    #[arg(long, value_name = "FILE")]
+    mining: Option<PathBuf>,
+    /// Only scenarios that pass the paper's filters
+    #[arg(long)]
+    kept: bool,
+}
+
+impl Mine {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let options = source::mining_options(self.mining.as_deref())?;
+        let mut collection = Source::Folder(self.dir.clone()).load(&options, verbosity)?;
+        tracing::info!("{}", source::counts(&collection));
+        if self.kept {
+            collection.scenarios.retain(|s| s.kept);
+        }
+        match &self.output {
+            Some(path) => {
+                write_scenarios(path, &collection.scenarios)?;
+                tracing::info!("{} scenarios written to {}", collection.scenarios.len(), path.display());
+            }
+            None => {
+                let mut text = Vec::new();
+                write_scenarios_to(&mut text, &collection.scenarios)?;
+                console::print(&String::from_utf8_lossy(&text))?;
+            }
+        }
+        Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
+    }
+}

@@ -1,0 +1,143 @@
+//! Many recordings at once: read and mined in parallel, one recording per thread in memory at a time, the
+//! result in the recordings' order. A recording that cannot be read is reported; the others are used.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::miner::{CategoryCount, Mined, mine};
+use super::options::MiningOptions;
+use crate::scenario::{Category, Scenario};
+use crate::trajectory::Recording;
+use crate::trajectory::generator::{GeneratorOptions, generate_one};
+use crate::trajectory::highd::{self, FileChecksum};
+use crate::{Error, Result};
+
+/// What one recording gave.
+#[derive(Debug, Clone, Serialize)]
+pub struct RecordingSummary {
+    /// Its id.
+    pub id: String,
+    /// Vehicles in it.
+    pub vehicles: u64,
+    /// Samples of all vehicles.
+    pub samples: u64,
+    /// Ego-centric data sets.
+    pub data_sets: u64,
+    /// Samples per second.
+    pub frame_rate_hz: f64,
+    /// Its files with their content's SHA-256; empty for generated recordings.
+    pub files: Vec<FileChecksum>,
+}
+
+/// Scenarios of many recordings.
+#[derive(Debug, Default)]
+pub struct Collection {
+    /// Every scenario found, recording by recording.
+    pub scenarios: Vec<Scenario>,
+    /// The recordings that were used.
+    pub recordings: Vec<RecordingSummary>,
+    /// Recordings that were not, and why.
+    pub problems: Vec<Error>,
+    /// What the data leaves open, as sentences.
+    pub notes: Vec<String>,
+}
+
+impl Collection {
+    /// Found and kept scenarios of a category.
+    pub fn count(&self, category: Category) -> CategoryCount {
+        count(&self.scenarios, category)
+    }
+
+    fn add(&mut self, part: Part) {
+        self.notes.extend(part.notes);
+        self.scenarios.extend(part.mined.scenarios);
+        self.recordings.push(part.summary);
+    }
+}
+
+/// Found and kept scenarios of a category.
+pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
+    let of = scenarios.iter().filter(|s| s.category == category);
+    of.fold(CategoryCount::default(), |sum, s| CategoryCount {
+        found: sum.found + 1,
+        kept: sum.kept + u64::from(s.kept),
+    })
+}
+
+struct Part {
+    mined: Mined,
+    summary: RecordingSummary,
+    notes: Vec<String>,
+}
+
+/// Reads and mines every recording of a folder. `done` is called after each one, from any thread.
+///
+/// # Errors
+/// If the folder holds no recording, or none of them can be read: the first recording's error.
+pub fn mine_folder(dir: &Path, options: &MiningOptions, done: impl Fn() + Sync) -> Result<Collection> {
+    options.validate()?;
+    let inventory = highd::inventory(dir)?;
+    let parts: Vec<Result<Part>> = inventory
+        .recordings
+        .par_iter()
+        .with_max_len(1)
+        .map(|files| {
+            let part = highd::read(files).map(|loaded| {
+                let mined = mine(&loaded.recording, options);
+                let summary = summary(&loaded.recording, &mined, loaded.checksum_sha256);
+                Part { mined, summary, notes: loaded.notes }
+            });
+            done();
+            part
+        })
+        .collect();
+    let mut collection = Collection { problems: inventory.problems, ..Collection::default() };
+    for part in parts {
+        match part {
+            Ok(part) => collection.add(part),
+            Err(error) => collection.problems.push(error),
+        }
+    }
+    if collection.recordings.is_empty() && !collection.problems.is_empty() {
+        return Err(collection.problems.swap_remove(0));
+    }
+    Ok(collection)
+}
+
+/// Generates and mines synthetic recordings.
+pub fn mine_generated(
+    generator: &GeneratorOptions,
+    options: &MiningOptions,
+    done: impl Fn() + Sync,
+) -> Result<Collection> {
+    options.validate()?;
+    let parts: Vec<Part> = (0..generator.recordings)
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|index| {
+            let recording = generate_one(generator, index)?;
+            let mined = mine(&recording, options);
+            let summary = summary(&recording, &mined, Vec::new());
+            done();
+            Ok(Part { mined, summary, notes: Vec::new() })
+        })
+        .collect::<Result<_>>()?;
+    let mut collection = Collection::default();
+    for part in parts {
+        collection.add(part);
+    }
+    Ok(collection)
+}
+
+fn summary(recording: &Recording, mined: &Mined, files: Vec<FileChecksum>) -> RecordingSummary {
+    RecordingSummary {
+        id: recording.id.clone(),
+        vehicles: recording.tracks.len() as u64,
+        samples: recording.tracks.iter().map(|t| t.len() as u64).sum(),
+        data_sets: mined.data_sets,
+        frame_rate_hz: recording.frame_rate_hz,
+        files,
+    }
+}
