@@ -4,7 +4,10 @@
 mod conformance;
 mod console;
 mod exit;
+mod mine;
 mod simulate;
+mod source;
+mod study;
 
 pub use exit::Exit;
 
@@ -61,6 +64,8 @@ impl Common {
 
 #[derive(Subcommand)]
 enum Verb {
+    Study(study::Study),
+    Mine(mine::Mine),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
 }
@@ -125,6 +130,8 @@ fn run(cli: &Cli) -> Result<Exit> {
             .map_err(|e| Error::Internal(format!("the thread pool did not start: {e}")))?;
     }
     match &cli.verb {
+        Verb::Study(verb) => verb.run(cli.common.verbosity()),
+        Verb::Mine(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
     }

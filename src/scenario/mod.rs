@@ -8,8 +8,9 @@ mod case;
 mod jsonl;
 mod mined;
 mod motion;
+mod schema;
 
 pub use case::{Ahead, Case, Participant};
-pub use jsonl::read_scenarios;
+pub use jsonl::{read_scenarios, write_scenarios, write_scenarios_to};
 pub use mined::{Category, Ego, Other, Scenario, Side};
 pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};

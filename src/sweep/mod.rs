@@ -11,6 +11,7 @@ mod frame;
 mod lane_case;
 mod outcome;
 mod plan;
+mod run;
 mod study;
 
 pub use backend::{Backend, Chunk, Session, Wanted};
@@ -20,4 +21,5 @@ pub use frame::{Frame, Observer, Seen, Silent, Start, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
+pub use run::{SweepSummary, chunks, sweep};
 pub use study::{StudyOptions, StudyPlan, plan_study};
