@@ -1,0 +1,328 @@
+//! What must be true of the physics, whatever the numbers.
+
+use lanesweep::criterion::{BrakeThreat, BtnForm, Criterion};
+use lanesweep::driver::ModelId;
+use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions, recorded_case};
+use lanesweep::profile::Profile;
+use lanesweep::scalar::{Counting, Real};
+use lanesweep::scenario::{Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
+use lanesweep::sweep::{Constants, LaneCase, Outcome, Silent, Start};
+
+fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
+    let mut tables = Tables::default();
+    let lane = LaneCase::encode(case, profile, &mut tables);
+    let constants = Constants::<R>::resolve(profile, case.category);
+    let start = Start::Headway(R::from_f64(thw));
+    constants.run(model, &lane.cast(), &tables.cast(), start, &mut Silent).widen()
+}
+
+fn run(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
+    run_in::<f64>(profile, case, model, thw)
+}
+
+fn paper() -> Profile {
+    Profile::load("paper").unwrap()
+}
+
+fn lvd(v0: f64, v1: f64, deceleration: f64) -> Case {
+    let until_s = (v0 - v1) / deceleration;
+    Case {
+        category: Category::Lvd,
+        ego_length_m: 4.3,
+        ego_width_m: 1.9,
+        ego_speed_mps: v0,
+        principal: Participant {
+            length_m: 4.3,
+            width_m: 1.9,
+            speed: Speed::Kinematic { initial_mps: v0, acceleration_mps2: -deceleration, until_s },
+            lateral: Lateral::Centred,
+        },
+        ahead: None,
+        horizon_s: until_s,
+    }
+}
+
+fn cut_in(v_ego: f64, v_other: f64, lateral: Lateral) -> Case {
+    Case {
+        category: Category::CutIn,
+        ego_length_m: 4.6,
+        ego_width_m: 1.9,
+        ego_speed_mps: v_ego,
+        principal: Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(v_other), lateral },
+        ahead: None,
+        horizon_s: 6.0,
+    }
+}
+
+/// LVDs over a grid of speeds and decelerations.
+fn lvd_grid() -> impl Iterator<Item = Case> {
+    let speeds = [8.0, 14.0, 20.0, 27.0, 33.0];
+    speeds.into_iter().flat_map(|v0| {
+        [0.0, 0.3, 0.6, 0.85]
+            .into_iter()
+            .flat_map(move |share| [0.5, 1.5, 3.0, 5.0, 8.0].into_iter().map(move |a| lvd(v0, v0 * share, a)))
+    })
+}
+
+fn headways() -> impl Iterator<Item = f64> {
+    (1..=10).map(|k| f64::from(k) / 5.0)
+}
+
+#[test]
+fn a_mirrored_cut_in_gives_the_same_outcome_to_the_last_bit() {
+    let y: Vec<f64> = (0..120).map(|i| 3.4 - 0.03 * f64::from(i) + 0.01 * f64::from(i % 7)).collect();
+    let towards: Vec<f64> = (0..120).map(|i| 0.75 - 0.004 * f64::from(i)).collect();
+    let mirrored: Vec<f64> = y.iter().map(|y| -y).collect();
+    for v_other in [15.0, 22.0, 27.0] {
+        let left = cut_in(30.0, v_other, Lateral::Sampled { position_m: y.clone(), towards_mps: towards.clone() });
+        let right =
+            cut_in(30.0, v_other, Lateral::Sampled { position_m: mirrored.clone(), towards_mps: towards.clone() });
+        for model in ModelId::ALL {
+            for thw in headways() {
+                assert_eq!(run(&paper(), &left, model, thw), run(&paper(), &right, model, thw));
+                assert_eq!(run_in::<f32>(&paper(), &left, model, thw), run_in::<f32>(&paper(), &right, model, thw));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_longer_headway_never_turns_an_rss_lvd_pass_into_a_collision() {
+    let profile = paper();
+    for case in lvd_grid() {
+        let mut passed = false;
+        for thw in headways() {
+            let collided = run(&profile, &case, ModelId::Rss, thw).verdicts.failed(Criterion::Collision);
+            assert!(!(passed && collided), "THW {thw} collides where a shorter one passed: {case:?}");
+            passed |= !collided;
+        }
+    }
+}
+
+/// TTC has no such property: the shorter headway makes the ego brake earlier, and a longer one may meet the
+/// leader at a higher closing speed. Kept as a counterexample.
+#[test]
+fn a_longer_headway_can_turn_an_lvd_pass_into_a_ttc_failure() {
+    let profile = paper();
+    let mut counterexamples = 0;
+    for model in ModelId::ALL {
+        for case in lvd_grid() {
+            let fails: Vec<bool> =
+                headways().map(|thw| run(&profile, &case, model, thw).verdicts.failed(Criterion::Ttc)).collect();
+            counterexamples += usize::from(fails.windows(2).any(|pair| !pair[0] && pair[1]));
+        }
+    }
+    assert!(counterexamples > 0, "no counterexample left: the claim may be true after all, look again");
+}
+
+/// A scenario whose recorded motion already has the parameterized form.
+fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>) -> Scenario {
+    let other = |v: Vec<f64>, y: Vec<f64>| Other { length: 4.5, width: 1.9, v, y };
+    let n = v.len();
+    Scenario {
+        id: "made".into(),
+        category,
+        recording: String::new(),
+        ego_id: 0,
+        target_id: 1,
+        lead_id: None,
+        frame0: 0,
+        frame1: n as i64 - 1,
+        fps: 25.0,
+        kept: true,
+        reason: String::new(),
+        ego: Ego { v0: 30.0, length: 4.7, width: 1.9 },
+        lane_width: 3.5,
+        side: Side::Left,
+        target: other(v, y),
+        lead: lead.map(|v| other(v, vec![0.0; n])),
+        thw0: None,
+        gap0: None,
+        lead_gap: Some(22.0),
+        peak_decel: None,
+        truncated_start: None,
+        end_cause: None,
+        frame_switch: None,
+        tag_frames: None,
+    }
+}
+
+#[test]
+fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
+    let n = 101;
+    let t = |i: usize| i as f64 / 25.0;
+    let duration = t(n - 1);
+    let constant = vec![22.0; n];
+    let braking: Vec<f64> = (0..n).map(|i| 24.0 - 1.5 * t(i)).collect();
+    let incoming: Vec<f64> = (0..n).map(|i| 3.5 * (1.0 - t(i) / duration)).collect();
+    let outgoing: Vec<f64> = (0..n).map(|i| 3.5 * t(i) / duration).collect();
+    let cosine: Vec<f64> =
+        (0..n).map(|i| 24.0 - 4.0 * (1.0 - (std::f64::consts::PI * t(i) / duration).cos())).collect();
+    let centred = vec![0.0; n];
+    let pairs = [
+        ("1", scenario(Category::CutIn, constant.clone(), incoming.clone(), None)),
+        ("2", scenario(Category::CutIn, braking.clone(), incoming, None)),
+        ("a", scenario(Category::CutOut, constant.clone(), outgoing.clone(), Some(vec![12.0; n]))),
+        ("b", scenario(Category::CutOut, braking.clone(), outgoing, Some(braking.clone()))),
+        ("i", scenario(Category::Lvd, braking, centred.clone(), None)),
+        ("ii", scenario(Category::Lvd, cosine, centred, None)),
+    ];
+    let profile = paper();
+    let options = ParameterizationOptions::default();
+    for (key, scenario) in pairs {
+        let recorded = recorded_case(&scenario, profile.frame.dt_s).unwrap();
+        let id = ParameterizationId::find(scenario.category, key).unwrap();
+        let parameterized = id.kinematic_case(&scenario, profile.frame.dt_s, &options).unwrap();
+        for model in ModelId::ALL {
+            for thw in headways() {
+                let (s, prime) = (run(&profile, &recorded, model, thw), run(&profile, &parameterized, model, thw));
+                assert_eq!(s.verdicts, prime.verdicts, "{key} {model:?} {thw}");
+                assert_eq!(s.contact, prime.contact, "{key} {model:?} {thw}");
+                let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-6 * (1.0 + a.abs());
+                assert!(near(s.min_gap, prime.min_gap), "{key} {model:?} {thw}: {} {}", s.min_gap, prime.min_gap);
+            }
+        }
+    }
+}
+
+/// Independent of the closed form: braking is integrated in small steps.
+fn full_braking_collides(mut gap: f64, mut closing: f64) -> bool {
+    let (dt, a_max, jerk) = (1e-4, 7.59294, 12.65);
+    let mut a = 0.0;
+    while closing > 0.0 {
+        let next = f64::min(a + jerk * dt, a_max);
+        let mean = 0.5 * (a + next);
+        gap -= closing * dt - 0.5 * mean * dt * dt;
+        closing -= mean * dt;
+        a = next;
+        if gap < 0.0 {
+            return true;
+        }
+    }
+    false
+}
+
+#[test]
+fn exact_btn_is_at_least_1_exactly_when_full_braking_from_that_instant_collides() {
+    let threat = BrakeThreat::<f64>::new(BtnForm::Exact, 0.8, 7.59294, 12.65);
+    let mut seen = [0, 0];
+    for v in [0.8, 1.7, 3.0, 6.5, 12.0, 21.0, 34.0] {
+        for k in 1..60 {
+            let gap = 0.04 * f64::from(k) * v * (0.3 + v / 20.0);
+            let number = threat.at(gap, v);
+            // The integration is good to a few millimetres.
+            if (threat.at(gap + 5e-3, v) >= 1.0) == (threat.at((gap - 5e-3).max(1e-4), v) >= 1.0) {
+                assert_eq!(number >= 1.0, full_braking_collides(gap, v), "v {v} gap {gap} BTN {number}");
+                seen[usize::from(number >= 1.0)] += 1;
+            }
+        }
+    }
+    assert!(seen[0] > 50 && seen[1] > 50, "both sides must occur: {seen:?}");
+}
+
+#[test]
+fn refining_the_time_step_converges() {
+    for model in ModelId::ALL {
+        let (mut coarse, mut fine) = (0.0, 0.0);
+        for case in lvd_grid() {
+            for thw in [0.6, 1.2, 2.0] {
+                let gap = |dt: f64| run(&paper().with_dt(dt).unwrap(), &case, model, thw).min_gap.max(-1.0);
+                let limit = gap(0.0025);
+                if limit.is_finite() && limit > 0.0 {
+                    coarse += (gap(0.04) - limit).abs();
+                    fine += (gap(0.01) - limit).abs();
+                }
+            }
+        }
+        assert!(fine < 0.5 * coarse, "{model:?}: summed deviation {fine} at 0.01 s, {coarse} at 0.04 s");
+    }
+}
+
+#[test]
+fn the_ego_never_accelerates_and_never_drives_backwards() {
+    let profile = paper();
+    for case in lvd_grid() {
+        for model in ModelId::ALL {
+            let mut tables = Tables::default();
+            let lane = LaneCase::encode(&case, &profile, &mut tables);
+            let constants = Constants::<f64>::resolve(&profile, case.category);
+            let mut before = f64::INFINITY;
+            let mut check = |step: &lanesweep::sweep::Step<f64>| {
+                assert!(step.v_ego <= before && step.v_ego >= 0.0);
+                before = step.v_ego;
+            };
+            constants.run(model, &lane, &tables, Start::Headway(0.8), &mut check);
+        }
+    }
+}
+
+/// The grid's round numbers make ties common; every difference must lie within rounding of a threshold: a
+/// tenth of a millimetre more or less gap gives f64 the verdicts of f32.
+#[test]
+fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
+    let profile = paper();
+    let (mut different, mut lanes) = (0, 0);
+    for case in lvd_grid() {
+        let mut tables = Tables::default();
+        let lane = LaneCase::encode(&case, &profile, &mut tables);
+        let constants = Constants::<f64>::resolve(&profile, case.category);
+        for model in ModelId::ALL {
+            for thw in headways() {
+                lanes += 1;
+                // The cap is no verdict: an ego that creeps up at a rounding error of closing speed reaches it.
+                let judged = |outcome: Outcome<f64>| outcome.verdicts.0 & 0b111;
+                let narrow = judged(run_in::<f32>(&profile, &case, model, thw));
+                if narrow == judged(run(&profile, &case, model, thw)) {
+                    continue;
+                }
+                different += 1;
+                let nudged = |by: f64| {
+                    let start = Start::Gap(thw * case.ego_speed_mps + by);
+                    judged(constants.run(model, &lane, &tables, start, &mut Silent))
+                };
+                let reached = [1e-4, -1e-4, 1e-5, -1e-5, 1e-6, -1e-6].iter().any(|by| nudged(*by) == narrow);
+                assert!(reached, "{model:?} {thw} s {case:?}: f32 {narrow:?}");
+            }
+        }
+    }
+    assert!(different * 20 < lanes, "{different} of {lanes} verdicts differ");
+}
+
+#[test]
+fn a_step_takes_no_more_operations_than_it_should() {
+    let profile = paper();
+    let case = lvd(30.0, 10.0, 4.0);
+    for (model, most) in
+        [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)]
+    {
+        let mut tables = Tables::default();
+        let lane = LaneCase::encode(&case, &profile, &mut tables).cast::<Counting>();
+        let (tables, constants) = (tables.cast(), Constants::<Counting>::resolve(&profile, case.category));
+        let (outcome, count) = Counting::measure(|| {
+            constants.run(model, &lane, &tables, Start::Headway(Counting::from_f64(1.0)), &mut Silent)
+        });
+        let per_step = count.total() / u64::from(outcome.end_step + 1);
+        assert!(per_step > 10 && per_step <= most, "{model:?}: {per_step} operations per step ({count:?})");
+    }
+}
+
+#[test]
+fn jrc_2021_un_r157_and_paper_fit_run_every_category_and_differ_from_paper_where_they_should() {
+    let lateral = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.2, end_m: 0.0 };
+    let case = cut_in(33.0, 20.0, lateral);
+    let reaction = |name: &str, model| {
+        let profile = Profile::load(name).unwrap().with_dt(0.04).unwrap();
+        run(&profile, &case, model, 0.8).reaction_step
+    };
+    // The visibility rule of the regulation lets Reg157 react 0.72 s after the movement begins at the earliest.
+    assert!(reaction("un-r157", ModelId::Reg157) >= 18);
+    // Perception replaces the overlap gate: 0.375 m and 0.4 s after it, long before the cars overlap.
+    assert!(reaction("un-r157", ModelId::Cchdm) < reaction("paper", ModelId::Cchdm));
+    assert_eq!(reaction("paper-fit", ModelId::Cchdm), reaction("paper", ModelId::Cchdm));
+    let hard = lvd(30.0, 0.0, 6.0);
+    let un = run(&Profile::load("un-r157").unwrap(), &hard, ModelId::Cchdm, 1.0);
+    assert_eq!(un.reaction_step, 1, "a leader beyond 5 m/s² is perceived at once");
+    let soft = lvd(30.0, 0.0, 3.0);
+    let un = run(&Profile::load("un-r157").unwrap(), &soft, ModelId::Cchdm, 1.0);
+    assert_eq!(un.reaction_step, lanesweep::sweep::NO_STEP, "a soft deceleration never triggers it");
+}
