@@ -14,6 +14,7 @@ pub mod parameterization;
 pub mod profile;
 pub mod scalar;
 pub mod scenario;
+pub mod score;
 pub mod sweep;
 pub mod trajectory;
 

@@ -1,0 +1,134 @@
+//! The tables as CSV: numbers in full precision, an empty field where a value is undefined.
+
+use crate::criterion::Criterion;
+use crate::parameterization::ParameterizationId;
+use crate::score::{ClaimResult, Interval, ScoreTable, f1, precision, recall};
+use crate::{Error, Result};
+
+fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
+    let broken = |e: &dyn std::fmt::Display| Error::Internal(format!("a CSV table cannot be written: {e}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(row).map_err(|e| broken(&e))?;
+    }
+    writer.into_inner().map_err(|e| broken(&e))
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or(String::new(), |v| v.to_string())
+}
+
+fn row(fields: &[&str]) -> Vec<String> {
+    fields.iter().map(|f| (*f).to_owned()).collect()
+}
+
+/// Failures of S and S': one row per category, variant, model and criterion. `data` says what was swept.
+pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
+    let mut rows = vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
+    for category in &scores.categories {
+        for cell in &category.cells {
+            let failures =
+                if cell.variant == 0 { cell.counts.both } else { cell.counts.both + cell.counts.only_s_prime };
+            let model = category.models.iter().position(|m| *m == cell.model).unwrap_or(0);
+            rows.push(vec![
+                category.category.key().to_owned(),
+                category.variants[cell.variant].clone(),
+                cell.model.name().to_owned(),
+                cell.criterion.key().to_owned(),
+                failures.to_string(),
+                category.simulations.to_string(),
+                category.capped[cell.variant * category.models.len() + model].to_string(),
+                data.to_owned(),
+            ]);
+        }
+    }
+    text(rows)
+}
+
+/// Scores: one row per category, parameterization, model and criterion.
+pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
+    let mut rows = vec![row(&[
+        "category",
+        "parameterization",
+        "parameters",
+        "model",
+        "criterion",
+        "tp",
+        "fn",
+        "fp",
+        "tn",
+        "recall",
+        "precision",
+        "f1",
+        "f1_low",
+        "f1_high",
+        "undefined_draws",
+        "data",
+    ])];
+    for category in &scores.categories {
+        for cell in category.cells.iter().filter(|c| c.variant > 0) {
+            let name = &category.variants[cell.variant];
+            let parameters = ParameterizationId::find(category.category, name).map_or(String::new(), |p| p.parameters.to_string());
+            let c = &cell.counts;
+            let end = |pick: fn(Interval) -> f64| number(cell.f1_interval.map(pick));
+            rows.push(vec![
+                category.category.key().to_owned(),
+                name.clone(),
+                parameters,
+                cell.model.name().to_owned(),
+                cell.criterion.key().to_owned(),
+                c.both.to_string(),
+                c.only_s.to_string(),
+                c.only_s_prime.to_string(),
+                c.neither.to_string(),
+                number(recall(c)),
+                number(precision(c)),
+                number(f1(c)),
+                end(|i| i.low),
+                end(|i| i.high),
+                cell.undefined_draws.to_string(),
+                data.to_owned(),
+            ]);
+        }
+    }
+    text(rows)
+}
+
+/// Claims: per claim one row over all cells (`model` and `criterion` empty), then one per cell.
+pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
+    let mut rows = vec![row(&[
+        "claim",
+        "category",
+        "statement",
+        "model",
+        "criterion",
+        "s_failures",
+        "difference",
+        "low",
+        "high",
+        "undefined_draws",
+        "verdict",
+        "data",
+    ])];
+    for result in results {
+        for claim_row in std::iter::once(&result.overall).chain(&result.rows) {
+            let (model, criterion) =
+                claim_row.cell.map_or(("", ""), |(m, c): (_, Criterion)| (m.name(), c.key()));
+            rows.push(vec![
+                result.claim.id.to_owned(),
+                result.claim.category.key().to_owned(),
+                result.claim.statement.to_owned(),
+                model.to_owned(),
+                criterion.to_owned(),
+                claim_row.failures.to_string(),
+                number(claim_row.value),
+                number(claim_row.interval.map(|i| i.low)),
+                number(claim_row.interval.map(|i| i.high)),
+                claim_row.undefined_draws.to_string(),
+                claim_row.verdict.text().to_owned(),
+                data.to_owned(),
+            ]);
+        }
+    }
+    text(rows)
+}

@@ -1,0 +1,13 @@
+//! Reports: what a person or another program reads of a study.
+//!
+//! Here live the terminal tables, the CSV files, the radar figures, `run.json` and the one way files are
+//! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
+//! [`crate::score`]; text and files go to the user.
+
+pub mod csv;
+pub mod files;
+pub mod lanes;
+pub mod radar;
+pub mod run_record;
+pub mod study;
+pub mod tables;

@@ -1,0 +1,90 @@
+//! `run.json`: what was run, on what, with what, so that a number can be made again.
+
+use serde::Serialize;
+
+use crate::mining::{MiningOptions, RecordingSummary};
+use crate::parameterization::ParameterizationOptions;
+use crate::profile::Profile;
+use crate::score::ScoreOptions;
+use crate::{Error, Result};
+
+/// Found and kept scenarios of a category, and what became of their lanes.
+#[derive(Debug, Clone, Serialize)]
+pub struct CategoryRecord {
+    /// Kind of scenario.
+    pub category: &'static str,
+    /// Scenarios mined or read.
+    pub found: u64,
+    /// Those that passed the filters and were simulated.
+    pub kept: u64,
+    /// Variants simulated, S first.
+    pub variants: Vec<String>,
+    /// Lanes.
+    pub lanes: u64,
+    /// Lanes that ended at the time cap.
+    pub capped_lanes: u64,
+    /// Cells of the score table whose F1 is 0/0.
+    pub undefined_f1: u64,
+    /// Undefined F1 over all cells and bootstrap draws.
+    pub undefined_draws: u64,
+    /// Explained variance of the decomposition by its first coefficients, where there is one.
+    pub svd_explained: Vec<f64>,
+}
+
+/// Seconds of the parts of a run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Timings {
+    /// Reading or generating, and mining.
+    pub mine_s: f64,
+    /// Planning: parameterizations and tables.
+    pub plan_s: f64,
+    /// Lanes.
+    pub sweep_s: f64,
+    /// Scores and bootstrap.
+    pub score_s: f64,
+}
+
+/// The whole record.
+#[derive(Debug, Clone, Serialize)]
+pub struct RunRecord {
+    /// Program and version.
+    pub program: String,
+    /// What was swept, in one line.
+    pub data: String,
+    /// Nothing here was measured on real traffic.
+    pub synthetic: bool,
+    /// What computed the lanes.
+    pub backend: String,
+    /// SHA-256 of the plan: everything that decides the outcomes.
+    pub plan_sha256: String,
+    /// SHA-256 of the scenario file, where one was read.
+    pub scenario_file_sha256: Option<String>,
+    /// Recordings with the SHA-256 of their files.
+    pub recordings: Vec<RecordingSummary>,
+    /// Recordings and parts that were left out, and why.
+    pub left_out: Vec<String>,
+    /// Per category.
+    pub categories: Vec<CategoryRecord>,
+    /// Lanes in all.
+    pub lanes: u64,
+    /// Profile with every constant.
+    pub profile: Profile,
+    /// Thresholds and filters of the mining.
+    pub mining: MiningOptions,
+    /// Options of the parameterizations.
+    pub parameterization: ParameterizationOptions,
+    /// Bootstrap and its seed.
+    pub score: ScoreOptions,
+    /// Seconds; they differ from run to run.
+    pub timings: Timings,
+}
+
+impl RunRecord {
+    /// As JSON.
+    pub fn to_json(&self) -> Result<Vec<u8>> {
+        let mut text = serde_json::to_vec_pretty(self)
+            .map_err(|e| Error::Internal(format!("run.json cannot be written: {e}")))?;
+        text.push(b'\n');
+        Ok(text)
+    }
+}

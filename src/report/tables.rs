@@ -1,0 +1,142 @@
+//! Tables for the terminal, as plain text.
+
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, presets};
+
+use crate::criterion::Criterion;
+use crate::score::{
+    CategoryScores, ClaimResult, ClaimRow, Interval, ScoreTable, f1, published_failures, published_lvd_f1,
+};
+
+fn table(header: Vec<String>) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(header);
+    table
+}
+
+/// Numbers to the right, the first `texts` columns to the left.
+fn aligned(mut table: Table, texts: usize) -> String {
+    for (at, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if at < texts { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    format!("{table}\n")
+}
+
+/// Failures of S per category, model and criterion, as in the paper's table; the published counts beside
+/// them where asked.
+pub fn failures(scores: &ScoreTable, published: bool) -> String {
+    let mut header: Vec<String> = ["scenario", "model"].map(str::to_owned).to_vec();
+    header.extend(["collision", "TTC", "BTN", "simulations", "capped"].map(str::to_owned));
+    if published {
+        header.push("published (of)".to_owned());
+    }
+    let mut table = table(header);
+    for category in &scores.categories {
+        for (at, &model) in category.models.iter().enumerate() {
+            let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.both);
+            let mut row = vec![category.category.label().to_owned(), model.name().to_owned()];
+            row.extend(Criterion::ALL.map(|c| count(c).to_string()));
+            row.extend([category.simulations.to_string(), category.capped[at].to_string()]);
+            if published {
+                let theirs = Criterion::ALL.map(|c| published_failures(category.category, model, c));
+                let counts: Vec<String> = theirs.iter().map(|p| p.failures.to_string()).collect();
+                row.push(format!("{} ({})", counts.join(" "), theirs[0].simulations));
+            }
+            table.add_row(row);
+        }
+    }
+    format!("Failures of the recorded scenarios (S)\n{}", aligned(table, 2))
+}
+
+/// F1 per parameterization, model and criterion, with the bootstrap interval.
+pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
+    let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
+    header.extend(scores.variants.iter().skip(1).cloned());
+    let mut table = table(header);
+    for &model in &scores.models {
+        for criterion in Criterion::ALL {
+            let Some(s) = scores.index(0, model, criterion) else { continue };
+            let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
+            row.push(scores.cells[s].counts.both.to_string());
+            for variant in 1..scores.variants.len() {
+                let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
+                let mut text = cell.map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));
+                let theirs = published_lvd_f1(&scores.variants[variant], model, criterion);
+                if let Some(theirs) = theirs.filter(|_| published) {
+                    let _ = write!(text, "\npaper {theirs:.3}");
+                }
+                row.push(text);
+            }
+            table.add_row(row);
+        }
+    }
+    format!(
+        "{}: F1 of S' against S over {} scenarios, [bootstrap interval]; - is undefined (0/0)\n{}",
+        scores.category.label(),
+        scores.scenarios,
+        aligned(table, 2)
+    )
+}
+
+fn value(value: Option<f64>, interval: Option<Interval>) -> String {
+    match (value, interval) {
+        (Some(value), Some(interval)) => format!("{value:.3}\n[{:.2} {:.2}]", interval.low, interval.high),
+        (Some(value), None) => format!("{value:.3}"),
+        (None, _) => "-".to_owned(),
+    }
+}
+
+/// The paper's claims with their numbers and verdicts.
+pub fn claims(results: &[ClaimResult]) -> String {
+    let header = ["claim", "the paper says", "S fails", "difference", "interval", "verdict", "cells"];
+    let mut table = table(header.map(str::to_owned).to_vec());
+    for result in results {
+        let row = &result.overall;
+        let count = |verdict| result.rows.iter().filter(|r: &&ClaimRow| r.verdict == verdict).count();
+        let mut verdicts = Vec::new();
+        for verdict in [
+            crate::score::ClaimVerdict::Holds,
+            crate::score::ClaimVerdict::Contradicted,
+            crate::score::ClaimVerdict::Undecided,
+            crate::score::ClaimVerdict::TooFew,
+            crate::score::ClaimVerdict::NotRun,
+        ] {
+            let n = count(verdict);
+            if n > 0 {
+                verdicts.push(format!("{n} {}", verdict.text()));
+            }
+        }
+        table.add_row([
+            result.claim.id.to_owned(),
+            wrap(result.claim.statement, 34),
+            row.failures.to_string(),
+            row.value.map_or("-".to_owned(), |v| format!("{v:+.3}")),
+            row.interval.map_or("-".to_owned(), |i| format!("{:+.2} {:+.2}", i.low, i.high)),
+            row.verdict.text().to_owned(),
+            wrap(&verdicts.join(", "), 24),
+        ]);
+    }
+    format!(
+        "The paper's claims on this data (mean over the cells with enough failures; cells: each model and \
+         criterion)\n{}",
+        aligned(table, 2)
+    )
+}
+
+fn wrap(text: &str, width: usize) -> String {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        if !lines[last].is_empty() && lines[last].len() + 1 + word.len() > width {
+            lines.push(word.to_owned());
+        } else {
+            if !lines[last].is_empty() {
+                lines[last].push(' ');
+            }
+            lines[last].push_str(word);
+        }
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,115 @@
+//! Bootstrap over scenarios: the headways of one scenario are not independent and stay together. One
+//! resample serves all cells of a category, so differences between cells are paired.
+
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::scenario::Category;
+use crate::sweep::{Confusion, UnitCounts};
+
+/// How scores are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScoreOptions {
+    /// Number of resamples (1000).
+    pub bootstrap_draws: usize,
+    /// Seed of the resamples.
+    pub seed: u64,
+    /// Coverage of the intervals (0.95).
+    pub confidence: f64,
+    /// Below so many failures in S a claim is not judged (10).
+    pub least_failures: u32,
+}
+
+impl Default for ScoreOptions {
+    fn default() -> Self {
+        ScoreOptions { bootstrap_draws: 1000, seed: 157, confidence: 0.95, least_failures: 10 }
+    }
+}
+
+/// A percentile interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Counts of every cell in every resample. A draw depends on the seed, the category and its own number
+/// only: not on threads, nor on the other categories.
+pub(super) fn bootstrap_draws(
+    units: &[UnitCounts],
+    width: usize,
+    category: Category,
+    options: &ScoreOptions,
+) -> Vec<Vec<Confusion>> {
+    if units.is_empty() {
+        return Vec::new();
+    }
+    let stream = |draw: usize| ((category as u64) << 32) | draw as u64;
+    (0..options.bootstrap_draws)
+        .into_par_iter()
+        .map(|draw| {
+            let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+            random.set_stream(stream(draw));
+            let mut totals = vec![Confusion::default(); width];
+            for _ in 0..units.len() {
+                let pick = (u128::from(random.next_u64()) * units.len() as u128) >> 64;
+                let cells = &units[pick as usize].cells;
+                totals.iter_mut().zip(cells).for_each(|(total, cell)| total.add(cell));
+            }
+            totals
+        })
+        .collect()
+}
+
+/// Percentile interval, linear between order statistics; `None` without values.
+pub(super) fn interval(mut values: Vec<f64>, confidence: f64) -> Option<Interval> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_by(f64::total_cmp);
+    let quantile = |q: f64| {
+        let position = q * (values.len() - 1) as f64;
+        let below = position.floor() as usize;
+        let above = (below + 1).min(values.len() - 1);
+        values[below] + (values[above] - values[below]) * (position - below as f64)
+    };
+    let tail = (1.0 - confidence) / 2.0;
+    Some(Interval { low: quantile(tail), high: quantile(1.0 - tail) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn units() -> Vec<UnitCounts> {
+        let cell = |k: u32| Confusion { both: k % 4, only_s: k % 3, only_s_prime: k % 2, neither: 10 };
+        (0..23).map(|k| UnitCounts { unit: u64::from(k), cells: vec![cell(k), cell(k)], capped: vec![] }).collect()
+    }
+
+    #[test]
+    fn draws_do_not_depend_on_the_number_of_threads() {
+        let options = ScoreOptions { bootstrap_draws: 50, ..ScoreOptions::default() };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| bootstrap_draws(&units(), 2, Category::Lvd, &options))
+        };
+        assert_eq!(with(1), with(2));
+    }
+
+    #[test]
+    fn a_cell_paired_with_its_equal_never_differs() {
+        let draws = bootstrap_draws(&units(), 2, Category::CutIn, &ScoreOptions::default());
+        assert!(draws.iter().all(|draw| draw[0] == draw[1]));
+    }
+
+    #[test]
+    fn the_interval_of_the_integers_to_100_leaves_out_the_tails() {
+        let interval = interval((0..=100).map(f64::from).collect(), 0.95).unwrap();
+        assert!((interval.low - 2.5).abs() < 1e-9 && (interval.high - 97.5).abs() < 1e-9);
+    }
+}

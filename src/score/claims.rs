@@ -1,0 +1,225 @@
+//! The paper's qualitative claims, judged on the user's data.
+//!
+//! A claim holds if the paired bootstrap interval of its statistic excludes 0 with the claimed sign, is
+//! contradicted if it excludes 0 with the other, and undecided otherwise. Cells with few failures in S are
+//! left out; where none remains the data is too few. A claimed equality holds if the interval lies within
+//! ±0.05 and is contradicted if it lies wholly outside.
+
+use super::bootstrap::{Interval, interval};
+use super::statistic::Statistic;
+use super::table::{CategoryScores, ScoreTable};
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::scenario::Category;
+
+/// Bound of a claimed equality of F1.
+const NEAR: f64 = 0.05;
+
+/// A claim as data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// Short name.
+    pub id: &'static str,
+    /// Kind of scenario.
+    pub category: Category,
+    /// What the paper says.
+    pub statement: &'static str,
+    /// The cells it speaks of.
+    pub cells: Vec<(ModelId, Criterion)>,
+    /// The number it is about.
+    pub statistic: Statistic,
+}
+
+/// What the data says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClaimVerdict {
+    /// The interval has the claimed sign.
+    Holds,
+    /// The interval has the other sign.
+    Contradicted,
+    /// The interval holds 0.
+    Undecided,
+    /// Fewer failures in S than needed.
+    TooFew,
+    /// A variant or model that it needs was not run.
+    NotRun,
+}
+
+impl ClaimVerdict {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            ClaimVerdict::Holds => "holds",
+            ClaimVerdict::Contradicted => "contradicted",
+            ClaimVerdict::Undecided => "undecided",
+            ClaimVerdict::TooFew => "too few",
+            ClaimVerdict::NotRun => "not run",
+        }
+    }
+}
+
+/// A statistic with its interval and verdict, over all usable cells or for one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClaimRow {
+    /// The cell; `None` for the mean over all usable ones.
+    pub cell: Option<(ModelId, Criterion)>,
+    /// Failures of S in these cells.
+    pub failures: u64,
+    /// Value on the whole sample.
+    pub value: Option<f64>,
+    /// Paired bootstrap interval.
+    pub interval: Option<Interval>,
+    /// Draws in which the statistic is undefined.
+    pub undefined_draws: u32,
+    /// Verdict.
+    pub verdict: ClaimVerdict,
+}
+
+/// A claim with its rows: first the mean, then each cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClaimResult {
+    /// The claim.
+    pub claim: Claim,
+    /// Mean over the usable cells.
+    pub overall: ClaimRow,
+    /// Each cell.
+    pub rows: Vec<ClaimRow>,
+    /// Cells left out for too few failures.
+    pub left_out: usize,
+}
+
+fn cells(models: &[ModelId], criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
+    models.iter().flat_map(|&m| criteria.iter().map(move |&c| (m, c))).collect()
+}
+
+/// The claims of the paper, sections on results and discussion.
+pub fn paper_claims() -> Vec<Claim> {
+    use Category::{CutIn, CutOut, Lvd};
+    use Criterion::{Btn, Collision, Ttc};
+    use ModelId::{Cchdm, Fsm, Reg157, Rss};
+    use Statistic::*;
+    let all = || cells(&ModelId::ALL, &Criterion::ALL);
+    let elsewhere = || {
+        let mut list = all();
+        list.retain(|&(m, c)| m != Reg157 || c == Collision);
+        list
+    };
+    let reg157_rest = || cells(&[Reg157], &[Ttc, Btn]);
+    let careful = || cells(&[Rss, Fsm], &Criterion::ALL);
+    let hasty = || cells(&[Reg157, Cchdm], &Criterion::ALL);
+    let often = || cells(&[Reg157, Cchdm], &[Ttc, Btn]);
+    let claim = |id, category, statement, cells, statistic| Claim { id, category, statement, cells, statistic };
+    let mut claims = vec![
+        claim("cut-in 2 > 1", CutIn, "2 is better than 1", all(), F1Above(&["2"], &["1"])),
+        claim("cut-in 3 < 1", CutIn, "3 is clearly worse than 1", elsewhere(), F1Above(&["1"], &["3"])),
+        claim("cut-in 4 < 2", CutIn, "4 is clearly worse than 2", elsewhere(), F1Above(&["2"], &["4"])),
+        claim("cut-in 3, 4 FP", CutIn, "3 and 4 err by false positives", elsewhere(), FalsePositivesDominate(&["3", "4"])),
+        claim(
+            "cut-in Reg157 2, 4",
+            CutIn,
+            "Reg157 with TTC and BTN: 2 and 4 are best",
+            reg157_rest(),
+            F1Above(&["2", "4"], &["1", "3", "5", "6", "7"]),
+        ),
+        claim(
+            "cut-in 6, 7 best",
+            CutIn,
+            "elsewhere 6 and 7 are best",
+            elsewhere(),
+            F1Above(&["6", "7"], &["1", "2", "3", "4", "5"]),
+        ),
+        claim("cut-out b = d", CutOut, "b and d are nearly the same", all(), F1Near("b", "d")),
+        claim(
+            "cut-out b, d best",
+            CutOut,
+            "Reg157 and CCHDM are low for all but b and d",
+            hasty(),
+            F1Above(&["b", "d"], &["a", "c", "e", "f", "g"]),
+        ),
+        claim("cut-out c ~ 0", CutOut, "RSS and FSM: c is almost zero (F1 below 0.1)", careful(), F1Below("c", 0.1)),
+        claim("cut-out c < a", CutOut, "RSS and FSM: c is below a", careful(), F1Above(&["a"], &["c"])),
+        claim("cut-out c FN", CutOut, "RSS and FSM: c errs by false negatives", careful(), FalseNegativesDominate(&["c"])),
+        claim("cut-out e, f low", CutOut, "RSS and FSM: e and f are below b, d and g", careful(), F1Above(&["b", "d", "g"], &["e", "f"])),
+        claim(
+            "LVD iii-v > i, ii",
+            Lvd,
+            "RSS and FSM: iii to v are far above i and ii",
+            careful(),
+            F1Above(&["iii", "iv", "v"], &["i", "ii"]),
+        ),
+        claim("LVD i, ii FN", Lvd, "RSS and FSM: i and ii err by false negatives", careful(), FalseNegativesDominate(&["i", "ii"])),
+        claim("LVD v best", Lvd, "v is best in all cases", all(), F1Above(&["v"], &["i", "ii", "iii", "iv"])),
+    ];
+    let fails = ["cut-in failures", "cut-out failures", "LVD failures"];
+    for (category, id) in Category::ALL.into_iter().zip(fails) {
+        let statement = "Reg157 and CCHDM fail TTC and BTN more often than RSS and FSM";
+        claims.push(claim(id, category, statement, often(), FailsMoreOften(&[Rss, Fsm])));
+    }
+    claims.push(claim(
+        "cut-in side hits",
+        CutIn,
+        "side collisions make collisions outnumber TTC failures",
+        cells(&[Cchdm, Rss, Fsm], &[Collision]),
+        FailsMoreThan(Ttc),
+    ));
+    claims
+}
+
+/// Judges every claim whose category was simulated.
+pub fn judge_claims(table: &ScoreTable) -> Vec<ClaimResult> {
+    let judge = |claim: Claim| {
+        let scores = table.categories.iter().find(|c| c.category == claim.category)?;
+        Some(judge_claim(claim, scores, table.options.least_failures, table.options.confidence))
+    };
+    paper_claims().into_iter().filter_map(judge).collect()
+}
+
+fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f64) -> ClaimResult {
+    let statistic = claim.statistic;
+    let runnable = statistic.variants().iter().all(|v| scores.variant(v).is_some());
+    let failures = |&(model, criterion): &(ModelId, Criterion)| {
+        scores.index(0, model, criterion).map_or(0, |at| u64::from(scores.cells[at].counts.both))
+    };
+    let of_draw = |draw: Option<usize>, (model, criterion): (ModelId, Criterion)| {
+        let counts = |at: usize| draw.map_or(scores.cells[at].counts, |d| scores.draws[d][at]);
+        statistic.value(scores, &counts, model, criterion)
+    };
+    let row = |cell: Option<(ModelId, Criterion)>, cells: &[(ModelId, Criterion)]| {
+        let mean = |draw: Option<usize>| {
+            let values: Vec<f64> = cells.iter().filter_map(|&c| of_draw(draw, c)).collect();
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let values: Vec<f64> = (0..scores.draws.len()).filter_map(|d| mean(Some(d))).collect();
+        let undefined_draws = (scores.draws.len() - values.len()) as u32;
+        let value = mean(None);
+        let interval = interval(values, confidence).filter(|_| value.is_some());
+        let total: u64 = cells.iter().map(failures).sum();
+        let verdict = if !runnable || value.is_none() && total >= u64::from(least) {
+            ClaimVerdict::NotRun
+        } else if cells.is_empty() || total < u64::from(least) {
+            ClaimVerdict::TooFew
+        } else {
+            verdict(&statistic, interval)
+        };
+        ClaimRow { cell, failures: total, value, interval, undefined_draws, verdict }
+    };
+    let usable: Vec<_> = claim.cells.iter().copied().filter(|c| failures(c) >= u64::from(least)).collect();
+    let overall = row(None, &usable);
+    let rows = claim.cells.iter().map(|&cell| row(Some(cell), &[cell])).collect();
+    ClaimResult { left_out: claim.cells.len() - usable.len(), claim, overall, rows }
+}
+
+fn verdict(statistic: &Statistic, interval: Option<Interval>) -> ClaimVerdict {
+    let Some(Interval { low, high }) = interval else { return ClaimVerdict::Undecided };
+    let (holds, contradicted) = match statistic {
+        Statistic::F1Near(..) => (low >= -NEAR && high <= NEAR, low > NEAR || high < -NEAR),
+        _ => (low > 0.0, high < 0.0),
+    };
+    if holds {
+        ClaimVerdict::Holds
+    } else if contradicted {
+        ClaimVerdict::Contradicted
+    } else {
+        ClaimVerdict::Undecided
+    }
+}

@@ -1,0 +1,162 @@
+//! The score table: per category, parameterization, model and criterion the agreement of S' with S over
+//! (scenario, THW) pairs.
+
+use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws, interval};
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::scenario::Category;
+use crate::sweep::{Confusion, LanePlan, Partial, UnitCounts};
+use crate::{Error, Place, Result};
+
+/// Recall TP/(TP + FN); `None` where S never fails.
+pub fn recall(c: &Confusion) -> Option<f64> {
+    ratio(c.both, c.both + c.only_s)
+}
+
+/// Precision TP/(TP + FP); `None` where S' never fails.
+pub fn precision(c: &Confusion) -> Option<f64> {
+    ratio(c.both, c.both + c.only_s_prime)
+}
+
+/// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
+pub fn f1(c: &Confusion) -> Option<f64> {
+    ratio(2 * c.both, 2 * c.both + c.only_s + c.only_s_prime)
+}
+
+fn ratio(numerator: u32, denominator: u32) -> Option<f64> {
+    (denominator > 0).then(|| f64::from(numerator) / f64::from(denominator))
+}
+
+/// One cell of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Index into [`CategoryScores::variants`]; 0 is S itself.
+    pub variant: usize,
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Counts over (scenario, THW) pairs.
+    pub counts: Confusion,
+    /// Bootstrap interval of F1; `None` where no draw defines it.
+    pub f1_interval: Option<Interval>,
+    /// Draws in which F1 is 0/0.
+    pub undefined_draws: u32,
+}
+
+/// Scores of one category.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CategoryScores {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Scenarios that were simulated.
+    pub scenarios: u64,
+    /// Simulations of S per model: scenarios × headways.
+    pub simulations: u64,
+    /// Names of the variants; the first is `S`.
+    pub variants: Vec<String>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// One per variant × model × criterion, in that order.
+    pub cells: Vec<Cell>,
+    /// Lanes that ended at the time cap, one per variant × model.
+    pub capped: Vec<u64>,
+    /// Bootstrap draws: the cells' counts in each.
+    pub draws: Vec<Vec<Confusion>>,
+}
+
+impl CategoryScores {
+    /// Position of a cell in [`CategoryScores::cells`]; `None` for a model that was not run.
+    pub fn index(&self, variant: usize, model: ModelId, criterion: Criterion) -> Option<usize> {
+        let model = self.models.iter().position(|m| *m == model)?;
+        Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
+    }
+
+    /// A variant by its name.
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.variants.iter().position(|v| v == name)
+    }
+}
+
+/// Scores of a whole study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreTable {
+    /// One per category of the plan.
+    pub categories: Vec<CategoryScores>,
+    /// How the intervals were made.
+    pub options: ScoreOptions,
+}
+
+/// Scores a complete partial.
+///
+/// # Errors
+/// If units are missing or the partial belongs to another plan.
+pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Result<ScoreTable> {
+    if !partial.is_complete(plan) {
+        let problem = format!("{} of {} units are there", partial.units().len(), plan.unit_count());
+        return Err(Error::input(Place::item("partial result"), problem, "compute the missing units first"));
+    }
+    let criteria = Criterion::ALL.len();
+    let mut categories = Vec::new();
+    for block in &plan.blocks {
+        let first = block.first_unit as usize;
+        let units: &[UnitCounts] = &partial.units()[first..first + block.units.len()];
+        let width = block.variants.len() * plan.models.len() * criteria;
+        let mut totals = vec![Confusion::default(); width];
+        let mut capped = vec![0_u64; block.variants.len() * plan.models.len()];
+        for unit in units {
+            totals.iter_mut().zip(&unit.cells).for_each(|(total, cell)| total.add(cell));
+            capped.iter_mut().zip(&unit.capped).for_each(|(total, &count)| *total += u64::from(count));
+        }
+        let draws = bootstrap_draws(units, width, block.category, options);
+        let cells = (0..width)
+            .map(|at| {
+                let values: Vec<f64> = draws.iter().filter_map(|draw| f1(&draw[at])).collect();
+                Cell {
+                    variant: at / (plan.models.len() * criteria),
+                    model: plan.models[at / criteria % plan.models.len()],
+                    criterion: Criterion::ALL[at % criteria],
+                    counts: totals[at],
+                    undefined_draws: (draws.len() - values.len()) as u32,
+                    f1_interval: interval(values, options.confidence),
+                }
+            })
+            .collect();
+        categories.push(CategoryScores {
+            category: block.category,
+            scenarios: block.units.len() as u64,
+            simulations: (block.units.len() * plan.headways.len()) as u64,
+            variants: block.variants.clone(),
+            models: plan.models.clone(),
+            cells,
+            capped,
+            draws,
+        });
+    }
+    Ok(ScoreTable { categories, options: options.clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_confusion_by_hand() {
+        let c = Confusion { both: 6, only_s: 2, only_s_prime: 4, neither: 88 };
+        assert_eq!(recall(&c), Some(0.75));
+        assert_eq!(precision(&c), Some(0.6));
+        assert_eq!(f1(&c), Some(12.0 / 18.0));
+    }
+
+    #[test]
+    fn where_nothing_ever_fails_there_is_no_score() {
+        let c = Confusion { neither: 100, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (None, None, None));
+    }
+
+    #[test]
+    fn a_parameterization_that_misses_every_failure_scores_0_and_has_no_precision() {
+        let c = Confusion { only_s: 3, neither: 7, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.0), None, Some(0.0)));
+    }
+}
