@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
+use std::io::Write;
 use std::path::PathBuf;
 
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
@@ -13,11 +14,60 @@ pub fn shared(rel: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    eprintln!("SKIPPED: needs ../shared/{rel} (set LANESWEEP_SHARED to the folder that holds it)");
+    skipped(&format!("needs ../shared/{rel} (set LANESWEEP_SHARED to the folder that holds it)"));
     None
+}
+
+/// Says that a test is skipped. Past the test harness, which shows the output of failing tests only.
+fn skipped(why: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
 }
 
 /// A file of `tests/golden`.
 pub fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
+}
+
+/// The four SUMO recordings of the shared folder, unpacked once below the target folder; says loudly why
+/// where that cannot be done.
+pub fn sumo_recordings() -> Option<PathBuf> {
+    static UNPACKED: std::sync::OnceLock<Option<PathBuf>> = std::sync::OnceLock::new();
+    UNPACKED.get_or_init(unpack_sumo_recordings).clone()
+}
+
+fn unpack_sumo_recordings() -> Option<PathBuf> {
+    let archive = shared("data/sumo/sumo_highd.zip")?;
+    let root = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let ready = root.join("sumo_highd");
+    if ready.is_dir() {
+        return Some(ready);
+    }
+    // Test binaries run side by side: each unpacks for itself, the first one's folder stays.
+    let mine = root.join(format!("sumo_highd.{}", std::process::id()));
+    let unpack = |program: &str, args: &[&std::ffi::OsStr]| {
+        let run = std::process::Command::new(program).args(args).stdout(std::process::Stdio::null()).status();
+        run.is_ok_and(|status| status.success())
+    };
+    let (archive, into) = (archive.as_os_str(), mine.as_os_str());
+    let unpacked = unpack("unzip", &["-q".as_ref(), "-o".as_ref(), archive, "-d".as_ref(), into])
+        || unpack("python3", &["-m".as_ref(), "zipfile".as_ref(), "-e".as_ref(), archive, into]);
+    if !unpacked {
+        skipped(&format!("needs `unzip` or `python3` to unpack {}", archive.display()));
+        return None;
+    }
+    let content = folder_with_tracks(&mine)?;
+    if std::fs::rename(&content, &ready).is_ok() || ready.is_dir() {
+        let _ = std::fs::remove_dir_all(&mine);
+        return Some(ready);
+    }
+    Some(content)
+}
+
+/// The folder itself or the one below it that holds `01_tracks.csv`.
+fn folder_with_tracks(folder: &std::path::Path) -> Option<PathBuf> {
+    if folder.join("01_tracks.csv").exists() {
+        return Some(folder.to_path_buf());
+    }
+    let below = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    below.filter(|path| path.is_dir()).find_map(|path| folder_with_tracks(&path))
 }
