@@ -12,6 +12,7 @@ pub mod error;
 pub mod mining;
 pub mod parameterization;
 pub mod profile;
+pub mod report;
 pub mod scalar;
 pub mod scenario;
 pub mod score;

@@ -292,9 +292,7 @@ fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
 fn a_step_takes_no_more_operations_than_it_should() {
     let profile = paper();
     let case = lvd(30.0, 10.0, 4.0);
-    for (model, most) in
-        [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)]
-    {
+    for (model, most) in [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)] {
         let mut tables = Tables::default();
         let lane = LaneCase::encode(&case, &profile, &mut tables).cast::<Counting>();
         let (tables, constants) = (tables.cast(), Constants::<Counting>::resolve(&profile, case.category));

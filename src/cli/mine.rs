@@ -35,7 +35,7 @@ impl Mine {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         let options = source::mining_options(self.mining.as_deref())?;
         let mut collection = Source::Folder(self.dir.clone()).load(&options, verbosity)?;
-        tracing::info!("{}", source::counts(&collection));
+        tracing::info!("{}", source::counts(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }

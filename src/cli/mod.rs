@@ -8,6 +8,7 @@ mod mine;
 mod simulate;
 mod source;
 mod study;
+mod synth;
 
 pub use exit::Exit;
 
@@ -66,6 +67,7 @@ impl Common {
 enum Verb {
     Study(study::Study),
     Mine(mine::Mine),
+    Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
 }
@@ -132,6 +134,7 @@ fn run(cli: &Cli) -> Result<Exit> {
     match &cli.verb {
         Verb::Study(verb) => verb.run(cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(cli.common.verbosity()),
+        Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
     }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::console::{self, Verbosity};
-use crate::mining::{Collection, MiningOptions, mine_folder, mine_generated};
-use crate::scenario::{Category, read_scenarios};
+use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
+use crate::scenario::{Category, Scenario, read_scenarios};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::trajectory::highd;
 use crate::{Error, Result};
@@ -33,17 +33,15 @@ impl Source {
         }
     }
 
-    /// The sentence that every output carries where the data is synthetic.
-    pub fn data_note(&self) -> Option<String> {
-        matches!(self, Source::Generated(_)).then(|| self.describe())
+    /// Made by the program: no statement about real traffic.
+    pub fn is_synthetic(&self) -> bool {
+        matches!(self, Source::Generated(_))
     }
 
     /// Reads or generates, and mines.
     pub fn load(&self, mining: &MiningOptions, verbosity: Verbosity) -> Result<Collection> {
         let collection = match self {
-            Source::Scenarios(path) => {
-                Collection { scenarios: read_scenarios(path)?, ..Collection::default() }
-            }
+            Source::Scenarios(path) => Collection { scenarios: read_scenarios(path)?, ..Collection::default() },
             Source::Folder(dir) => {
                 let length = highd::inventory(dir).map_or(0, |i| i.recordings.len() as u64);
                 let bar = console::progress(verbosity, length, "reading and mining");
@@ -69,9 +67,9 @@ impl Source {
 }
 
 /// Found and kept, per category, in one line.
-pub fn counts(collection: &Collection) -> String {
+pub fn counts(scenarios: &[Scenario]) -> String {
     let part = |category: Category| {
-        let count = collection.count(category);
+        let count = count(scenarios, category);
         format!("{} {} found, {} kept", category.label(), count.found, count.kept)
     };
     Category::ALL.map(part).join("; ")

@@ -1,32 +1,239 @@
-//! x
+//! `lanesweep study`: trajectories in, F1 out.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
 use clap::Args;
-use super::console::Verbosity;
-use super::Exit;
-use crate::Result;
-/// x
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::console::{self, Verbosity};
+use super::source::{self, Source};
+use super::synth::GeneratorFlags;
+use super::{Exit, ProfileFlags};
+use crate::mining::{Collection, MiningOptions, count};
+use crate::parameterization::ParameterizationOptions;
+use crate::profile::Profile;
+use crate::report::lanes;
+use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
+use crate::report::study::StudyReport;
+use crate::scenario::Category;
+use crate::score::{ScoreOptions, f1, judge_claims, score};
+use crate::sweep::{
+    Backend, CpuBackend, LanePlan, Partial, StudyOptions, StudyPlan, Wanted, chunks, plan_study, sweep,
+};
+use crate::{Error, Place, Result};
+
+/// How far do parameterized scenarios agree with recorded ones?
+///
+/// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S')
+/// from ten time headways against four driver models, judges collision, TTC and BTN, and scores S' against
+/// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
-pub struct Study { dir: Option<std::path::PathBuf> }
-impl Study { pub fn run(&self, v: Verbosity)->Result<Exit>{
-    use crate::sweep::*;
-    use crate::criterion::Criterion;
-    let src = match &self.dir { Some(d) => super::source::Source::Folder(d.clone()), None => super::source::Source::Generated(Default::default()) };
-    let t=std::time::Instant::now();
-    let c = src.load(&Default::default(), v)?;
-    println!("{} {:?}", super::source::counts(&c), t.elapsed());
-    let p = crate::profile::Profile::load("paper")?;
-    let t=std::time::Instant::now();
-    let plan = plan_study(&c.scenarios, &p, &StudyOptions::default())?;
-    println!("plan {:?} left {:?} lanes {}", t.elapsed(), plan.left_out, plan.plan.lane_count());
-    let plan=plan.plan;
-    let t=std::time::Instant::now();
-    let mut n=std::collections::BTreeMap::new();
-    let mut steps=0u64;
-    sweep(&plan, 0..plan.unit_count(), &CpuBackend::lane_arithmetic(), None, Wanted::Verdicts, |ch| { 
-        for (k,vd) in ch.verdicts.iter().enumerate() { let key=plan.key(ch.first_lane+k as u64).unwrap(); let e=n.entry((key.block,key.variant,key.model)).or_insert([0u32;5]); e[4]+=1; for c in Criterion::ALL { e[c.index()]+=u32::from(vd.failed(c)); } e[3]+=u32::from(vd.capped()); }
-        Ok(()) })?;
-    println!("sweep {:?}", t.elapsed());
-    for (k,e) in n { if k.1==0 {println!("{} {} {} {e:?}", plan.blocks[k.0].category.label(), plan.blocks[k.0].variants[k.1], plan.models[k.2].name());} }
-    let t=std::time::Instant::now();
-    sweep(&plan, 0..plan.unit_count(), &CpuBackend::lane_arithmetic(), None, Wanted::Outcomes, |ch| { steps+=ch.outcomes.iter().map(|o| u64::from(o.end_step)+1).sum::<u64>(); Ok(()) })?;
-    println!("outcomes {:?} steps {steps}", t.elapsed());
-    Ok(Exit::Ok) } }
+#[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
+                        --scenarios scenarios.jsonl --lanes lanes.csv")]
+pub struct Study {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    dir: Option<PathBuf>,
+    /// Scenario file (JSON Lines) instead of recordings
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Folder for tables, figures and run.json
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
+    out: PathBuf,
+    /// Also write one row per lane
+    #[arg(long, value_name = "FILE")]
+    lanes: Option<PathBuf>,
+    /// Set the paper's published numbers beside (they are highD's)
+    #[arg(long)]
+    published: bool,
+    /// Run the f64 reference instead of the f32 lane arithmetic
+    #[arg(long)]
+    reference: bool,
+    /// Study options (TOML): tables `mining`, `parameterization`, `score`
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Seed of the bootstrap [default: 157]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    categories: Vec<String>,
+    #[command(flatten)]
+    profile: ProfileFlags,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+/// The study file.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct StudyConfig {
+    mining: MiningOptions,
+    parameterization: ParameterizationOptions,
+    score: ScoreOptions,
+}
+
+impl StudyConfig {
+    fn read(path: Option<&Path>) -> Result<StudyConfig> {
+        let config: StudyConfig = path.map_or(Ok(StudyConfig::default()), source::read_toml)?;
+        config.mining.validate()?;
+        config.parameterization.validate()?;
+        config.score.validate()?;
+        Ok(config)
+    }
+}
+
+impl Study {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let mut config = StudyConfig::read(self.config.as_deref())?;
+        config.score.seed = self.seed.unwrap_or(config.score.seed);
+        let profile = self.profile.load()?;
+        let options = StudyOptions {
+            categories: self.categories()?,
+            parameterization: config.parameterization.clone(),
+            ..StudyOptions::default()
+        };
+        let source = match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(self.generator.options()),
+        };
+        tracing::info!("{}", source.describe());
+
+        let mut timings = Timings::default();
+        let collection = timed(&mut timings.mine_s, || source.load(&config.mining, verbosity))?;
+        tracing::info!("{}", source::counts(&collection.scenarios));
+        let planned = timed(&mut timings.plan_s, || plan_study(&collection.scenarios, &profile, &options))?;
+        planned.left_out.iter().for_each(console::complain);
+        if planned.plan.unit_count() == 0 {
+            return Err(Error::input(
+                Place::item(source.describe()),
+                format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
+                "use more recordings, or relax the filters in the study file (--config)",
+            ));
+        }
+        let backend: Box<dyn Backend> =
+            if self.reference { Box::new(CpuBackend::reference()) } else { Box::new(CpuBackend::lane_arithmetic()) };
+        tracing::info!("{} lanes on {}", planned.plan.lane_count(), backend.describe());
+        let partial = timed(&mut timings.sweep_s, || run_plan(&planned.plan, backend.as_ref(), verbosity))?;
+        let scores = timed(&mut timings.score_s, || score(&planned.plan, &partial, &config.score))?;
+        let claims = judge_claims(&scores);
+        if let Some(path) = &self.lanes {
+            write_lanes(path, &planned.plan, backend.as_ref())?;
+        }
+        let categories = category_records(&collection, &planned, &scores);
+        let run = RunRecord {
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            data: source.describe(),
+            synthetic: source.is_synthetic(),
+            backend: backend.describe(),
+            plan_sha256: planned.plan.hash().to_owned(),
+            scenario_file_sha256: self.scenarios.as_deref().map(checksum).transpose()?,
+            left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
+            recordings: collection.recordings,
+            categories,
+            lanes: planned.plan.lane_count(),
+            profile,
+            mining: config.mining,
+            parameterization: config.parameterization,
+            score: config.score,
+            timings,
+        };
+        let report = StudyReport { scores, claims, run, published: self.published };
+        let written = report.write(&self.out)?;
+        console::print(&report.text())?;
+        tracing::info!("{} files written to {}", written.len(), self.out.display());
+        Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
+    }
+
+    fn categories(&self) -> Result<Vec<Category>> {
+        if self.categories.is_empty() {
+            return Ok(Category::ALL.to_vec());
+        }
+        let parse = |text: &String| {
+            Category::parse(text.trim()).ok_or_else(|| {
+                let problem = format!("there is no category `{text}`");
+                Error::usage(Place::item("--categories"), problem, "use cut-in, cut-out, lvd")
+            })
+        };
+        let mut list = self.categories.iter().map(parse).collect::<Result<Vec<_>>>()?;
+        list.sort();
+        list.dedup();
+        Ok(list)
+    }
+}
+
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *seconds = start.elapsed().as_secs_f64();
+    result
+}
+
+fn run_plan(plan: &LanePlan, backend: &dyn Backend, verbosity: Verbosity) -> Result<Partial> {
+    let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
+    let mut parts = Vec::new();
+    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
+        bar.inc(chunk.units.end - chunk.units.start);
+        parts.push(Partial::of(plan, &chunk));
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)
+}
+
+/// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
+fn write_lanes(path: &Path, plan: &LanePlan, backend: &dyn Backend) -> Result<()> {
+    let mut session = backend.prepare(plan)?;
+    let mut failure = None;
+    let written = crate::report::files::write_atomically_with(path, |out| {
+        lanes::write_header(out)?;
+        for units in chunks(plan, 0..plan.unit_count()) {
+            match session.run(units, Wanted::Outcomes) {
+                Ok(chunk) => lanes::write_chunk(out, plan, &chunk)?,
+                Err(error) => {
+                    failure = Some(error);
+                    return Err(std::io::Error::other("the sweep failed"));
+                }
+            }
+        }
+        Ok(())
+    });
+    match failure {
+        Some(error) => Err(error),
+        None => written,
+    }
+}
+
+fn category_records(
+    collection: &Collection,
+    planned: &StudyPlan,
+    scores: &crate::score::ScoreTable,
+) -> Vec<CategoryRecord> {
+    let plan = &planned.plan;
+    let record = |block: &crate::sweep::Block| {
+        let of = count(&collection.scenarios, block.category);
+        let scored = scores.categories.iter().find(|c| c.category == block.category);
+        let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
+        let reduction = planned.reductions.iter().find(|r| r.category == block.category);
+        CategoryRecord {
+            category: block.category.key(),
+            found: of.found,
+            kept: of.kept,
+            variants: block.variants.clone(),
+            lanes: plan.lanes_per_unit(block) * block.units.len() as u64,
+            capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
+            undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
+            undefined_draws: cells().map(|c| u64::from(c.undefined_draws)).sum(),
+            svd_explained: reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect()),
+        }
+    };
+    plan.blocks.iter().map(record).collect()
+}
+
+fn checksum(path: &Path) -> Result<String> {
+    let content = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    Ok(crate::sweep::hex(&Sha256::digest(content)))
+}

@@ -45,11 +45,6 @@ pub struct Collection {
 }
 
 impl Collection {
-    /// Found and kept scenarios of a category.
-    pub fn count(&self, category: Category) -> CategoryCount {
-        count(&self.scenarios, category)
-    }
-
     fn add(&mut self, part: Part) {
         self.notes.extend(part.notes);
         self.scenarios.extend(part.mined.scenarios);

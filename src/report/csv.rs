@@ -24,7 +24,8 @@ fn row(fields: &[&str]) -> Vec<String> {
 
 /// Failures of S and S': one row per category, variant, model and criterion. `data` says what was swept.
 pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
-    let mut rows = vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
+    let mut rows =
+        vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
     for category in &scores.categories {
         for cell in &category.cells {
             let failures =
@@ -68,7 +69,8 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
     for category in &scores.categories {
         for cell in category.cells.iter().filter(|c| c.variant > 0) {
             let name = &category.variants[cell.variant];
-            let parameters = ParameterizationId::find(category.category, name).map_or(String::new(), |p| p.parameters.to_string());
+            let parameters =
+                ParameterizationId::find(category.category, name).map_or(String::new(), |p| p.parameters.to_string());
             let c = &cell.counts;
             let end = |pick: fn(Interval) -> f64| number(cell.f1_interval.map(pick));
             rows.push(vec![
@@ -112,8 +114,7 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
     ])];
     for result in results {
         for claim_row in std::iter::once(&result.overall).chain(&result.rows) {
-            let (model, criterion) =
-                claim_row.cell.map_or(("", ""), |(m, c): (_, Criterion)| (m.name(), c.key()));
+            let (model, criterion) = claim_row.cell.map_or(("", ""), |(m, c): (_, Criterion)| (m.name(), c.key()));
             rows.push(vec![
                 result.claim.id.to_owned(),
                 result.claim.category.key().to_owned(),

@@ -17,10 +17,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
 }
 
 /// The same for content that is produced on the way.
-pub fn write_atomically_with(
-    path: &Path,
-    produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> Result<()> {
+pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let failed = |e: std::io::Error| Error::io(path, "write", e);
     let dir = match path.parent() {
         Some(dir) if !dir.as_os_str().is_empty() => dir,

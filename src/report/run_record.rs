@@ -82,8 +82,8 @@ pub struct RunRecord {
 impl RunRecord {
     /// As JSON.
     pub fn to_json(&self) -> Result<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self)
-            .map_err(|e| Error::Internal(format!("run.json cannot be written: {e}")))?;
+        let mut text =
+            serde_json::to_vec_pretty(self).map_err(|e| Error::Internal(format!("run.json cannot be written: {e}")))?;
         text.push(b'\n');
         Ok(text)
     }

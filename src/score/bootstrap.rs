@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::scenario::Category;
 use crate::sweep::{Confusion, UnitCounts};
+use crate::{Error, Place, Result};
 
 /// How scores are made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,20 @@ pub struct ScoreOptions {
 impl Default for ScoreOptions {
     fn default() -> Self {
         ScoreOptions { bootstrap_draws: 1000, seed: 157, confidence: 0.95, least_failures: 10 }
+    }
+}
+
+impl ScoreOptions {
+    /// Checks the ranges; the error names the option.
+    pub fn validate(&self) -> Result<()> {
+        let bad = |key: &str, problem: String, help: &str| Err(Error::usage(Place::item(key), problem, help));
+        if self.bootstrap_draws == 0 || self.bootstrap_draws > 1_000_000 {
+            return bad("score.bootstrap_draws", format!("{} draws", self.bootstrap_draws), "use 1 to 1000000");
+        }
+        if !(self.confidence > 0.0 && self.confidence < 1.0) {
+            return bad("score.confidence", format!("{}", self.confidence), "use a number between 0 and 1, like 0.95");
+        }
+        Ok(())
     }
 }
 

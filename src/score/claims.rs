@@ -113,7 +113,13 @@ pub fn paper_claims() -> Vec<Claim> {
         claim("cut-in 2 > 1", CutIn, "2 is better than 1", all(), F1Above(&["2"], &["1"])),
         claim("cut-in 3 < 1", CutIn, "3 is clearly worse than 1", elsewhere(), F1Above(&["1"], &["3"])),
         claim("cut-in 4 < 2", CutIn, "4 is clearly worse than 2", elsewhere(), F1Above(&["2"], &["4"])),
-        claim("cut-in 3, 4 FP", CutIn, "3 and 4 err by false positives", elsewhere(), FalsePositivesDominate(&["3", "4"])),
+        claim(
+            "cut-in 3, 4 FP",
+            CutIn,
+            "3 and 4 err by false positives",
+            elsewhere(),
+            FalsePositivesDominate(&["3", "4"]),
+        ),
         claim(
             "cut-in Reg157 2, 4",
             CutIn,
@@ -138,8 +144,20 @@ pub fn paper_claims() -> Vec<Claim> {
         ),
         claim("cut-out c ~ 0", CutOut, "RSS and FSM: c is almost zero (F1 below 0.1)", careful(), F1Below("c", 0.1)),
         claim("cut-out c < a", CutOut, "RSS and FSM: c is below a", careful(), F1Above(&["a"], &["c"])),
-        claim("cut-out c FN", CutOut, "RSS and FSM: c errs by false negatives", careful(), FalseNegativesDominate(&["c"])),
-        claim("cut-out e, f low", CutOut, "RSS and FSM: e and f are below b, d and g", careful(), F1Above(&["b", "d", "g"], &["e", "f"])),
+        claim(
+            "cut-out c FN",
+            CutOut,
+            "RSS and FSM: c errs by false negatives",
+            careful(),
+            FalseNegativesDominate(&["c"]),
+        ),
+        claim(
+            "cut-out e, f low",
+            CutOut,
+            "RSS and FSM: e and f are below b, d and g",
+            careful(),
+            F1Above(&["b", "d", "g"], &["e", "f"]),
+        ),
         claim(
             "LVD iii-v > i, ii",
             Lvd,
@@ -147,7 +165,13 @@ pub fn paper_claims() -> Vec<Claim> {
             careful(),
             F1Above(&["iii", "iv", "v"], &["i", "ii"]),
         ),
-        claim("LVD i, ii FN", Lvd, "RSS and FSM: i and ii err by false negatives", careful(), FalseNegativesDominate(&["i", "ii"])),
+        claim(
+            "LVD i, ii FN",
+            Lvd,
+            "RSS and FSM: i and ii err by false negatives",
+            careful(),
+            FalseNegativesDominate(&["i", "ii"]),
+        ),
         claim("LVD v best", Lvd, "v is best in all cases", all(), F1Above(&["v"], &["i", "ii", "iii", "iv"])),
     ];
     let fails = ["cut-in failures", "cut-out failures", "LVD failures"];

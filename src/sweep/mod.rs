@@ -22,6 +22,7 @@ pub use frame::{Frame, Observer, Seen, Silent, Start, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Confusion, Partial, UnitCounts};
+pub(crate) use plan::hex;
 pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use run::{SweepSummary, chunks, sweep};
 pub use study::{StudyOptions, StudyPlan, plan_study};
