@@ -2,6 +2,7 @@
 //!
 //! Rooms in the order of the data: [`trajectory`] → [`scenario`].
 
+mod atomic_file;
 pub mod error;
 pub mod scenario;
 pub mod trajectory;
