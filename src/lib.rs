@@ -4,6 +4,7 @@
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`conformance`] (other simulators' tables) and [`cli`].
 
+mod atomic_file;
 pub mod cli;
 pub mod conformance;
 pub mod criterion;

@@ -13,7 +13,6 @@ use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::ParameterizationOptions;
-use crate::profile::Profile;
 use crate::report::lanes;
 use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
 use crate::report::study::StudyReport;

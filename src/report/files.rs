@@ -1,8 +1,9 @@
-//! Writing files whole or not at all.
+//! Writing the files of a report: each whole or not at all.
 
 use std::io::Write;
 use std::path::Path;
 
+use crate::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
 /// Makes a folder and those above it, where they do not exist.
@@ -18,33 +19,9 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
 
 /// The same for content that is produced on the way.
 pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    let failed = |e: std::io::Error| Error::io(path, "write", e);
-    let dir = match path.parent() {
-        Some(dir) if !dir.as_os_str().is_empty() => dir,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::Builder::new().prefix(".lanesweep-").tempfile_in(dir).map_err(failed)?;
-    {
-        let mut buffered = std::io::BufWriter::new(file.as_file_mut());
-        produce(&mut buffered).map_err(failed)?;
-        buffered.flush().map_err(failed)?;
-    }
-    set_usual_permissions(file.as_file()).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    file.persist(path).map_err(|e| failed(e.error))?;
-    Ok(())
-}
-
-/// Temporary files are private; a result is as readable as other files.
-#[cfg(unix)]
-fn set_usual_permissions(file: &std::fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn set_usual_permissions(_: &std::fs::File) -> std::io::Result<()> {
-    Ok(())
+    let mut file = AtomicFile::create(path)?;
+    produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
+    file.stage()?.publish()
 }
 
 #[cfg(test)]

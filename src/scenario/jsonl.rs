@@ -6,13 +6,14 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 
 use serde_json::Value;
 
 use super::schema::wrong_field;
 use super::{Category, Other, Scenario};
+use crate::atomic_file::AtomicFile;
 use crate::error::{Error, Place, Result};
 
 /// Reads a scenario file. A byte-order mark, Windows line ends and empty lines are accepted.
@@ -62,22 +63,15 @@ pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
     Ok(scenarios)
 }
 
-/// Writes a scenario file: whole or not at all. It is written beside its final place, synced and then
-/// renamed, so a crash leaves the old file or the new one.
+/// Writes a scenario file: whole or not at all.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be written to; [`Error::Internal`] for a scenario that
 /// [`read_scenarios`] would refuse.
 pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
-    let failed = |e| Error::io(path, "write", e);
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = temporary(folder).map_err(failed)?;
-    let mut writer = BufWriter::with_capacity(1 << 16, file);
-    write_lines(&mut writer, scenarios, path)?;
-    let file = writer.into_inner().map_err(|e| failed(e.into_error()))?;
-    file.as_file().sync_all().map_err(failed)?;
-    file.persist(path).map_err(|e| failed(e.error))?;
-    Ok(())
+    let mut file = AtomicFile::create(path)?;
+    write_lines(&mut file, scenarios, path)?;
+    file.stage()?.publish()
 }
 
 /// Writes scenarios to an open stream, one a line.
@@ -106,18 +100,6 @@ fn write_lines<'a>(
         writer.write_all(&line).map_err(|e| Error::io(path, "write", e))?;
     }
     Ok(())
-}
-
-/// A new file in `folder`, with the permissions that a new file has (temporary ones are private).
-fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".lanesweep-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666)); // less the umask
-    }
-    builder.tempfile_in(folder)
 }
 
 /// How messages call a scenario.

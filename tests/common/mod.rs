@@ -5,6 +5,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+pub mod small;
+
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
 /// it is absent, says so loudly and gives `None`: the test returns.
 pub fn shared(rel: &str) -> Option<PathBuf> {
