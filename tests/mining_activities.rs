@@ -61,7 +61,7 @@ fn lane_changes_are_those_of_the_published_formula() {
         let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
         let options = LateralOptions { lc_end: LaneChangeEnd::Published, ..LateralOptions::default() };
         let mut found = vec![(0, "fl".to_owned())];
-        for change in lane_changes(&numbers(&case["target_dy"]), lane, fs, &options, 1e-6) {
+        for change in lane_changes(&numbers(&case["target_dy"]), lane, fs, &options) {
             let name = match change.kind {
                 LaneChangeKind::LeftIn => "li",
                 LaneChangeKind::RightIn => "ri",
@@ -85,8 +85,8 @@ fn a_mirrored_track_has_the_mirrored_lane_changes() {
         let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
         for lc_end in [LaneChangeEnd::Published, LaneChangeEnd::Observed] {
             let options = LateralOptions { lc_end, ..LateralOptions::default() };
-            let here = lane_changes(&d, lane, fs, &options, 1e-6);
-            let there = lane_changes(&mirrored, mirror, fs, &options, 1e-6);
+            let here = lane_changes(&d, lane, fs, &options);
+            let there = lane_changes(&mirrored, mirror, fs, &options);
             assert_eq!(here.len(), there.len());
             for (a, b) in here.iter().zip(&there) {
                 assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end), "{}", case["name"]);
@@ -107,7 +107,7 @@ fn the_observed_end_of_a_lane_change_comes_after_the_published_one() {
         let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
         let ends = |lc_end| -> Vec<usize> {
             let options = LateralOptions { lc_end, ..LateralOptions::default() };
-            lane_changes(&numbers(&case["target_dy"]), lane, fs, &options, 1e-6).iter().map(|c| c.end).collect()
+            lane_changes(&numbers(&case["target_dy"]), lane, fs, &options).iter().map(|c| c.end).collect()
         };
         for (published, observed) in ends(LaneChangeEnd::Published).into_iter().zip(ends(LaneChangeEnd::Observed)) {
             assert!(observed > published && observed <= published + fs as usize, "{}", case["name"]);

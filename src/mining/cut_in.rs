@@ -11,7 +11,7 @@
 use super::data_set::DataSet;
 use super::found::Found;
 use super::lateral::LaneChangeKind;
-use super::options::CutInOptions;
+use super::options::{CutInOptions, TOLERANCE};
 use super::search::{Item, Match};
 use super::tags::Tags;
 use crate::scenario::{Category, Scenario, Side};
@@ -41,17 +41,16 @@ pub(super) fn scenario(
         LaneChangeKind::LeftIn | LaneChangeKind::RightOut => Side::Right,
     };
     let mut scenario = found.scenario(side)?;
-    let options = set.scene.options;
-    (scenario.kept, scenario.reason) = verdict(&scenario, &options.cut_in, options.tolerance);
+    (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_in);
     describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_IN, true));
     Some(scenario)
 }
 
 /// The filters of the paper, at t = 0: slower than the ego, and near.
-fn verdict(scenario: &Scenario, options: &CutInOptions, tolerance: f64) -> (bool, String) {
+fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     let (v_target, v_ego) = (scenario.target.v[0], scenario.ego.v0);
-    let slower = v_target < options.max_speed_share * v_ego - tolerance;
-    let near = scenario.thw0.is_some_and(|thw| thw < options.max_thw_s - tolerance);
+    let slower = v_target < options.max_speed_share * v_ego - TOLERANCE;
+    let near = scenario.thw0.is_some_and(|thw| thw < options.max_thw_s - TOLERANCE);
     let mut reasons = Vec::new();
     if !slower {
         reasons.push(format!("v_c >= {} v_e", options.max_speed_share));

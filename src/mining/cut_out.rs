@@ -13,7 +13,7 @@ use super::cut_in::{describe, end_cause, lane_change_of};
 use super::data_set::DataSet;
 use super::found::{Found, micrometres};
 use super::lateral::LaneChangeKind;
-use super::options::CutOutOptions;
+use super::options::{CutOutOptions, TOLERANCE};
 use super::search::{Item, Match};
 use super::tags::Tags;
 use crate::scenario::{Category, Scenario, Side};
@@ -44,7 +44,6 @@ pub(super) fn scenario(
     };
     let mut scenario = found.scenario(side)?;
     describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_OUT, false));
-    let options = set.scene.options;
     match uncovered(&found) {
         Ok(lead) => {
             let (j, l) = (found.sample_of(target, start)?, found.sample_of(lead, start)?);
@@ -52,7 +51,7 @@ pub(super) fn scenario(
             scenario.lead_id = Some(lead.id);
             scenario.lead = Some(found.other(lead, side)?);
             scenario.lead_gap = Some(micrometres(lead_gap));
-            (scenario.kept, scenario.reason) = verdict(&scenario, &options.cut_out, options.tolerance);
+            (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_out);
         }
         Err(reason) => scenario.reason = reason.to_owned(),
     }
@@ -74,8 +73,8 @@ fn uncovered<'a>(found: &Found<'a>) -> Result<&'a Track, &'static str> {
 }
 
 /// The filter of the paper, at t = 0.
-fn verdict(scenario: &Scenario, options: &CutOutOptions, tolerance: f64) -> (bool, String) {
-    let slower = scenario.lead.as_ref().is_some_and(|lead| lead.v[0] < scenario.ego.v0 - tolerance);
+fn verdict(scenario: &Scenario, options: &CutOutOptions) -> (bool, String) {
+    let slower = scenario.lead.as_ref().is_some_and(|lead| lead.v[0] < scenario.ego.v0 - TOLERANCE);
     match (slower, options.require_slower_lead) {
         (true, _) => (true, "lead slower than ego".to_owned()),
         (false, false) => (true, "lead stays ahead".to_owned()),

@@ -1,10 +1,11 @@
 //! The ego-centric data set (method.md §2): one ego, the part of its track that counts, who is in
-//! range, and who leads.
+//! range, and who leads. Its extent is that of [`EgoView`]; neighbours come from the frame index instead
+//! of a walk over all vehicles.
 
 use super::neighbours::Neighbours;
-use super::options::MiningOptions;
+use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
-use crate::trajectory::{Carriageway, NO_LANE, Recording, Track};
+use crate::trajectory::{Carriageway, EgoView, NO_LANE, Recording, Track};
 
 /// A recording with everything that is computed once for it.
 pub(super) struct Scene<'a> {
@@ -53,7 +54,7 @@ impl<'a> DataSet<'a> {
     /// end cut.
     pub fn new(scene: &'a Scene<'a>, ego_index: usize) -> Option<Self> {
         let ego = &scene.recording.tracks[ego_index];
-        let samples = ego_samples(ego, scene.options)?;
+        let samples = EgoView::of(scene.recording, ego_index, &scene.options.ego_view)?.last_sample() + 1;
         let carriageway = &scene.recording.carriageways[ego.carriageway];
         let mut set = DataSet { scene, ego_index, ego, carriageway, samples, leader: Vec::new() };
         set.leader = (0..samples).map(|k| set.leader_at(k)).collect();
@@ -73,20 +74,18 @@ impl<'a> DataSet<'a> {
         leaders
     }
 
-    /// The vehicle with track `other` is within range (centre to centre) at the ego's sample `k`, the
+    /// The vehicle with track `other` is within range (along the road, centre to centre, as in
+    /// [`EgoView`]) at the ego's sample `k`, the
     /// other's sample `j`.
     pub fn in_range(&self, k: usize, other: &Track, j: usize) -> bool {
-        let reach = self.scene.options.range_m + self.scene.options.tolerance;
-        let (ds, dd) = (other.s_m[j] - self.ego.s_m[k], other.d_m[j] - self.ego.d_m[k]);
-        ds * ds + dd * dd <= reach * reach
+        (other.s_m[j] - self.ego.s_m[k]).abs() <= self.scene.options.ego_view.range_m + TOLERANCE
     }
 
     /// The lateral position `d_m` is in `lane`.
     pub fn in_lane(&self, lane: u16, d_m: f64) -> bool {
-        let tolerance = self.scene.options.tolerance;
         self.carriageway
             .lane(usize::from(lane))
-            .is_some_and(|lane| lane.left_m - d_m >= -tolerance && lane.right_m - d_m <= tolerance)
+            .is_some_and(|lane| lane.left_m - d_m >= -TOLERANCE && lane.right_m - d_m <= TOLERANCE)
     }
 
     /// Gap from the ego to `other`, bumper to bumper, m, at the ego's sample `k` and the other's `j`.
@@ -99,9 +98,9 @@ impl<'a> DataSet<'a> {
     pub fn ahead_in_lane(&self, k: usize, s_m: f64) -> impl Iterator<Item = (usize, usize)> {
         let options = self.scene.options;
         let lane = self.ego.lane[k];
-        let horizon = self.ego.s_m[k] + options.range_m + options.tolerance;
+        let horizon = self.ego.s_m[k] + options.ego_view.range_m + TOLERANCE;
         self.scene.neighbours[self.ego.carriageway]
-            .ahead(self.ego_index, k, s_m + options.tolerance, horizon)
+            .ahead(self.ego_index, k, s_m + TOLERANCE, horizon)
             .map(|n| (n.track as usize, n.sample as usize))
             .filter(move |&(track, sample)| {
                 let other = &self.scene.recording.tracks[track];
@@ -112,7 +111,7 @@ impl<'a> DataSet<'a> {
     /// Leader: in front, same lane, gap of at most the leader's THW, nearest of those.
     fn leader_at(&self, k: usize) -> Option<u32> {
         let options = self.scene.options;
-        let reach = options.leader_max_thw_s * self.ego.v_s_mps[k] + options.tolerance;
+        let reach = options.leader_max_thw_s * self.ego.v_s_mps[k] + TOLERANCE;
         self.ahead_in_lane(k, self.ego.s_m[k])
             .find(|&(track, j)| self.gap_m(k, &self.scene.recording.tracks[track], j) <= reach)
             .map(|(track, _)| track as u32)
@@ -155,15 +154,4 @@ impl<'a> DataSet<'a> {
             .with(Tags::DECELERATES, decelerates)
             .with(Tags::EGO_KEEPS_LANE, lane != NO_LANE && ego.lane_change(lane, k).is_none())
     }
-}
-
-/// How many samples of a track count when the vehicle is ego: up to and including the first with no
-/// more than the end cut left to its final position.
-fn ego_samples(ego: &Track, options: &MiningOptions) -> Option<usize> {
-    let (&first, &last) = (ego.s_m.first()?, ego.s_m.last()?);
-    if last - first < options.end_cut_m - options.tolerance {
-        return None;
-    }
-    let cut = ego.s_m.iter().position(|&s| last - s <= options.end_cut_m + options.tolerance)?;
-    Some(cut + 1)
 }

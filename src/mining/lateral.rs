@@ -4,7 +4,7 @@
 //! past the line that is crossed: negative before, zero at the crossing, positive after. So one
 //! detector serves all four, and left and right are treated alike.
 
-use super::options::{LaneChangeEnd, LateralOptions, samples, window_samples};
+use super::options::{LaneChangeEnd, LateralOptions, TOLERANCE, samples, window_samples};
 use super::window::trailing_min;
 use crate::trajectory::Lane;
 
@@ -57,15 +57,9 @@ pub struct LaneChange {
 }
 
 /// Lane changes of a whole track with lateral positions `d_m` against `lane`: ascending, not
-/// overlapping. `tolerance` in m, see [`MiningOptions`](super::MiningOptions).
-pub fn lane_changes(
-    d_m: &[f64],
-    lane: Lane,
-    frame_rate_hz: f64,
-    options: &LateralOptions,
-    tolerance: f64,
-) -> Vec<LaneChange> {
-    let crossings = crossings(d_m, lane, tolerance);
+/// overlapping.
+pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &LateralOptions) -> Vec<LaneChange> {
+    let crossings = crossings(d_m, lane);
     let mut found: Vec<LaneChange> = Vec::new();
     for (k, kind) in crossings {
         let free_from = found.last().map_or(0, |c| c.end);
@@ -73,7 +67,7 @@ pub fn lane_changes(
             continue; // already changing
         }
         let s: Vec<f64> = d_m.iter().map(|&d| kind.past_line(d, lane)).collect();
-        let profile = Profile::new(&s, lane.width_m(), frame_rate_hz, options, tolerance);
+        let profile = Profile::new(&s, lane.width_m(), frame_rate_hz, options);
         if let Some(end) = profile.end(k) {
             let start = profile.start(k, free_from).unwrap_or(free_from);
             found.push(LaneChange { kind, start, crossing: k, end });
@@ -88,11 +82,11 @@ pub fn lane_change_at(changes: &[LaneChange], k: usize) -> Option<&LaneChange> {
 }
 
 /// Samples at which a line of the lane is passed, ascending, with the change each may belong to.
-fn crossings(d_m: &[f64], lane: Lane, tolerance: f64) -> Vec<(usize, LaneChangeKind)> {
+fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
     let mut crossings = Vec::new();
     for k in 1..d_m.len() {
         for kind in LaneChangeKind::ALL {
-            if kind.past_line(d_m[k - 1], lane) <= tolerance && kind.past_line(d_m[k], lane) > tolerance {
+            if kind.past_line(d_m[k - 1], lane) <= TOLERANCE && kind.past_line(d_m[k], lane) > TOLERANCE {
                 crossings.push((k, kind));
             }
         }
@@ -110,11 +104,10 @@ struct Profile<'a> {
     far_m: f64,
     near_m: f64,
     lc_end: LaneChangeEnd,
-    tolerance: f64,
 }
 
 impl<'a> Profile<'a> {
-    fn new(s: &'a [f64], lane_width_m: f64, frame_rate_hz: f64, options: &LateralOptions, tolerance: f64) -> Self {
+    fn new(s: &'a [f64], lane_width_m: f64, frame_rate_hz: f64, options: &LateralOptions) -> Self {
         let window = window_samples(options.window_s, frame_rate_hz);
         Profile {
             s,
@@ -125,21 +118,20 @@ impl<'a> Profile<'a> {
             far_m: options.far_share * lane_width_m,
             near_m: options.near_share * lane_width_m,
             lc_end: options.lc_end,
-            tolerance,
         }
     }
 
     /// Progress over the window that ends at `k` is small. A window that is not complete is not calm.
     fn calm(&self, k: usize) -> bool {
-        k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.calm_m - self.tolerance
+        k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.calm_m - TOLERANCE
     }
 
     /// Last sample before the crossing `k` at which the change had not begun.
     fn start(&self, k: usize, free_from: usize) -> Option<usize> {
         let first = free_from.max(k.saturating_sub(self.reach));
-        (first..k).rev().find(|&j| {
-            self.s[j] < -self.far_m - self.tolerance || (self.calm(j) && self.s[j] < -self.near_m - self.tolerance)
-        })
+        (first..k)
+            .rev()
+            .find(|&j| self.s[j] < -self.far_m - TOLERANCE || (self.calm(j) && self.s[j] < -self.near_m - TOLERANCE))
     }
 
     /// First sample after the crossing `k` at which the change is over.
@@ -150,7 +142,7 @@ impl<'a> Profile<'a> {
                 LaneChangeEnd::Published => j + self.window,
                 LaneChangeEnd::Observed => j,
             };
-            self.s[j] > self.far_m + self.tolerance || (self.calm(judged) && self.s[j] > self.near_m + self.tolerance)
+            self.s[j] > self.far_m + TOLERANCE || (self.calm(judged) && self.s[j] > self.near_m + TOLERANCE)
         })
     }
 }

@@ -6,7 +6,7 @@
 
 use super::data_set::DataSet;
 use super::found::Found;
-use super::options::LvdOptions;
+use super::options::{LvdOptions, TOLERANCE};
 use super::search::{Item, Match};
 use super::tags::Tags;
 use crate::scenario::{Category, Scenario, Side};
@@ -32,22 +32,22 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, firs
         }
     }
     let duration_s = (end as f64 - start as f64) / set.scene.recording.frame_rate_hz;
-    if end <= start || duration_s < options.lvd.min_duration_s - options.tolerance {
+    if end <= start || duration_s < options.lvd.min_duration_s - TOLERANCE {
         return None;
     }
     let found = Found { set, target, category: Category::Lvd, start, end };
     let d_m = target.d_m[found.sample_of(target, start)?];
-    let side = if d_m < found.lane()?.centre_m() - options.tolerance { Side::Right } else { Side::Left };
+    let side = if d_m < found.lane()?.centre_m() - TOLERANCE { Side::Right } else { Side::Left };
     let mut scenario = found.scenario(side)?;
-    scenario.tag_frames = Some([found.frame(first + matched.start()), found.frame(first + matched.end)]);
-    (scenario.kept, scenario.reason) = verdict(&scenario, &options.lvd, options.tolerance);
+    scenario.tag_frames = Some([found.frame(first + tagged.start), found.frame(first + tagged.end)]);
+    (scenario.kept, scenario.reason) = verdict(&scenario, &options.lvd);
     Some(scenario)
 }
 
 /// The filter of the paper, over the trimmed interval.
-fn verdict(scenario: &Scenario, options: &LvdOptions, tolerance: f64) -> (bool, String) {
+fn verdict(scenario: &Scenario, options: &LvdOptions) -> (bool, String) {
     let limit = options.min_peak_deceleration_mps2;
-    match scenario.peak_decel.is_some_and(|peak| peak > limit + tolerance) {
+    match scenario.peak_decel.is_some_and(|peak| peak > limit + TOLERANCE) {
         true => (true, format!("peak deceleration > {limit}")),
         false => (false, format!("peak deceleration <= {limit}")),
     }

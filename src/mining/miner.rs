@@ -1,7 +1,7 @@
 //! The run over a recording: every vehicle once as ego, every category, every target that leads it.
 
 use super::data_set::{DataSet, Scene, Stretch};
-use super::options::{MiningOptions, samples};
+use super::options::{MiningOptions, TOLERANCE, samples};
 use super::search::{self, Item, Match};
 use super::tags::Tags;
 use super::{cut_in, cut_out, lvd};
@@ -64,7 +64,7 @@ fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) 
     let rate = set.scene.recording.frame_rate_hz;
     let stretches = set.stretches(target_index);
     if activities.changes_lane() {
-        let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - options.tolerance;
+        let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - TOLERANCE;
         let discarded = shorter(options.cut_in.min_duration_s);
         each_match(&stretches, &cut_in::ITEMS, samples(options.cut_in.pause_s, rate), discarded, |stretch, m| {
             scenarios.extend(cut_in::scenario(set, target_index, m, stretch.first, &stretch.tags));
@@ -75,7 +75,7 @@ fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) 
         });
     }
     if activities.decelerates() {
-        let discarded = |m: &Match| m.len() as f64 / rate <= options.lvd.max_discarded_s + options.tolerance;
+        let discarded = |m: &Match| m.last_item().len() as f64 / rate <= options.lvd.max_discarded_s + TOLERANCE;
         each_match(&stretches, &lvd::ITEMS, 0, discarded, |stretch, m| {
             scenarios.extend(lvd::scenario(set, target_index, m, stretch.first));
         });

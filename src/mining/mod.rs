@@ -11,7 +11,7 @@
 //!
 //! **Equality and the tolerance.** Recordings have two decimals, and the same place reached from the
 //! other side of the road differs in the last bits. Every comparison of a position, a distance or a
-//! filter value therefore treats values within [`MiningOptions::tolerance`] as equal to the limit, and
+//! filter value therefore treats values within 1e-6 as equal to the limit, and
 //! lengths in a mined scenario are rounded to 1e-6 m: a recording turned by 180° gives the same
 //! scenarios to the last bit. Longitudinal activities compare speeds as they were read.
 

@@ -4,19 +4,16 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Place, Result};
+use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
 
 /// All options of [`mine`](super::mine).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MiningOptions {
-    /// Reach of an ego's data set, m, centre to centre. Default 100 (paper).
-    pub range_m: f64,
-    /// An ego's data set ends where this much of its way is left, m. Default 100 (paper).
-    pub end_cut_m: f64,
+    /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
+    pub ego_view: EgoViewOptions,
     /// A vehicle ahead in the ego's lane is its leader up to this time headway, s. Default 2.
     pub leader_max_thw_s: f64,
-    /// Values this near to a geometric or filter limit count as equal to it. Default 1e-6.
-    pub tolerance: f64,
     /// Detection of acceleration, deceleration and cruising.
     pub longitudinal: LongitudinalOptions,
     /// Detection of lane changes.
@@ -116,10 +113,8 @@ pub struct LvdOptions {
 impl Default for MiningOptions {
     fn default() -> Self {
         MiningOptions {
-            range_m: 100.0,
-            end_cut_m: 100.0,
+            ego_view: EgoViewOptions::default(),
             leader_max_thw_s: 2.0,
-            tolerance: 1e-6,
             longitudinal: LongitudinalOptions::default(),
             lateral: LateralOptions::default(),
             cut_in: CutInOptions::default(),
@@ -179,7 +174,7 @@ impl MiningOptions {
     /// is needed.
     pub fn validate(&self) -> Result<()> {
         let positive = [
-            ("range_m", self.range_m),
+            ("ego_view.range_m", self.ego_view.range_m),
             ("leader_max_thw_s", self.leader_max_thw_s),
             ("longitudinal.window_s", self.longitudinal.window_s),
             ("longitudinal.cruise_acceleration_mps2", self.longitudinal.cruise_acceleration_mps2),
@@ -188,8 +183,7 @@ impl MiningOptions {
             ("lateral.search_s", self.lateral.search_s),
         ];
         let at_least_zero = [
-            ("end_cut_m", self.end_cut_m),
-            ("tolerance", self.tolerance),
+            ("ego_view.cut_m", self.ego_view.cut_m),
             ("longitudinal.min_speed_change_mps", self.longitudinal.min_speed_change_mps),
             ("longitudinal.min_cruise_s", self.longitudinal.min_cruise_s),
             ("lateral.far_share", self.lateral.far_share),
@@ -224,6 +218,10 @@ impl MiningOptions {
         Ok(())
     }
 }
+
+/// Positions in metres, filter values in their unit and times in seconds this near to a limit count as
+/// equal to it (method.md §3).
+pub(super) const TOLERANCE: f64 = LIMIT_TOLERANCE_M;
 
 /// A time in samples, to the nearest whole one: thresholds in seconds hold at any frame rate.
 pub(super) fn samples(time_s: f64, frame_rate_hz: f64) -> usize {
@@ -266,8 +264,8 @@ mod tests {
         let mut options = MiningOptions::default();
         options.lateral.window_s = 0.0;
         assert!(options.validate().unwrap_err().to_string().contains("lateral.window_s"));
-        let options = MiningOptions { tolerance: f64::NAN, ..MiningOptions::default() };
-        assert!(options.validate().unwrap_err().to_string().contains("tolerance"));
+        let options = MiningOptions { leader_max_thw_s: f64::NAN, ..MiningOptions::default() };
+        assert!(options.validate().unwrap_err().to_string().contains("leader_max_thw_s"));
     }
 
     #[test]

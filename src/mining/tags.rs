@@ -2,7 +2,7 @@
 
 use super::lateral::{LaneChange, lane_change_at, lane_changes};
 use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
-use super::options::MiningOptions;
+use super::options::{MiningOptions, TOLERANCE};
 use crate::trajectory::{Carriageway, Track};
 
 /// Tags of one ego and one target at one sample, as a set of bits.
@@ -52,14 +52,12 @@ impl Activities {
     /// Detects everything a vehicle does.
     pub fn of(track: &Track, carriageway: &Carriageway, frame_rate_hz: f64, options: &MiningOptions) -> Self {
         let (low, high) = track.d_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &d| (l.min(d), h.max(d)));
-        let reaches_a_line = carriageway
-            .lane_lines_m
-            .iter()
-            .any(|&line| line >= low - options.tolerance && line <= high + options.tolerance);
+        let reaches_a_line =
+            carriageway.lane_lines_m.iter().any(|&line| line >= low - TOLERANCE && line <= high + TOLERANCE);
         let lane_changes = if reaches_a_line {
             (0..carriageway.lane_count())
                 .filter_map(|lane| carriageway.lane(lane))
-                .map(|lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral, options.tolerance))
+                .map(|lane| lane_changes(&track.d_m, lane, frame_rate_hz, &options.lateral))
                 .collect()
         } else {
             Vec::new()

@@ -157,7 +157,7 @@ pub struct Scenario {
     /// First frame of the second item (the target becomes or ceases to be leader).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_switch: Option<i64>,
-    /// LVD: the frames of the untrimmed tag interval.
+    /// LVD: the untrimmed interval of the tags, half open: first frame with them, first frame without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_frames: Option<[i64; 2]>,
 }

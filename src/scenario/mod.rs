@@ -4,6 +4,9 @@
 //! nothing about how scenarios are found or parameterized. Data comes from [`crate::mining`] or from a
 //! scenario file and goes to [`crate::parameterization`].
 
+mod jsonl;
 mod mined;
+mod schema;
 
+pub use jsonl::{read_scenarios, write_scenarios, write_scenarios_to};
 pub use mined::{Category, Ego, Other, Scenario, Side};

@@ -9,6 +9,7 @@ pub const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
 /// Extent of an ego-centric view.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct EgoViewOptions {
     /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
     pub range_m: f64,
