@@ -13,7 +13,7 @@ const FOLLOWS_WITHIN_MPS: f64 = 4.0;
 /// wider or narrower roads carry more or less.
 const MEAN_LANES: f64 = 8.0 / 3.0;
 /// Some arrivals wait for room; demand is raised by this so that the flow comes out as asked.
-const QUEUED: f64 = 1.03;
+const QUEUED: f64 = 1.035;
 
 /// What arrives in one lane.
 #[derive(Debug, Clone, PartialEq)]

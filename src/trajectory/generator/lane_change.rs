@@ -4,11 +4,11 @@ use super::idm::DriverParameters;
 
 /// Rate of a change with full motive and accepted gaps, 1/s. Calibrates the published 0.24 line crossings
 /// per vehicle and kilometre at rate factor 1.
-const FULL_MOTIVE_PER_S: f64 = 0.112;
+const FULL_MOTIVE_PER_S: f64 = 0.265;
 /// The motive to pull out grows up to this gain in speed, m/s.
-const FULL_GAIN_MPS: f64 = 4.0;
+const FULL_GAIN_MPS: f64 = 3.0;
 /// Strength of keeping right, as a share of the full motive.
-const KEEP_RIGHT: f64 = 0.8;
+const KEEP_RIGHT: f64 = 0.38;
 /// Strength of changes without visible reason (exits, habits), as a share of the full motive.
 const NO_REASON: f64 = 0.08;
 /// The same where the change costs much speed (exits only).
@@ -17,10 +17,15 @@ const NO_REASON_AT_A_LOSS: f64 = 0.02;
 const GRAVE_LOSS_MPS: f64 = 3.0;
 /// Headway to the new follower at which half of the drivers accept, s. Calibrates the headway at which
 /// vehicles cut in: mode 0.8–1.0 s and 4 % below 0.5 s.
-const LAG_HALF_S: f64 = 0.53;
+const LAG_HALF_S: f64 = 0.48;
+/// A gap that still fits but soon will not is taken at once; with more headway to the follower than this
+/// there is no hurry, s. Calibrates the mode of the headway at which vehicles cut in.
+const HURRY_S: f64 = 1.0;
+/// Share of the acceptance that is left without hurry.
+const NO_HURRY: f64 = 0.35;
 /// Braking imposed on the new follower that makes acceptance fall by a factor e, m/s². Calibrates how
 /// many cut-ins are slower than the ego (published: 362 of 2,992 below 0.95 of its speed).
-const LAG_BRAKING_MPS2: f64 = 0.115;
+const LAG_BRAKING_MPS2: f64 = 0.10;
 /// Shortest time to collision with the new neighbours at the start of a change, s.
 const SHORTEST_TTC_S: f64 = 3.5;
 /// Shortest gap to the new neighbours at the start, m.
@@ -102,13 +107,17 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
     let too_close = |gap_m: f64, closing_mps: f64| {
         gap_m < SHORTEST_GAP_M || (closing_mps > 0.0 && gap_m < SHORTEST_TTC_S * closing_mps)
     };
-    let mut accepted = 1.0;
+    let mut accepted = if there.behind.is_some() { 1.0 } else { NO_HURRY };
     if let Some(lag) = there.behind {
         let closing_mps = lag.speed_mps - speed_mps;
         if too_close(lag.gap_m, closing_mps) {
             return 0.0;
         }
-        accepted *= soft_step(lag.gap_m / lag.speed_mps.max(5.0), LAG_HALF_S);
+        let lag_s = lag.gap_m / lag.speed_mps.max(5.0);
+        let fits = soft_step(lag_s, LAG_HALF_S);
+        // Drivers know well what is too close: the step is steeper than the others.
+        accepted *= fits * fits / (fits * fits + (1.0 - fits) * (1.0 - fits));
+        accepted *= NO_HURRY + (1.0 - NO_HURRY) * (1.0 - soft_step(lag_s, HURRY_S));
         if closing_mps > 0.0 {
             let braking = closing_mps * closing_mps / (2.0 * lag.gap_m);
             accepted *= libm::exp(-braking / LAG_BRAKING_MPS2);
@@ -159,11 +168,21 @@ mod tests {
     }
 
     #[test]
+    fn a_gap_that_just_fits_is_taken_sooner_than_a_tight_or_a_wide_one() {
+        let at = |headway_s: f64| {
+            let behind = Some(Neighbour { gap_m: 30.0 * headway_s, speed_mps: 30.0 });
+            acceptance(30.0, LaneView { behind, ahead: None })
+        };
+        assert!(at(0.8) > 3.0 * at(0.4));
+        assert!(at(0.8) > 1.5 * at(2.5));
+    }
+
+    #[test]
     fn nobody_moves_into_a_vehicle_or_before_one_that_closes_fast() {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
         assert_eq!(acceptance(25.0, view(-2.0, 25.0)), 0.0);
         assert_eq!(acceptance(25.0, view(20.0, 34.0)), 0.0);
-        assert!(acceptance(25.0, view(40.0, 26.0)) > 0.8);
+        assert!(acceptance(25.0, view(40.0, 25.0)) > 0.4);
         assert!(acceptance(25.0, view(40.0, 31.0)) < acceptance(25.0, view(40.0, 28.0)));
     }
 }

@@ -17,9 +17,9 @@ const UPSTREAM_M: f64 = 350.0;
 const DOWNSTREAM_M: f64 = 250.0;
 /// Spread of the acceleration noise as commanded, m/s²; the lag below leaves 0.22 of it, the middle of
 /// the published 0.20 to 0.24.
-const NOISE_SD_MPS2: f64 = 0.235;
+const NOISE_SD_MPS2: f64 = 0.24;
 /// Published correlation time of the noise, s.
-const NOISE_CORRELATION_S: f64 = 1.5;
+const NOISE_CORRELATION_S: f64 = 1.2;
 /// Lag from the command to the vehicle's acceleration, s (pedal, drivetrain, brakes).
 const ACTUATION_LAG_S: f64 = 0.25;
 /// Time over which drivers take in the leader's acceleration, s.

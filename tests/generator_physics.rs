@@ -1,0 +1,186 @@
+//! The synthetic recordings are physically possible, well-formed, and the same everywhere.
+
+use lanesweep::trajectory::generator::{GeneratorOptions, generate, generate_one};
+use lanesweep::trajectory::{Recording, Track};
+use sha2::{Digest, Sha256};
+
+/// SHA-256 of the default recordings' data as [`digest`] writes it. It changes when the generator does,
+/// and then on purpose: every published default result changes with it.
+const DEFAULT_DIGEST: &str = "";
+
+fn default_recordings() -> Vec<Recording> {
+    generate(&GeneratorOptions::default()).unwrap()
+}
+
+/// Every field of every recording, numbers as their bits.
+fn digest(recordings: &[Recording]) -> String {
+    let mut hash = Sha256::new();
+    for recording in recordings {
+        hash.update(recording.id.as_bytes());
+        hash.update(recording.frame_rate_hz.to_bits().to_le_bytes());
+        for carriageway in &recording.carriageways {
+            hash.update(carriageway.name.as_bytes());
+            for line in &carriageway.lane_lines_m {
+                hash.update(line.to_bits().to_le_bytes());
+            }
+        }
+        for track in &recording.tracks {
+            hash.update(track.id.to_le_bytes());
+            hash.update(format!("{:?}", track.class).as_bytes());
+            hash.update((track.carriageway as u64).to_le_bytes());
+            hash.update(track.first_frame.to_le_bytes());
+            hash.update(track.length_m.to_bits().to_le_bytes());
+            hash.update(track.width_m.to_bits().to_le_bytes());
+            for series in [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2] {
+                for value in series {
+                    hash.update(value.to_bits().to_le_bytes());
+                }
+            }
+            for lane in &track.lane {
+                hash.update(lane.to_le_bytes());
+            }
+        }
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[test]
+fn the_default_recordings_are_the_same_bits_on_every_machine_and_thread_count() {
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| digest(&default_recordings()))
+    };
+    let one = with_threads(1);
+    assert_eq!(one, with_threads(2), "one thread and two threads differ");
+    assert_eq!(one, DEFAULT_DIGEST, "the default recordings have changed");
+}
+
+#[test]
+fn one_recording_alone_is_the_one_among_all_and_another_seed_gives_another() {
+    let options = GeneratorOptions { recordings: 3, duration_s: 20.0, ..GeneratorOptions::default() };
+    let all = generate(&options).unwrap();
+    assert_eq!(all.iter().map(|r| r.id.as_str()).collect::<Vec<_>>(), ["01", "02", "03"]);
+    for (index, recording) in all.iter().enumerate() {
+        assert_eq!(&generate_one(&options, index).unwrap(), recording);
+    }
+    assert!(generate_one(&options, 3).is_err());
+    let other = GeneratorOptions { seed: options.seed + 1, ..options.clone() };
+    assert_ne!(generate_one(&other, 0).unwrap(), all[0]);
+    // The number of recordings does not reach into any of them.
+    assert_eq!(generate_one(&GeneratorOptions { recordings: 1, ..options }, 0).unwrap(), all[0]);
+}
+
+#[test]
+fn vehicles_appear_once_in_ascending_order_with_complete_series() {
+    for recording in default_recordings() {
+        let mut before = (0, 1);
+        for track in &recording.tracks {
+            let now = (track.id, track.first_frame);
+            assert!(now.0 == before.0 + 1 && now.1 >= before.1, "{now:?} after {before:?}");
+            before = now;
+            let n = track.len();
+            assert!(n >= 1);
+            assert!(
+                [&track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2].iter().all(|series| series.len() == n)
+            );
+            assert_eq!(track.lane.len(), n);
+        }
+    }
+}
+
+#[test]
+fn no_two_vehicles_overlap() {
+    for recording in default_recordings() {
+        let last = recording.tracks.iter().map(Track::last_frame).max().unwrap();
+        let mut present: Vec<Vec<usize>> = vec![Vec::new(); last as usize + 1];
+        for (i, track) in recording.tracks.iter().enumerate() {
+            for frame in track.first_frame..=track.last_frame() {
+                present[frame as usize].push(i);
+            }
+        }
+        for (frame, there) in present.iter().enumerate() {
+            for (n, &i) in there.iter().enumerate() {
+                for &j in &there[..n] {
+                    let (a, b) = (&recording.tracks[i], &recording.tracks[j]);
+                    let (p, q) = (a.index_of(frame as i64).unwrap(), b.index_of(frame as i64).unwrap());
+                    let along = (a.s_m[p] - b.s_m[q]).abs() - 0.5 * (a.length_m + b.length_m);
+                    let across = (a.d_m[p] - b.d_m[q]).abs() - 0.5 * (a.width_m + b.width_m);
+                    assert!(
+                        a.carriageway != b.carriageway || along > 0.0 || across > 0.0,
+                        "{} frame {frame}: {} and {} overlap by {along:.2} m and {across:.2} m",
+                        recording.id,
+                        a.id,
+                        b.id
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
+    // Half of the last written digit of a position, of a speed over one step, and the same again.
+    let digits = 0.005;
+    for recording in default_recordings() {
+        let dt = recording.sample_time_s();
+        for t in &recording.tracks {
+            assert!(t.v_s_mps.iter().all(|v| (0.0..=60.0).contains(v)), "speed of {}/{}", recording.id, t.id);
+            assert!(t.a_s_mps2.iter().all(|a| (-8.5..=3.0).contains(a)), "acceleration of {}/{}", recording.id, t.id);
+            assert!(t.v_d_mps.iter().all(|v| v.abs() < 3.5), "lateral speed of {}/{}", recording.id, t.id);
+            for k in 1..t.len() {
+                let along = t.s_m[k] - t.s_m[k - 1] - 0.5 * dt * (t.v_s_mps[k] + t.v_s_mps[k - 1]);
+                let across = t.d_m[k] - t.d_m[k - 1] - 0.5 * dt * (t.v_d_mps[k] + t.v_d_mps[k - 1]);
+                let speed = t.v_s_mps[k] - t.v_s_mps[k - 1] - dt * t.a_s_mps2[k - 1];
+                assert!(along.abs() < 2.5 * digits, "{}/{}: s {along}", recording.id, t.id);
+                assert!(across.abs() < 2.5 * digits, "{}/{}: d {across}", recording.id, t.id);
+                assert!(speed.abs() < 2.5 * digits, "{}/{}: v {speed}", recording.id, t.id);
+            }
+            // No drift: rounding does not add up over the whole track.
+            let integral: f64 = (1..t.len()).map(|k| 0.5 * dt * (t.v_s_mps[k] + t.v_s_mps[k - 1])).sum();
+            let way = t.s_m[t.len() - 1] - t.s_m[0];
+            assert!((way - integral).abs() < 0.05, "{}/{}: {way} against {integral}", recording.id, t.id);
+        }
+    }
+}
+
+#[test]
+fn the_lane_is_the_one_that_holds_the_centre_and_nobody_leaves_the_road() {
+    for recording in default_recordings() {
+        for track in &recording.tracks {
+            let road = &recording.carriageways[track.carriageway];
+            for (d, lane) in track.d_m.iter().zip(&track.lane) {
+                assert_eq!(road.lane_at(*d), Some(usize::from(*lane)));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_camera_sees_its_window_and_vehicles_pass_through_it() {
+    let options = GeneratorOptions::default();
+    let end = options.duration_s * options.frame_rate_hz;
+    for recording in generate(&options).unwrap() {
+        for track in &recording.tracks {
+            let start = if track.carriageway == 0 { -options.window_m } else { 0.0 };
+            let (first, last) = (track.s_m[0] - start, track.s_m[track.len() - 1] - start);
+            assert!(first > -0.01 && last < options.window_m + 0.01, "{}/{}", recording.id, track.id);
+            // Cut only by the recording's start and end.
+            assert!(first < 2.5 || track.first_frame == 1, "{}/{} appears at {first}", recording.id, track.id);
+            assert!(last > options.window_m - 2.5 || track.last_frame() as f64 == end, "{}/{}", recording.id, track.id);
+        }
+    }
+}
+
+#[test]
+fn another_frame_rate_gives_the_same_kind_of_traffic() {
+    for frame_rate_hz in [10.0, 30.0] {
+        let options =
+            GeneratorOptions { frame_rate_hz, recordings: 1, duration_s: 60.0, ..GeneratorOptions::default() };
+        let recording = generate_one(&options, 0).unwrap();
+        assert_eq!(recording.frame_rate_hz, frame_rate_hz);
+        let last = recording.tracks.iter().map(Track::last_frame).max().unwrap();
+        assert_eq!(last as f64, 60.0 * frame_rate_hz);
+        assert!((60..220).contains(&recording.tracks.len()), "{} vehicles in a minute", recording.tracks.len());
+    }
+}
