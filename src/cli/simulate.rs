@@ -21,6 +21,7 @@ use crate::{Error, Place, Result};
 /// keys or columns; flags win), or from a scenario file with a lane key. The series goes to stdout as CSV,
 /// the outcome to stderr.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep simulate --category cut-in --model FSM --ego-speed 30 --speed 20 \
                         --thw 1.2 --lateral-speed 1.0\n  lanesweep simulate --scenarios scenarios.jsonl --lane \
                         01_cut_in_81_74_836/S/1.2s/RSS")]
@@ -75,7 +76,7 @@ struct CaseFlags {
     #[arg(long, value_name = "M")]
     lateral_distance: Option<f64>,
     /// Acceleration of the other vehicle, m/s² [default: 0]
-    #[arg(long, value_name = "MPS2", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MPS2")]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends, m/s [default: standstill, or never]
     #[arg(long, value_name = "MPS")]

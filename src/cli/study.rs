@@ -13,7 +13,9 @@ use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::ParameterizationOptions;
+use crate::report::files::write_atomically;
 use crate::report::lanes;
+use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
 use crate::report::study::StudyReport;
 use crate::scenario::Category;
@@ -50,6 +52,9 @@ pub struct Study {
     /// Run the f64 reference instead of the f32 lane arithmetic
     #[arg(long)]
     reference: bool,
+    /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
+    #[arg(long, conflicts_with = "reference")]
+    compare_reference: bool,
     /// Study options (TOML): tables `mining`, `parameterization`, `score`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -122,6 +127,7 @@ impl Study {
         if let Some(path) = &self.lanes {
             write_lanes(path, &planned.plan, backend.as_ref())?;
         }
+        let comparison = self.compare_reference.then(|| compare_reference(&planned.plan)).transpose()?;
         let categories = category_records(&collection, &planned, &scores);
         let run = RunRecord {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
@@ -143,6 +149,10 @@ impl Study {
         let report = StudyReport { scores, claims, run, published: self.published };
         let written = report.write(&self.out)?;
         console::print(&report.text())?;
+        if let Some(comparison) = comparison {
+            write_atomically(&self.out.join("reference.csv"), comparison.csv().as_bytes())?;
+            console::print(&format!("\n{}", comparison.text()))?;
+        }
         tracing::info!("{} files written to {}", written.len(), self.out.display());
         Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
@@ -181,6 +191,18 @@ fn run_plan(plan: &LanePlan, backend: &dyn Backend, verbosity: Verbosity) -> Res
     })?;
     bar.finish_and_clear();
     parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)
+}
+
+/// Every lane in f32 and in f64, chunk by chunk.
+fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
+    let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
+    let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
+    let mut comparison = ReferenceComparison::default();
+    for units in chunks(plan, 0..plan.unit_count()) {
+        let reference = wide.run(units.clone(), Wanted::Outcomes)?;
+        comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
+    }
+    Ok(comparison)
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.

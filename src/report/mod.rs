@@ -8,6 +8,7 @@ pub mod csv;
 pub mod files;
 pub mod lanes;
 pub mod radar;
+pub mod reference;
 pub mod run_record;
 pub mod study;
 pub mod tables;

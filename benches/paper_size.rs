@@ -1,0 +1,121 @@
+//! The whole study at the paper's size, part by part: reading and mining of 1 GB of highD files, planning
+//! with the decompositions, the sweep of 493,600 lanes in f32 and f64, the scores.
+//!
+//! `cargo bench --bench paper_size` prints one CSV row per part and repetition to stdout (kept under
+//! `benches/runs` with the machine's facts) and a summary to stderr. Synthetic data; repetitions in turn.
+
+use std::path::Path;
+use std::time::Instant;
+
+use lanesweep::mining::{MiningOptions, mine_folder, mine_generated};
+use lanesweep::profile::Profile;
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::score::{ScoreOptions, score};
+use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, Wanted, plan_study, sweep};
+use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::trajectory::highd::{self, RecordingInfo};
+
+const REPETITIONS: usize = 5;
+/// The paper's kept scenarios.
+const PAPER: [(Category, usize); 3] = [(Category::CutIn, 362), (Category::CutOut, 819), (Category::Lvd, 482)];
+const LEAST_BYTES: u64 = 1_000_000_000;
+
+fn main() {
+    // `cargo test --benches` calls without `--bench`: nothing to time then.
+    if !std::env::args().any(|arg| arg == "--bench") {
+        return;
+    }
+    println!("part,repetition,seconds,amount,unit");
+    let scenarios = paper_size_scenarios();
+    let profile = Profile::load("paper").unwrap();
+    let plan = || plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap().plan;
+    let made = plan();
+    assert_eq!(made.lane_count(), 493_600);
+    let narrow = CpuBackend::lane_arithmetic();
+    let wide = CpuBackend::reference();
+    let steps = lane_steps(&made, &narrow);
+    let partial = run(&made, &narrow);
+    for repetition in 0..REPETITIONS {
+        time("plan", repetition, made.lane_count(), "lanes", plan);
+        time("sweep f32", repetition, steps, "lane-steps", || run(&made, &narrow));
+        time("sweep f64", repetition, steps, "lane-steps", || run(&made, &wide));
+        time("score", repetition, 1000, "draws", || score(&made, &partial, &ScoreOptions::default()).unwrap());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = write_recordings(folder.path());
+    for repetition in 0..3 {
+        time("read and mine", repetition, bytes, "bytes", || {
+            mine_folder(folder.path(), &MiningOptions::default(), || ()).unwrap()
+        });
+    }
+    if let Some(peak) = peak_memory_bytes() {
+        println!("peak memory,0,,{peak},bytes");
+        eprintln!("peak memory {:.0} MB, the benchmark's own data included", peak as f64 / 1e6);
+    }
+}
+
+fn time<T>(part: &str, repetition: usize, amount: u64, unit: &str, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{part},{repetition},{seconds},{amount},{unit}");
+    eprintln!("{part:>14} {seconds:8.3} s  {:9.2} M {unit}/s", amount as f64 / seconds / 1e6);
+    result
+}
+
+/// Synthetic scenarios, repeated under new keys up to the paper's numbers.
+fn paper_size_scenarios() -> Vec<Scenario> {
+    let mined = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap();
+    let mut scenarios = Vec::new();
+    for (category, count) in PAPER {
+        let kept: Vec<&Scenario> = mined.scenarios.iter().filter(|s| s.category == category && s.kept).collect();
+        for k in 0..count {
+            let mut scenario = kept[k % kept.len()].clone();
+            scenario.id = format!("{}#{}", scenario.id, k / kept.len());
+            scenarios.push(scenario);
+        }
+    }
+    scenarios
+}
+
+fn run(plan: &LanePlan, backend: &dyn Backend) -> Partial {
+    let mut parts = Vec::new();
+    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
+        parts.push(Partial::of(plan, &chunk));
+        Ok(())
+    })
+    .unwrap();
+    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
+}
+
+fn lane_steps(plan: &LanePlan, backend: &dyn Backend) -> u64 {
+    let mut steps = 0;
+    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Outcomes, |chunk| {
+        steps += chunk.outcomes.iter().map(|o| u64::from(o.end_step) + 1).sum::<u64>();
+        Ok(())
+    })
+    .unwrap();
+    steps
+}
+
+/// Recordings of ever new seeds until there is a gigabyte of files.
+fn write_recordings(dir: &Path) -> u64 {
+    let mut bytes = 0;
+    let mut index = 0;
+    while bytes < LEAST_BYTES {
+        let options = GeneratorOptions { seed: 1000 + index, recordings: 1, ..GeneratorOptions::default() };
+        let mut recording = generate_one(&options, 0).unwrap();
+        recording.id = format!("{:03}", index + 1);
+        highd::write(dir, &recording, &RecordingInfo::default()).unwrap();
+        index += 1;
+        bytes = std::fs::read_dir(dir).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
+    }
+    bytes
+}
+
+/// Linux: the process's highest resident memory.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}

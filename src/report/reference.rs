@@ -1,0 +1,86 @@
+//! The lane arithmetic against the f64 reference, lane by lane: which verdicts differ, and how near to the
+//! threshold each lies.
+
+use crate::criterion::Criterion;
+use crate::sweep::{Chunk, LanePlan, Outcome};
+
+/// A verdict that differs between f32 and f64.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Key of the lane.
+    pub lane: String,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Failed in f32; in f64 it did not, or the other way round.
+    pub failed_in_f32: bool,
+    /// Distance of the f64 value from the threshold: TTC in s, BTN, for a collision the smallest gap in m.
+    pub distance: f64,
+}
+
+/// What a comparison has seen.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReferenceComparison {
+    /// Lanes compared.
+    pub lanes: u64,
+    /// Verdicts that differ.
+    pub differences: Vec<Difference>,
+    /// Lanes in which one ran into the time cap and the other did not: no verdict, information.
+    pub cap_differs: u64,
+}
+
+impl ReferenceComparison {
+    /// Takes two chunks of the same units into account.
+    pub fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
+        let thresholds = (plan.profile.criteria.ttc_threshold_s, plan.profile.criteria.btn_threshold);
+        for (at, (f32, f64)) in narrow.outcomes.iter().zip(&wide.outcomes).enumerate() {
+            self.lanes += 1;
+            self.cap_differs += u64::from(f32.verdicts.capped() != f64.verdicts.capped());
+            for criterion in Criterion::ALL {
+                let failed = f32.verdicts.failed(criterion);
+                if failed == f64.verdicts.failed(criterion) {
+                    continue;
+                }
+                let lane = plan.key(narrow.first_lane + at as u64).map_or(String::new(), |k| plan.key_text(&k));
+                let distance = distance(criterion, f64, f32, thresholds);
+                self.differences.push(Difference { lane, criterion, failed_in_f32: failed, distance });
+            }
+        }
+    }
+
+    /// One line for the terminal and the first differences.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
+            self.differences.len(),
+            self.lanes * Criterion::ALL.len() as u64,
+            self.lanes,
+            self.cap_differs
+        );
+        for d in self.differences.iter().take(20) {
+            let side = if d.failed_in_f32 { "fails in f32 only" } else { "fails in f64 only" };
+            text += &format!("  {} {}: {side}, {:.3e} from the threshold\n", d.lane, d.criterion.label(), d.distance);
+        }
+        text
+    }
+
+    /// All differences as CSV.
+    pub fn csv(&self) -> String {
+        let mut text = "lane,criterion,failed_in_f32,distance_to_threshold\n".to_owned();
+        for d in &self.differences {
+            let failed = u8::from(d.failed_in_f32);
+            text += &format!("{},{},{failed},{}\n", d.lane, d.criterion.key(), d.distance);
+        }
+        text
+    }
+}
+
+/// How far the value nearest to the threshold is from it; a contact makes its side's value infinite or 0,
+/// so the other side's counts.
+fn distance(criterion: Criterion, a: &Outcome<f64>, b: &Outcome<f64>, (ttc, btn): (f64, f64)) -> f64 {
+    let of = |o: &Outcome<f64>| match criterion {
+        Criterion::Collision => o.min_gap.abs(),
+        Criterion::Ttc => (o.min_ttc - ttc).abs(),
+        Criterion::Btn => (o.max_btn - btn).abs(),
+    };
+    of(a).min(of(b))
+}
