@@ -75,8 +75,8 @@ pub enum Error {
     /// The data is not what it must be: missing file or column, a bad number, a broken order.
     #[error("{place}: {problem}")]
     Input {
-        /// Where.
-        place: Place,
+        /// Where. Boxed, so that results which carry no error stay small: the reader returns millions.
+        place: Box<Place>,
         /// What was found and what was expected.
         problem: String,
         /// What to do.
@@ -86,7 +86,7 @@ pub enum Error {
     #[error("{place}: {problem}")]
     Usage {
         /// Which flag, key or profile.
-        place: Place,
+        place: Box<Place>,
         /// What is wrong with it.
         problem: String,
         /// What to write instead.
@@ -113,12 +113,12 @@ pub enum Error {
 impl Error {
     /// Bad data at `place`.
     pub fn input(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
-        Error::Input { place, problem: problem.into(), help: help.into() }
+        Error::Input { place: Box::new(place), problem: problem.into(), help: help.into() }
     }
 
     /// A flag, key or profile that cannot be used.
     pub fn usage(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
-        Error::Usage { place, problem: problem.into(), help: help.into() }
+        Error::Usage { place: Box::new(place), problem: problem.into(), help: help.into() }
     }
 
     /// The system's refusal, with the path and what was tried.

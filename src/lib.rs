@@ -2,6 +2,7 @@
 //!
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`].
 
+mod atomic_file;
 pub mod error;
 pub mod mining;
 pub mod scenario;

@@ -257,10 +257,11 @@ impl Table {
         }
     }
 
-    /// Whether the line just read is the last one and lacks its line end.
+    /// Whether the record just read ends with the file and not with a line end: only then had the end of
+    /// the file to be seen.
     fn ends_open(&self) -> bool {
         let hashing = self.reader.get_ref();
-        hashing.at_end && self.reader.position().byte() == hashing.bytes && hashing.last != b'\n'
+        hashing.at_end && self.reader.position().byte() == hashing.bytes
     }
 
     /// Line ends inside the fields of the record, where quotes allow them.
@@ -378,13 +379,12 @@ struct Hashing<R> {
     inner: R,
     hash: Sha256,
     bytes: u64,
-    last: u8,
     at_end: bool,
 }
 
 impl<R> Hashing<R> {
     fn new(inner: R) -> Self {
-        Hashing { inner, hash: Sha256::new(), bytes: 0, last: b'\n', at_end: false }
+        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false }
     }
 }
 
@@ -395,7 +395,6 @@ impl<R: Read> Read for Hashing<R> {
         self.hash.update(read);
         self.bytes += count as u64;
         self.at_end = count == 0;
-        self.last = read.last().copied().unwrap_or(self.last);
         Ok(count)
     }
 }

@@ -10,9 +10,16 @@ mod format;
 mod frame;
 mod inventory;
 mod meta;
+mod neighbours;
 mod number;
+mod precision;
 mod read;
+mod writable;
+mod write;
 
 pub use columns::FileChecksum;
 pub use inventory::{HighdFiles, Inventory, inventory};
+pub use precision::Precision;
 pub use read::{Loaded, read};
+pub use writable::quantize;
+pub use write::{RecordingInfo, write};
