@@ -280,7 +280,7 @@ fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
 
 #[test]
 fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
-    let Some(dir) = common::sumo_dir() else { return };
+    let Some(dir) = common::sumo_recordings() else { return };
     let inventory = highd::inventory(&dir).unwrap();
     assert_eq!(
         inventory.recordings.iter().map(|files| files.id.as_str()).collect::<Vec<_>>(),

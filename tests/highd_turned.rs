@@ -116,7 +116,7 @@ fn a_recording_turned_by_180_degrees_is_the_same_traffic() {
 
 #[test]
 fn a_sumo_recording_with_unequal_lane_counts_turned_by_180_degrees_is_the_same_traffic() {
-    let Some(dir) = common::sumo_dir() else { return };
+    let Some(dir) = common::sumo_recordings() else { return };
     let text = |name: &str| fs::read_to_string(dir.join(name)).unwrap();
     let texts = Texts {
         tracks: text("04_tracks.csv"),

@@ -118,7 +118,7 @@ fn the_observed_end_of_a_lane_change_comes_after_the_published_one() {
 }
 
 /// Rows `[time, tags…]` at a sample every half second: a value holds until the next row.
-fn row_at<'a>(rows: &'a [Value], t: f64) -> &'a Value {
+fn row_at(rows: &[Value], t: f64) -> &Value {
     rows.iter().rev().find(|r| r[0].as_f64().unwrap() <= t).unwrap()
 }
 

@@ -7,7 +7,7 @@
 //! about file formats or about what is done with a scenario. Data comes from [`crate::trajectory`] and
 //! goes, as [`Scenario`](crate::scenario::Scenario)s, to [`crate::parameterization`].
 //!
-//! A new category is one file beside [`lvd`] and one line in [`miner`].
+//! A new category is one file beside [`lvd`] and its search in `miner.rs`.
 //!
 //! **Equality and the tolerance.** Recordings have two decimals, and the same place reached from the
 //! other side of the road differs in the last bits. Every comparison of a position, a distance or a

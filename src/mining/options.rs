@@ -198,21 +198,21 @@ impl MiningOptions {
             ("lvd.min_duration_s", self.lvd.min_duration_s),
             ("lvd.min_peak_deceleration_mps2", self.lvd.min_peak_deceleration_mps2),
         ];
-        let refuse = |name: &str, value: f64, expected: &str| {
-            Err(Error::usage(
+        let refused = |name: &str, value: f64, expected: &str| {
+            Error::usage(
                 Place::item(format!("mining option `{name}`")),
                 format!("is {value}, but must be {expected}"),
                 "leave the option out to use the paper's value",
-            ))
+            )
         };
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
-                return refuse(name, value, "a finite number above 0");
+                return Err(refused(name, value, "a finite number above 0"));
             }
         }
         for (name, value) in at_least_zero {
             if !(value.is_finite() && value >= 0.0) {
-                return refuse(name, value, "a finite number of at least 0");
+                return Err(refused(name, value, "a finite number of at least 0"));
             }
         }
         Ok(())

@@ -88,7 +88,7 @@ fn wrong_content(value: &Value, field: String, content: Content) -> Option<(Stri
             format!("one of {}", names.iter().map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", "))
         }
         Number if !value.is_number() => "a number".to_owned(),
-        VehicleId if !value.as_u64().is_some_and(|id| id <= u64::from(u32::MAX)) => {
+        VehicleId if value.as_u64().is_none_or(|id| id > u64::from(u32::MAX)) => {
             "a vehicle's number (whole, at least 0)".to_owned()
         }
         Frame if !value.is_i64() => "a frame (a whole number)".to_owned(),
@@ -113,6 +113,22 @@ fn wrong_content(value: &Value, field: String, content: Content) -> Option<(Stri
 }
 
 #[cfg(test)]
-pub(super) fn field_names() -> Vec<&'static str> {
-    FIELDS.iter().map(|f| f.0).collect()
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    /// A field added to the scenario must be added here too.
+    #[test]
+    fn every_written_field_is_known() {
+        let line = r#"{"id": "a", "category": "lvd", "fps": 25.0, "side": "left", "ego": {"v0": 1.0, "length": 4.0,
+            "width": 2.0}, "target": {"length": 4.0, "width": 2.0, "v": [1.0], "y": [0.0]}, "truncated_start": true,
+            "end_cause": "leader", "frame_switch": 1, "tag_frames": [1, 2]}"#;
+        let scenario: Scenario = serde_json::from_str(line).unwrap();
+        let Ok(Value::Object(written)) = serde_json::to_value(scenario) else { panic!("not an object") };
+        let mut written: Vec<&str> = written.keys().map(String::as_str).collect();
+        let mut known: Vec<&str> = FIELDS.iter().map(|f| f.0).collect();
+        written.sort_unstable();
+        known.sort_unstable();
+        assert_eq!(written, known);
+    }
 }

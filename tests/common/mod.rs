@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every test binary uses its own part
 
+use std::io::Write;
 use std::path::PathBuf;
 
 pub mod small;
@@ -15,8 +16,13 @@ pub fn shared(rel: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    eprintln!("SKIPPED: needs ../shared/{rel} (set LANESWEEP_SHARED to the folder that holds it)");
+    skipped(&format!("needs ../shared/{rel} (set LANESWEEP_SHARED to the folder that holds it)"));
     None
+}
+
+/// Says that a test is skipped. Past the test harness, which shows the output of failing tests only.
+fn skipped(why: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
 }
 
 /// A file of `tests/golden`.
@@ -24,31 +30,46 @@ pub fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
 }
 
-/// Folder with the four SUMO recordings of `../shared/data/sumo/sumo_highd.zip`, unpacked once into the
-/// system's temporary folder; where archive or Python is absent, says so loudly and gives `None`.
-pub fn sumo_dir() -> Option<PathBuf> {
+/// The four SUMO recordings of the shared folder, unpacked once below the target folder; says loudly why
+/// where that cannot be done.
+pub fn sumo_recordings() -> Option<PathBuf> {
     static UNPACKED: std::sync::OnceLock<Option<PathBuf>> = std::sync::OnceLock::new();
-    UNPACKED.get_or_init(|| unpack_sumo(&shared("data/sumo/sumo_highd.zip")?)).clone()
+    UNPACKED.get_or_init(unpack_sumo_recordings).clone()
 }
 
-fn unpack_sumo(archive: &std::path::Path) -> Option<PathBuf> {
-    let bytes = std::fs::metadata(archive).ok()?.len();
-    let target = std::env::temp_dir().join(format!("lanesweep-test-sumo-{bytes}"));
-    if !target.is_dir() {
-        // Test binaries run side by side: each unpacks beside the place, the first one to finish gives
-        // its folder the name, and nobody ever sees half of it.
-        let own = std::env::temp_dir().join(format!("lanesweep-test-sumo-{bytes}-{}", std::process::id()));
-        let done = std::process::Command::new("python3").args(["-m", "zipfile", "-e"]).arg(archive).arg(&own).status();
-        if !done.is_ok_and(|status| status.success()) {
-            eprintln!("SKIPPED: needs python3 to unpack {}", archive.display());
-            return None;
-        }
-        if std::fs::rename(&own, &target).is_err() {
-            let _ = std::fs::remove_dir_all(&own);
-        }
+fn unpack_sumo_recordings() -> Option<PathBuf> {
+    let archive = shared("data/sumo/sumo_highd.zip")?;
+    let root = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let ready = root.join("sumo_highd");
+    if ready.is_dir() {
+        return Some(ready);
     }
-    // The archive may hold the files in a folder of its own.
-    let holds = |dir: &PathBuf| dir.join("01_tracks.csv").is_file();
-    let inner = std::fs::read_dir(&target).ok()?.flatten().map(|entry| entry.path());
-    std::iter::once(target).chain(inner).find(holds)
+    // Test binaries run side by side: each unpacks for itself, the first one's folder stays.
+    let mine = root.join(format!("sumo_highd.{}", std::process::id()));
+    let unpack = |program: &str, args: &[&std::ffi::OsStr]| {
+        let run = std::process::Command::new(program).args(args).stdout(std::process::Stdio::null()).status();
+        run.is_ok_and(|status| status.success())
+    };
+    let (archive, into) = (archive.as_os_str(), mine.as_os_str());
+    let unpacked = unpack("unzip", &["-q".as_ref(), "-o".as_ref(), archive, "-d".as_ref(), into])
+        || unpack("python3", &["-m".as_ref(), "zipfile".as_ref(), "-e".as_ref(), archive, into]);
+    if !unpacked {
+        skipped(&format!("needs `unzip` or `python3` to unpack {}", archive.display()));
+        return None;
+    }
+    let content = folder_with_tracks(&mine)?;
+    if std::fs::rename(&content, &ready).is_ok() || ready.is_dir() {
+        let _ = std::fs::remove_dir_all(&mine);
+        return Some(ready);
+    }
+    Some(content)
+}
+
+/// The folder itself or the one below it that holds `01_tracks.csv`.
+fn folder_with_tracks(folder: &std::path::Path) -> Option<PathBuf> {
+    if folder.join("01_tracks.csv").exists() {
+        return Some(folder.to_path_buf());
+    }
+    let below = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    below.filter(|path| path.is_dir()).find_map(|path| folder_with_tracks(&path))
 }
