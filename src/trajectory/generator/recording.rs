@@ -1,18 +1,21 @@
-//! From the simulated carriageways to one recording: road, numbering, and the decimals of a highD file.
+//! From the simulated carriageways to one recording: road, numbering, and the decimals of a highD file,
+//! so that a recording read back from its own files is the same to the last bit.
 
 use super::inflow::demand;
 use super::options::GeneratorOptions;
 use super::random::{Purpose, Stream};
 use super::traffic::{Setting, Traffic};
 use super::vehicle::Vehicle;
+use crate::error::Result;
+use crate::trajectory::highd::{self, Precision};
 use crate::trajectory::{Carriageway, NO_LANE, Recording, Track};
 
 /// Upper edge of the image to the first line, and between the carriageways, m.
 const VERGE_M: f64 = 8.0;
 const MEDIAN_M: f64 = 4.5;
 
-/// One recording. `index` counts from 0.
-pub(super) fn record(options: &GeneratorOptions, index: usize) -> Recording {
+/// One recording. `index` counts from 0. An error means that a highD file could not hold it.
+pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recording> {
     let mut site = Stream::new(options.seed, index, 0, Purpose::Site);
     // Two of three recordings have three lanes per direction.
     let lanes = if index % 3 == 2 { 2 } else { 3 };
@@ -45,7 +48,20 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Recording {
         .enumerate()
         .map(|(k, (carriageway, vehicle))| track(k as u32 + 1, carriageway, &carriageways, options.window_m, vehicle))
         .collect();
-    Recording { id: format!("{:02}", index + 1), frame_rate_hz: options.frame_rate_hz, carriageways, tracks }
+    let id = format!("{:02}", index + 1);
+    let mut recording = Recording { id, frame_rate_hz: options.frame_rate_hz, carriageways, tracks };
+    highd::quantize(&mut recording, Precision::Hundredths)?;
+    label_lanes(&mut recording);
+    Ok(recording)
+}
+
+/// Lanes by the centre as it is written: rounding may have moved it over a line.
+fn label_lanes(recording: &mut Recording) {
+    for track in &mut recording.tracks {
+        let road = &recording.carriageways[track.carriageway];
+        let lane = |d: &f64| road.lane_at(*d).map_or(NO_LANE, |lane| lane as u16);
+        track.lane = track.d_m.iter().map(lane).collect();
+    }
 }
 
 /// Lines as the internal model has them for a highD image with `y` down: the upper carriageway (`1`,
@@ -62,11 +78,9 @@ fn carriageways(lanes: [usize; 2], lane_width_m: f64) -> Vec<Carriageway> {
 fn track(id: u32, carriageway: usize, carriageways: &[Carriageway], window_m: f64, vehicle: Vehicle) -> Track {
     // highD's x runs with carriageway 2 and against carriageway 1, whose s therefore ends at 0.
     let start_m = if carriageway == 0 { -window_m } else { 0.0 };
-    let road = &carriageways[carriageway];
-    let left_m = road.lane_lines_m[0];
+    let left_m = carriageways[carriageway].lane_lines_m[0];
     let samples = vehicle.samples;
-    let d_m: Vec<f64> = samples.d_m.iter().map(|d| left_m + d).collect();
-    let lane = d_m.iter().map(|&d| road.lane_at(d).map_or(NO_LANE, |lane| lane as u16)).collect();
+    let n = samples.s_m.len();
     Track {
         id,
         class: vehicle.class,
@@ -75,10 +89,10 @@ fn track(id: u32, carriageway: usize, carriageways: &[Carriageway], window_m: f6
         carriageway,
         first_frame: samples.first as i64 + 1,
         s_m: samples.s_m.iter().map(|s| start_m + s).collect(),
-        d_m,
+        d_m: samples.d_m.iter().map(|d| left_m + d).collect(),
         v_s_mps: samples.v_s_mps,
         v_d_mps: samples.v_d_mps,
         a_s_mps2: samples.a_s_mps2,
-        lane,
+        lane: vec![NO_LANE; n], // by `label_lanes`, from the rounded positions
     }
 }
