@@ -248,8 +248,10 @@ impl Table {
             if !found {
                 return Ok(false);
             }
-            let end_line = self.reader.position().line() - u64::from(!self.ends_open());
-            self.line = if end_line > self.last_line + 1 { end_line - self.inner_line_ends() } else { end_line };
+            // The reader stands on the line after the record, unless no line end closed it.
+            let end_line = self.reader.position().line().saturating_sub(u64::from(!self.ends_open()));
+            let spans_lines = end_line > self.last_line + 1;
+            self.line = if spans_lines { end_line.saturating_sub(self.inner_line_ends()) } else { end_line };
             self.last_line = end_line;
             if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
                 return Ok(true);
