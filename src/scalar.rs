@@ -113,10 +113,24 @@ thread_local! {
     static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0 }) };
 }
 
-fn count(update: impl FnOnce(&mut OperationCount)) {
+/// Kinds of operations that are counted.
+enum Operation {
+    Addition,
+    Multiplication,
+    Division,
+    Comparison,
+}
+
+fn count(operation: Operation) {
     COUNT.with(|cell| {
         let mut now = cell.get();
-        update(&mut now);
+        let counter = match operation {
+            Operation::Addition => &mut now.additions,
+            Operation::Multiplication => &mut now.multiplications,
+            Operation::Division => &mut now.divisions,
+            Operation::Comparison => &mut now.comparisons,
+        };
+        *counter += 1;
         cell.set(now);
     });
 }
@@ -137,21 +151,21 @@ impl Counting {
 impl Add for Counting {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        count(|c| c.additions += 1);
+        count(Operation::Addition);
         Counting(self.0 + other.0)
     }
 }
 impl Sub for Counting {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        count(|c| c.additions += 1);
+        count(Operation::Addition);
         Counting(self.0 - other.0)
     }
 }
 impl Mul for Counting {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        count(|c| c.multiplications += 1);
+        count(Operation::Multiplication);
         Counting(self.0 * other.0)
     }
 }
@@ -163,13 +177,13 @@ impl Neg for Counting {
 }
 impl PartialEq for Counting {
     fn eq(&self, other: &Self) -> bool {
-        count(|c| c.comparisons += 1);
+        count(Operation::Comparison);
         self.0 == other.0
     }
 }
 impl PartialOrd for Counting {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        count(|c| c.comparisons += 1);
+        count(Operation::Comparison);
         self.0.partial_cmp(&other.0)
     }
 }
@@ -188,7 +202,7 @@ impl Real for Counting {
         Counting(f64::from(step))
     }
     fn exact_div(self, divisor: Self) -> Self {
-        count(|c| c.divisions += 1);
+        count(Operation::Division);
         Counting(self.0 / divisor.0)
     }
 }

@@ -297,7 +297,7 @@ fn run_lane_of_study(profile: &Profile, scenarios: &Path, lane: &str) -> Result<
         wanted.kept = true;
     }
     let mut options = StudyOptions { parameterization: ParameterizationOptions::default(), ..StudyOptions::default() };
-    let asked = lane.rsplitn(4, '/').nth(1).and_then(|h| h.strip_suffix('s')).and_then(|h| h.parse::<f64>().ok());
+    let asked = lane.rsplit('/').nth(1).and_then(|h| h.strip_suffix('s')).and_then(|h| h.parse::<f64>().ok());
     if let Some(thw) = asked.filter(|t| t.is_finite() && *t >= 0.0) {
         options.headways = vec![Headway::ThwS(thw)];
     }

@@ -58,11 +58,11 @@ impl Reduction {
     pub fn reduce(&self, scenario: &Scenario, d: usize) -> Result<ReducedScenario> {
         let z = vector(scenario, &self.options)?;
         let rebuilt = self.basis.reconstruct(&self.basis.coefficients(&z, d));
-        Ok(self.from_vector(&rebuilt, scenario.side.sign()))
+        Ok(self.scenario_of(&rebuilt, scenario.side.sign()))
     }
 
     /// Vector → scenario: mirrored back and brought into the physical range.
-    fn from_vector(&self, z: &[f64], side: f64) -> ReducedScenario {
+    fn scenario_of(&self, z: &[f64], side: f64) -> ReducedScenario {
         let n = self.options.svd_instants;
         let speeds = |part: &[f64]| part.iter().map(|v| v.max(0.0)).collect::<Vec<_>>();
         let mirror = match self.options.svd_lateral {

@@ -6,7 +6,7 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::frame::{Frame, Observer, Start, run_lane};
+use super::frame::{Frame, Observer, Simulation, Start, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 
@@ -62,15 +62,26 @@ impl<R: Real> Constants<R> {
         start: Start<R>,
         observer: &mut impl Observer<R>,
     ) -> Outcome<R> {
-        let at = model.index();
+        let (criteria, model_index) = (&self.criteria, model.index());
+        let frame = &self.frame;
         match model {
-            ModelId::Reg157 => run_lane(&self.frame, &self.criteria, &self.reg157, at, case, tables, start, observer),
-            ModelId::Cchdm => {
-                let frame = Frame { abort_above_ttc: self.cchdm_abort, ..self.frame };
-                run_lane(&frame, &self.criteria, &self.cchdm, at, case, tables, start, observer)
+            ModelId::Reg157 => {
+                let model = &self.reg157;
+                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
             }
-            ModelId::Rss => run_lane(&self.frame, &self.criteria, &self.rss, at, case, tables, start, observer),
-            ModelId::Fsm => run_lane(&self.frame, &self.criteria, &self.fsm, at, case, tables, start, observer),
+            ModelId::Cchdm => {
+                let frame = &Frame { abort_above_ttc: self.cchdm_abort, ..self.frame };
+                let model = &self.cchdm;
+                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+            }
+            ModelId::Rss => {
+                let model = &self.rss;
+                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+            }
+            ModelId::Fsm => {
+                let model = &self.fsm;
+                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+            }
         }
     }
 }

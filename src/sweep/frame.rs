@@ -91,18 +91,29 @@ struct Record<R> {
     min_gap: R,
 }
 
-/// Runs one lane. `model_index` is the model's position in the registry: it selects the attention windows.
+/// What all lanes of one model have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct Simulation<'a, R, M> {
+    /// Time and end rules.
+    pub frame: &'a Frame<R>,
+    /// Criteria.
+    pub criteria: &'a Criteria<R>,
+    /// The ego's driver.
+    pub model: &'a M,
+    /// Its position in the registry: selects the attention windows.
+    pub model_index: usize,
+}
+
+/// Runs one lane.
 #[inline(always)]
 pub fn run_lane<R: Real, M: DriverModel<R>>(
-    frame: &Frame<R>,
-    criteria: &Criteria<R>,
-    model: &M,
-    model_index: usize,
+    simulation: &Simulation<R, M>,
     case: &LaneCase<R>,
     tables: &Tables<R>,
     start: Start<R>,
     observer: &mut impl Observer<R>,
 ) -> Outcome<R> {
+    let &Simulation { frame, criteria, model, model_index } = simulation;
     let gap_start = match start {
         Start::Headway(thw) => thw * case.ego_speed,
         Start::Gap(gap) => gap,

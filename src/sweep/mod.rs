@@ -18,7 +18,7 @@ mod study;
 pub use backend::{Backend, Chunk, Session, Wanted};
 pub use cpu::CpuBackend;
 pub use drivers::Constants;
-pub use frame::{Frame, Observer, Seen, Silent, Start, Step, run_lane};
+pub use frame::{Frame, Observer, Seen, Silent, Simulation, Start, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Confusion, Partial, UnitCounts};
