@@ -47,7 +47,7 @@ pub fn sweep(
     Ok(summary)
 }
 
-/// Splits an interval of units into chunks of about [`CHUNK_LANES`] lanes, at least one unit each.
+/// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.
 pub fn chunks(plan: &LanePlan, units: Range<u64>) -> Vec<Range<u64>> {
     let most = plan.blocks.iter().map(|b| plan.lanes_per_unit(b)).max().unwrap_or(1).max(1);
     let step = (CHUNK_LANES / most).max(1);
