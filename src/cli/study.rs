@@ -13,8 +13,8 @@ use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::ParameterizationOptions;
-use crate::report::files::write_atomically;
-use crate::report::lanes;
+use crate::report::files::{make_folder, write_atomically};
+use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
 use crate::report::study::StudyReport;
@@ -125,7 +125,8 @@ impl Study {
         let scores = timed(&mut timings.score_s, || score(&planned.plan, &partial, &config.score))?;
         let claims = judge_claims(&scores);
         if let Some(path) = &self.lanes {
-            write_lanes(path, &planned.plan, backend.as_ref())?;
+            let digits = if self.reference { Digits::Binary64 } else { Digits::Binary32 };
+            write_lanes(path, &planned.plan, backend.as_ref(), digits)?;
         }
         let comparison = self.compare_reference.then(|| compare_reference(&planned.plan)).transpose()?;
         let categories = category_records(&collection, &planned, &scores);
@@ -206,14 +207,17 @@ fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
-fn write_lanes(path: &Path, plan: &LanePlan, backend: &dyn Backend) -> Result<()> {
+fn write_lanes(path: &Path, plan: &LanePlan, backend: &dyn Backend, digits: Digits) -> Result<()> {
+    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
+        make_folder(dir)?;
+    }
     let mut session = backend.prepare(plan)?;
     let mut failure = None;
     let written = crate::report::files::write_atomically_with(path, |out| {
         lanes::write_header(out)?;
         for units in chunks(plan, 0..plan.unit_count()) {
             match session.run(units, Wanted::Outcomes) {
-                Ok(chunk) => lanes::write_chunk(out, plan, &chunk)?,
+                Ok(chunk) => lanes::write_chunk(out, plan, &chunk, digits)?,
                 Err(error) => {
                     failure = Some(error);
                     return Err(std::io::Error::other("the sweep failed"));

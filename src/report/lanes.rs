@@ -10,6 +10,29 @@ use crate::sweep::{Chunk, Constants, Headway, LaneCase, LaneKey, LanePlan, NO_ST
 pub const HEADER: &str = "id,category,param,thw,model,collision,ttc,btn,min_ttc,max_btn,crash_type,t_react,t_crash,\
                           impact_speed,t_end,robust";
 
+/// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Digits {
+    /// The lane arithmetic.
+    Binary32,
+    /// The reference.
+    Binary64,
+}
+
+impl Digits {
+    fn write(self, value: f64) -> String {
+        match self {
+            Digits::Binary32 => (value as f32).to_string(),
+            Digits::Binary64 => value.to_string(),
+        }
+    }
+}
+
+/// A key as a CSV field.
+fn quoted(key: &str) -> String {
+    if key.contains([',', '"', '\n', '\r']) { format!("\"{}\"", key.replace('"', "\"\"")) } else { key.to_owned() }
+}
+
 /// Writes the header.
 pub fn write_header(out: &mut dyn Write) -> std::io::Result<()> {
     writeln!(out, "{HEADER}")
@@ -17,7 +40,7 @@ pub fn write_header(out: &mut dyn Write) -> std::io::Result<()> {
 
 /// Writes the lanes of a chunk that has outcomes, in the plan's order. Empty: did not happen. `robust` is 0
 /// where verdicts or crash type of the f64 reference change when the initial gap moves by 1e-9 m.
-pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk) -> std::io::Result<()> {
+pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: Digits) -> std::io::Result<()> {
     let dt = plan.profile.frame.dt_s;
     let constants: Vec<Constants<f64>> =
         plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
@@ -39,20 +62,20 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk) -> std::
         };
         let judged = |c: Criterion| u8::from(outcome.verdicts.failed(c));
         let time = |step: u32| if step == NO_STEP { String::new() } else { time(step, dt) };
-        let impact = if outcome.contact_step == NO_STEP { String::new() } else { outcome.impact_speed.to_string() };
+        let impact = if outcome.contact_step == NO_STEP { String::new() } else { digits.write(outcome.impact_speed) };
         let robust = is_robust(&constants[key.block], plan, &key, &case, headway);
         writeln!(
             out,
             "{},{},{},{thw},{},{},{},{},{},{},{},{},{},{impact},{},{}",
-            block.units[key.unit as usize],
+            quoted(&block.units[key.unit as usize]),
             block.category.key(),
             block.variants[key.variant],
             plan.models[key.model].name(),
             judged(Criterion::Collision),
             judged(Criterion::Ttc),
             judged(Criterion::Btn),
-            outcome.min_ttc,
-            outcome.max_btn,
+            digits.write(outcome.min_ttc),
+            digits.write(outcome.max_btn),
             outcome.contact.code(),
             time(outcome.reaction_step),
             time(outcome.contact_step),

@@ -34,8 +34,9 @@ impl ScoreOptions {
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
         let bad = |key: &str, problem: String, help: &str| Err(Error::usage(Place::item(key), problem, help));
-        if self.bootstrap_draws == 0 || self.bootstrap_draws > 1_000_000 {
-            return bad("score.bootstrap_draws", format!("{} draws", self.bootstrap_draws), "use 1 to 1000000");
+        // Every draw's counts are kept, about 1.5 kB each.
+        if !(20..=100_000).contains(&self.bootstrap_draws) {
+            return bad("score.bootstrap_draws", format!("{} draws", self.bootstrap_draws), "use 20 to 100000");
         }
         if !(self.confidence > 0.0 && self.confidence < 1.0) {
             return bad("score.confidence", format!("{}", self.confidence), "use a number between 0 and 1, like 0.95");

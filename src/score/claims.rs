@@ -3,7 +3,11 @@
 //! A claim holds if the paired bootstrap interval of its statistic excludes 0 with the claimed sign, is
 //! contradicted if it excludes 0 with the other, and undecided otherwise. Cells with few failures in S are
 //! left out; where none remains the data is too few. A claimed equality holds if the interval lies within
-//! ±0.05 and is contradicted if it lies wholly outside.
+//! ±0.05 and is contradicted if it lies wholly outside; over several cells it is about the mean size of the
+//! difference, so that differences of opposite sign do not cancel.
+//!
+//! The mean over cells is taken over the same cells in every draw: a draw in which one of them is undefined is
+//! undefined, and where more than 5 % of the draws are, the claim is undecided.
 
 use super::bootstrap::{Interval, interval};
 use super::statistic::Statistic;
@@ -15,6 +19,9 @@ use crate::scenario::Category;
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
 
+/// Share of undefined draws above which a claim is undecided.
+const MOST_UNDEFINED: f64 = 0.05;
+
 /// A claim as data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {
@@ -24,7 +31,7 @@ pub struct Claim {
     pub category: Category,
     /// What the paper says.
     pub statement: &'static str,
-    /// The cells it speaks of.
+    /// The cells it speaks of. A claim that compares models has one cell per criterion, under its first model.
     pub cells: Vec<(ModelId, Criterion)>,
     /// The number it is about.
     pub statistic: Statistic,
@@ -107,7 +114,7 @@ pub fn paper_claims() -> Vec<Claim> {
     let reg157_rest = || cells(&[Reg157], &[Ttc, Btn]);
     let careful = || cells(&[Rss, Fsm], &Criterion::ALL);
     let hasty = || cells(&[Reg157, Cchdm], &Criterion::ALL);
-    let often = || cells(&[Reg157, Cchdm], &[Ttc, Btn]);
+    let often = || cells(&[Reg157], &[Ttc, Btn]);
     let claim = |id, category, statement, cells, statistic| Claim { id, category, statement, cells, statistic };
     let mut claims = vec![
         claim("cut-in 2 > 1", CutIn, "2 is better than 1", all(), F1Above(&["2"], &["1"])),
@@ -177,7 +184,7 @@ pub fn paper_claims() -> Vec<Claim> {
     let fails = ["cut-in failures", "cut-out failures", "LVD failures"];
     for (category, id) in Category::ALL.into_iter().zip(fails) {
         let statement = "Reg157 and CCHDM fail TTC and BTN more often than RSS and FSM";
-        claims.push(claim(id, category, statement, often(), FailsMoreOften(&[Rss, Fsm])));
+        claims.push(claim(id, category, statement, often(), FailsMoreOften(&[Reg157, Cchdm], &[Rss, Fsm])));
     }
     claims.push(claim(
         "cut-in side hits",
@@ -200,28 +207,32 @@ pub fn judge_claims(table: &ScoreTable) -> Vec<ClaimResult> {
 
 fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f64) -> ClaimResult {
     let statistic = claim.statistic;
-    let runnable = statistic.variants().iter().all(|v| scores.variant(v).is_some());
-    let failures = |&(model, criterion): &(ModelId, Criterion)| {
-        scores.index(0, model, criterion).map_or(0, |at| u64::from(scores.cells[at].counts.both))
-    };
+    let has_model = |m: &ModelId| scores.models.contains(m);
+    let runnable =
+        statistic.variants().iter().all(|v| scores.variant(v).is_some()) && statistic.models().iter().all(has_model);
+    let failures = |&(model, criterion): &(ModelId, Criterion)| statistic.failures(scores, model, criterion);
     let of_draw = |draw: Option<usize>, (model, criterion): (ModelId, Criterion)| {
         let counts = |at: usize| draw.map_or(scores.cells[at].counts, |d| scores.draws[d][at]);
         statistic.value(scores, &counts, model, criterion)
     };
     let row = |cell: Option<(ModelId, Criterion)>, cells: &[(ModelId, Criterion)]| {
+        let sizes = matches!(statistic, Statistic::F1Near(..)) && cells.len() > 1;
         let mean = |draw: Option<usize>| {
-            let values: Vec<f64> = cells.iter().filter_map(|&c| of_draw(draw, c)).collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+            let values: Option<Vec<f64>> = cells.iter().map(|&c| of_draw(draw, c)).collect();
+            let values = values.filter(|v| !v.is_empty())?;
+            Some(values.iter().map(|v| if sizes { v.abs() } else { *v }).sum::<f64>() / values.len() as f64)
         };
         let values: Vec<f64> = (0..scores.draws.len()).filter_map(|d| mean(Some(d))).collect();
         let undefined_draws = (scores.draws.len() - values.len()) as u32;
         let value = mean(None);
         let interval = interval(values, confidence).filter(|_| value.is_some());
         let total: u64 = cells.iter().map(failures).sum();
-        let verdict = if !runnable || value.is_none() && total >= u64::from(least) {
+        let verdict = if !runnable || cell.is_some_and(|(model, _)| !has_model(&model)) {
             ClaimVerdict::NotRun
         } else if cells.is_empty() || total < u64::from(least) {
             ClaimVerdict::TooFew
+        } else if f64::from(undefined_draws) > MOST_UNDEFINED * scores.draws.len() as f64 {
+            ClaimVerdict::Undecided
         } else {
             verdict(&statistic, interval)
         };
@@ -245,5 +256,68 @@ fn verdict(statistic: &Statistic, interval: Option<Interval>) -> ClaimVerdict {
         ClaimVerdict::Contradicted
     } else {
         ClaimVerdict::Undecided
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::ScoreOptions;
+    use crate::score::table::Cell;
+    use crate::sweep::Confusion;
+
+    /// Cut-out scores in which S fails as given per model (same for every criterion) and b and d differ from it
+    /// as given; every draw equals the sample.
+    fn table(failures: [u32; 4], b: Confusion, d: Confusion) -> ScoreTable {
+        let variants = ["S", "a", "b", "c", "d", "e", "f", "g"];
+        let mut cells = Vec::new();
+        for (variant, name) in variants.iter().enumerate() {
+            for (model, &both) in ModelId::ALL.into_iter().zip(&failures) {
+                for criterion in Criterion::ALL {
+                    let counts = match *name {
+                        "b" => b,
+                        "d" => d,
+                        _ => Confusion { both, neither: 1000 - both, ..Confusion::default() },
+                    };
+                    cells.push(Cell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
+                }
+            }
+        }
+        let counts: Vec<Confusion> = cells.iter().map(|c| c.counts).collect();
+        let scores = CategoryScores {
+            category: Category::CutOut,
+            scenarios: 100,
+            simulations: 1000,
+            variants: variants.map(str::to_owned).to_vec(),
+            models: ModelId::ALL.to_vec(),
+            cells,
+            capped: Vec::new(),
+            draws: vec![counts; 20],
+        };
+        ScoreTable { categories: vec![scores], options: ScoreOptions::default() }
+    }
+
+    fn verdict_of(table: &ScoreTable, id: &str) -> ClaimVerdict {
+        judge_claims(table).into_iter().find(|r| r.claim.id == id).map(|r| r.overall.verdict).unwrap()
+    }
+
+    const GOOD: Confusion = Confusion { both: 90, only_s: 10, only_s_prime: 10, neither: 890 };
+    const BAD: Confusion = Confusion { both: 20, only_s: 80, only_s_prime: 0, neither: 900 };
+
+    #[test]
+    fn equal_scores_are_nearly_the_same_and_distant_ones_contradict_it() {
+        assert_eq!(verdict_of(&table([100; 4], GOOD, GOOD), "cut-out b = d"), ClaimVerdict::Holds);
+        assert_eq!(verdict_of(&table([100; 4], GOOD, BAD), "cut-out b = d"), ClaimVerdict::Contradicted);
+    }
+
+    #[test]
+    fn a_claim_about_few_failures_is_not_judged() {
+        assert_eq!(verdict_of(&table([3; 4], GOOD, GOOD), "cut-out c < a"), ClaimVerdict::TooFew);
+    }
+
+    #[test]
+    fn a_model_that_never_fails_contradicts_that_it_fails_more_often() {
+        assert_eq!(verdict_of(&table([500, 0, 20, 20], GOOD, GOOD), "cut-out failures"), ClaimVerdict::Contradicted);
+        assert_eq!(verdict_of(&table([500, 300, 20, 20], GOOD, GOOD), "cut-out failures"), ClaimVerdict::Holds);
     }
 }

@@ -1,6 +1,6 @@
 //! The statistics that claims are about: functions of the counts of one category, per model and criterion.
 
-use super::table::{CategoryScores, f1, precision, recall};
+use super::table::{CategoryScores, f1};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::sweep::Confusion;
@@ -14,12 +14,13 @@ pub enum Statistic {
     F1Below(&'static str, f64),
     /// F1 difference of two variants, claimed to be nearly 0.
     F1Near(&'static str, &'static str),
-    /// Recall minus precision, mean over variants: > 0 where false positives dominate.
+    /// (FP − FN)/(2TP + FP + FN), mean over variants: > 0 where false positives dominate. Has the sign of
+    /// recall − precision and stays defined where S' never fails.
     FalsePositivesDominate(&'static [&'static str]),
-    /// FN minus FP per S failure, mean over variants: > 0 where false negatives dominate.
+    /// The same with the other sign: > 0 where false negatives dominate.
     FalseNegativesDominate(&'static [&'static str]),
-    /// Failure rate of S of this model minus the mean one of others, same criterion.
-    FailsMoreOften(&'static [ModelId]),
+    /// Least failure rate of S among the first models minus the largest among the others, same criterion.
+    FailsMoreOften(&'static [ModelId], &'static [ModelId]),
     /// Failure rate of S in this criterion minus that in another one, same model.
     FailsMoreThan(Criterion),
 }
@@ -48,33 +49,42 @@ impl Statistic {
             }
             Statistic::F1Below(variant, bound) => Some(bound - f1_of(&variant)?),
             Statistic::F1Near(a, b) => Some(f1_of(&a)? - f1_of(&b)?),
-            Statistic::FalsePositivesDominate(variants) => mean(
-                variants
-                    .iter()
-                    .map(|v| {
-                        let c = cell(v, model, criterion)?;
-                        Some(recall(&c)? - precision(&c)?)
-                    })
-                    .collect(),
-            ),
-            Statistic::FalseNegativesDominate(variants) => mean(
-                variants
-                    .iter()
-                    .map(|v| {
-                        let c = cell(v, model, criterion)?;
-                        let failures = c.both + c.only_s;
-                        (failures > 0).then(|| (f64::from(c.only_s) - f64::from(c.only_s_prime)) / f64::from(failures))
-                    })
-                    .collect(),
-            ),
-            Statistic::FailsMoreOften(others) => {
-                let own = rate(cell("S", model, criterion)?);
-                let others = others.iter().map(|m| Some(rate(cell("S", *m, criterion)?))).collect();
-                Some(own - mean(others)?)
+            Statistic::FalsePositivesDominate(variants) => {
+                mean(variants.iter().map(|v| excess(&cell(v, model, criterion)?)).collect())
+            }
+            Statistic::FalseNegativesDominate(variants) => {
+                mean(variants.iter().map(|v| excess(&cell(v, model, criterion)?)).collect()).map(|e| -e)
+            }
+            Statistic::FailsMoreOften(often, seldom) => {
+                let rates = |models: &[ModelId]| -> Option<Vec<f64>> {
+                    models.iter().map(|m| Some(rate(cell("S", *m, criterion)?))).collect()
+                };
+                let least = rates(often)?.into_iter().fold(f64::INFINITY, f64::min);
+                Some(least - rates(seldom)?.into_iter().fold(f64::NEG_INFINITY, f64::max))
             }
             Statistic::FailsMoreThan(other) => {
                 Some(rate(cell("S", model, criterion)?) - rate(cell("S", model, other)?))
             }
+        }
+    }
+
+    /// Failures of S that this cell has to judge the claim by: those of every model and criterion compared.
+    pub fn failures(&self, scores: &CategoryScores, model: ModelId, criterion: Criterion) -> u64 {
+        let of = |model: ModelId, criterion: Criterion| {
+            scores.index(0, model, criterion).map_or(0, |at| u64::from(scores.cells[at].counts.both))
+        };
+        match *self {
+            Statistic::FailsMoreOften(often, seldom) => often.iter().chain(seldom).map(|m| of(*m, criterion)).sum(),
+            Statistic::FailsMoreThan(other) => of(model, criterion) + of(model, other),
+            _ => of(model, criterion),
+        }
+    }
+
+    /// The models that it compares beyond the cell's own.
+    pub fn models(&self) -> Vec<ModelId> {
+        match *self {
+            Statistic::FailsMoreOften(often, seldom) => [often, seldom].concat(),
+            _ => Vec::new(),
         }
     }
 
@@ -85,7 +95,13 @@ impl Statistic {
             Statistic::F1Below(v, _) => vec![v],
             Statistic::F1Near(a, b) => vec![a, b],
             Statistic::FalsePositivesDominate(v) | Statistic::FalseNegativesDominate(v) => v.to_vec(),
-            Statistic::FailsMoreOften(_) | Statistic::FailsMoreThan(_) => vec!["S"],
+            Statistic::FailsMoreOften(..) | Statistic::FailsMoreThan(_) => vec!["S"],
         }
     }
+}
+
+/// (FP − FN)/(2TP + FP + FN); `None` where neither S nor S' ever fails.
+fn excess(c: &Confusion) -> Option<f64> {
+    let all = 2 * c.both + c.only_s + c.only_s_prime;
+    (all > 0).then(|| (f64::from(c.only_s_prime) - f64::from(c.only_s)) / f64::from(all))
 }
