@@ -21,6 +21,16 @@ pub enum CutOutTarget {
     Exposed,
 }
 
+/// Which vehicles the criteria judge in a cut-out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutOutJudged {
+    /// Every other vehicle; the worst counts (the paper's words on criteria).
+    Every,
+    /// The vehicle ahead only: contacts with the cutting-out one and its TTC and BTN are ignored.
+    Ahead,
+}
+
 /// The frame around the models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +45,8 @@ pub struct FrameProfile {
     pub end_when_settled: bool,
     /// Whom the driver heeds in a cut-out.
     pub cut_out_target: CutOutTarget,
+    /// Whom the criteria judge in a cut-out.
+    pub cut_out_judged: CutOutJudged,
     /// Exposure threshold of `exposed`, m.
     pub exposure_m: f64,
     /// Length of vehicles without a size, m.

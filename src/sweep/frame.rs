@@ -237,7 +237,9 @@ fn see<R: Real>(
         half_lengths: other.half_lengths,
     };
     let present = other.used != 0 && index >= other.present_from && index < other.present_until;
-    let judged = present && criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral.position, ego.width);
+    let judged = present
+        && other.judged != 0
+        && criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral.position, ego.width);
     Seen { view, lateral: lateral.position, present, judged }
 }
 
@@ -266,7 +268,11 @@ fn check<R: Real, M: DriverModel<R>>(
 
 #[inline(always)]
 fn touches<R: Real>(seen: &Seen<R>, other: &LaneOther<R>) -> Contact {
-    if seen.present { contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap) } else { Contact::None }
+    if seen.present && other.judged != 0 {
+        contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
+    } else {
+        Contact::None
+    }
 }
 
 /// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.

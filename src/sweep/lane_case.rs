@@ -2,7 +2,7 @@
 //! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
 
 use crate::driver::{Attention, ModelId, Perception};
-use crate::profile::{CutOutTarget, Profile};
+use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
 
@@ -29,6 +29,8 @@ pub struct LaneOther<R> {
     pub attend_from: [u32; 4],
     /// 1 where the slot is used.
     pub used: u32,
+    /// 1 where the criteria judge it.
+    pub judged: u32,
 }
 
 /// What all lanes of one case share.
@@ -58,6 +60,9 @@ impl LaneCase<f64> {
             let offset = case.principal.length_m + ahead.gap_m;
             others[1] = encode_other(case, &ahead.vehicle, offset, dt_s, tables);
         }
+        if case.category == Category::CutOut && profile.frame.cut_out_judged == CutOutJudged::Ahead {
+            others[0].judged = 0;
+        }
         let series = Series::of(&others[0].motion, tables, profile.step_cap());
         if exposed {
             expose(case, profile, &series, &mut others, tables);
@@ -85,6 +90,7 @@ impl LaneCase<f64> {
                 present_until: o.present_until,
                 attend_from: o.attend_from,
                 used: o.used,
+                judged: o.judged,
             }),
             ego_speed: R::from_f64(self.ego_speed),
             ego_width: R::from_f64(self.ego_width),
@@ -110,6 +116,7 @@ fn encode_other(
         present_until: NEVER,
         attend_from: [0; 4],
         used: 1,
+        judged: 1,
     }
 }
 
