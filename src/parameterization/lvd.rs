@@ -47,3 +47,29 @@ pub(crate) fn sinusoidal_speed(v0: f64, v1: f64, duration_s: f64, t_s: f64) -> f
         v0 - (v0 - v1) / 2.0 * (1.0 - libm::cos(phase))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::sinusoidal_speed;
+
+    #[test]
+    fn the_sinusoidal_leader_equals_the_golden_one() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../tests/golden/lvd_sinusoidal.json")).unwrap();
+        let mut compared = 0;
+        for profile in golden["profiles"].as_array().unwrap() {
+            let number = |key: &str| profile[key].as_f64().unwrap();
+            let (v0, v1, duration_s) = (number("v0"), number("v0") - number("dv"), number("T"));
+            assert!((duration_s - number("dv") / number("amean")).abs() < 1e-9, "T = Δ/ā");
+            for row in profile["rows"].as_array().unwrap() {
+                let (t, v) = (row[0].as_f64().unwrap(), row[2].as_f64().unwrap());
+                let elapsed = (t - number("t_const")).max(0.0);
+                // The golden's times and values are rounded to six and ten decimals.
+                let ours = sinusoidal_speed(v0, v1, duration_s, elapsed);
+                assert!((ours - v).abs() < 1e-5, "v0 {v0}, t {t}: {ours} instead of {v}");
+                compared += 1;
+            }
+        }
+        assert_eq!(compared, 123);
+    }
+}
