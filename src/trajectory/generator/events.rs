@@ -25,7 +25,7 @@ const CROWDING: f64 = 1.85;
 const PROVOKED: f64 = 0.5;
 /// Scheduled hard brakings of one vehicle with a follower, 1/s, at rate factor 1. Calibrates the
 /// published 482 decelerations above 2 m/s² of 109,986 egos' leaders.
-const BRAKING_PER_S: f64 = 0.0031;
+const BRAKING_PER_S: f64 = 0.0012;
 /// A follower within this headway makes a vehicle a leader whose braking matters, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
 /// Slowest speed at which a braking is scheduled, m/s.

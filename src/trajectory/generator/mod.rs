@@ -17,7 +17,7 @@
 //! | `traffic` | correlated (Ornstein–Uhlenbeck) acceleration noise, lag, opening of the gap after a cut-in | noise sd 0.20–0.24 m/s², correlation 1.5 s |
 //! | `lane_change` | motives and gap acceptance | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
 //! | `lateral` | quintic lane changes with a mild asymmetry, wander in the lane | duration 2.9–7.3 s, profile close to a quintic |
-//! | `braking` | scheduled hard brakings of one or two phases with an exponential tail of peaks | 482 of 20,351 leader decelerations above 2 m/s² |
+//! | `braking` | scheduled hard brakings of one or two phases, two kinds of exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; order of the paper's LVD failure shares |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
 //! `tests/generator_calibration.rs` prints every one of these figures beside ours and fails where they
@@ -25,7 +25,7 @@
 //!
 //! # The rate factor
 //! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are as rare as published: two
-//! or three dozen kept ones of each category in 51 minutes of traffic. The default of 8 raises how *often*
+//! or three dozen kept ones of each category in 49 minutes of traffic. The default of 8 raises how *often*
 //! lane changes and hard brakings begin in view, so that each category has at least 150 kept scenarios in
 //! a second of computing. What an event is like is drawn the same way at any factor. Some consequences are
 //! inherent. Rates rise a little less than the factor says, because lane changes get in each other's way.

@@ -34,7 +34,7 @@ impl Default for GeneratorOptions {
         GeneratorOptions {
             seed: 20_240_901,
             recordings: 12,
-            duration_s: 255.0,
+            duration_s: 245.0,
             frame_rate_hz: 25.0,
             window_m: 420.0,
             flow_vehph: 3350.0,
