@@ -81,7 +81,7 @@ fn paper_size_scenarios() -> Vec<Scenario> {
 fn run(plan: &LanePlan, backend: &dyn Backend) -> Partial {
     let mut parts = Vec::new();
     sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
-        parts.push(Partial::of(plan, &chunk));
+        parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
     })
     .unwrap();

@@ -24,9 +24,11 @@ pub struct StudyReport {
 }
 
 impl StudyReport {
-    /// The tables for the terminal.
+    /// The tables for the terminal, 120 columns wide at most; only an unbroken word of the data's description
+    /// (a path) can be longer.
     pub fn text(&self) -> String {
-        let mut parts = vec![format!("{}\n", self.run.data)];
+        let data = tables::wrap(&self.run.data, tables::WIDTH);
+        let mut parts = vec![format!("{data}\n")];
         if self.published {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
@@ -34,7 +36,7 @@ impl StudyReport {
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published)));
         parts.push(tables::claims(&self.claims));
         if self.run.synthetic {
-            parts.push(format!("{}\nNo number above is a statement about real traffic.\n", self.run.data));
+            parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
         parts.join("\n")
     }

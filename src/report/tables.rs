@@ -2,17 +2,21 @@
 
 use std::fmt::Write;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use crate::criterion::Criterion;
 use crate::score::{
     CategoryScores, ClaimResult, ClaimRow, Interval, ScoreTable, f1, published_failures, published_lvd_f1,
 };
 
+/// Columns of a terminal that every table fits in.
+pub(super) const WIDTH: usize = 120;
+
+/// An empty table that breaks its cells rather than the terminal's lines.
 fn table(header: Vec<String>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(header);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH as u16).set_header(header);
     table
 }
 
@@ -82,15 +86,21 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
 
 fn value(value: Option<f64>, interval: Option<Interval>) -> String {
     match (value, interval) {
-        (Some(value), Some(interval)) => format!("{value:.3}\n[{:.2} {:.2}]", interval.low, interval.high),
+        (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
         (Some(value), None) => format!("{value:.3}"),
         (None, _) => "-".to_owned(),
     }
 }
 
+/// A number in 0…1 in three characters, so that seven variants fit beside each other: `.87`, `1.0`.
+fn short(value: f64) -> String {
+    let text = format!("{value:.2}");
+    text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
+}
+
 /// The paper's claims with their numbers and verdicts.
 pub fn claims(results: &[ClaimResult]) -> String {
-    let header = ["claim", "the paper says", "S fails", "difference", "interval", "verdict", "cells"];
+    let header = ["claim", "the paper says", "S fails", "difference\n[interval]", "verdict", "cells"];
     let mut table = table(header.map(str::to_owned).to_vec());
     for result in results {
         let row = &result.overall;
@@ -112,10 +122,9 @@ pub fn claims(results: &[ClaimResult]) -> String {
             result.claim.id.to_owned(),
             wrap(result.claim.statement, 34),
             row.failures.to_string(),
-            row.value.map_or("-".to_owned(), |v| format!("{v:+.3}")),
-            row.interval.map_or("-".to_owned(), |i| format!("{:+.2} {:+.2}", i.low, i.high)),
+            difference(row),
             row.verdict.text().to_owned(),
-            wrap(&verdicts.join(", "), 24),
+            verdicts.join("\n"),
         ]);
     }
     format!(
@@ -125,11 +134,20 @@ pub fn claims(results: &[ClaimResult]) -> String {
     )
 }
 
-fn wrap(text: &str, width: usize) -> String {
+fn difference(row: &ClaimRow) -> String {
+    let mut text = row.value.map_or("-".to_owned(), |v| format!("{v:+.3}"));
+    if let Some(Interval { low, high }) = row.interval {
+        let _ = write!(text, "\n[{low:+.2} {high:+.2}]");
+    }
+    text
+}
+
+/// The text broken between words; a longer word stays whole.
+pub(super) fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.len() - 1;
-        if !lines[last].is_empty() && lines[last].len() + 1 + word.len() > width {
+        if !lines[last].is_empty() && lines[last].chars().count() + 1 + word.chars().count() > width {
             lines.push(word.to_owned());
         } else {
             if !lines[last].is_empty() {
@@ -139,4 +157,20 @@ fn wrap(text: &str, width: usize) -> String {
         }
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_numbers_have_three_characters() {
+        assert_eq!([0.0, 0.8687, 0.9949, 0.9951, 1.0].map(short), [".00", ".87", ".99", "1.0", "1.0"]);
+    }
+
+    #[test]
+    fn text_breaks_between_words() {
+        assert_eq!(wrap("b and d are nearly the same", 11), "b and d are\nnearly the\nsame");
+        assert_eq!(wrap("/a/path/longer/than/the/line 2", 5), "/a/path/longer/than/the/line\n2");
+    }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
-use crate::Result;
+use crate::{Error, Result};
 
 /// How much of a lane comes back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,27 @@ pub struct Chunk {
     pub verdicts: Vec<Verdicts>,
     /// One per lane where outcomes were wanted, else empty. Values are exact widenings of the lane's own.
     pub outcomes: Vec<Outcome<f64>>,
+}
+
+impl Chunk {
+    /// Checks that it holds exactly the lanes of its units in this plan.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where it does not: its backend has a defect.
+    pub fn check(&self, plan: &LanePlan) -> Result<()> {
+        let first_lane = plan.first_lane_of(self.units.start);
+        let lanes = plan.first_lane_of(self.units.end).saturating_sub(first_lane) as usize;
+        let fits = self.units.start <= self.units.end
+            && self.units.end <= plan.unit_count()
+            && self.first_lane == first_lane
+            && self.verdicts.len() == lanes
+            && [0, lanes].contains(&self.outcomes.len());
+        if fits {
+            Ok(())
+        } else {
+            Err(Error::Internal(format!("a chunk of units {:?} does not fit its plan", self.units)))
+        }
+    }
 }
 
 /// A place where lanes are computed.

@@ -21,7 +21,7 @@ pub use drivers::Constants;
 pub use frame::{Frame, Observer, Seen, Silent, Simulation, Start, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
-pub use partial::{Confusion, Partial, UnitCounts};
+pub use partial::{Confusion, Partial, UnitCounts, WORST_LANES, WorstLane};
 pub(crate) use plan::hex;
 pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use run::{SweepSummary, chunks, sweep};

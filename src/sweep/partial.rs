@@ -1,4 +1,4 @@
-//! What remains of lanes: exact integer counts per unit. A chunk, a journal record and a shard's part are
+//! What remains of lanes: exact integer counts per unit, and the worst lanes by value. A chunk, a journal record and a shard's part are
 //! all partials; merging is associative and does not depend on the order.
 
 use std::ops::Range;
@@ -12,8 +12,13 @@ use super::plan::{LanePlan, hex};
 use crate::criterion::Criterion;
 use crate::{Error, Place, Result};
 
+/// Number of worst lanes that a partial keeps unless told otherwise.
+pub const WORST_LANES: usize = 20;
+
+/// What the serialized form calls itself.
+const FORMAT: &str = "lanesweep partial";
 /// Version of the serialized form.
-const VERSION: u32 = 1;
+const VERSION: u64 = 1;
 
 /// Agreement of S' with S over the headways of one unit, variant, model and criterion. For variant 0 (S
 /// against itself) `both` counts the failures of S and `neither` its passes.
@@ -60,53 +65,107 @@ pub struct UnitCounts {
     pub capped: Vec<u32>,
 }
 
-/// Counts of a set of units of one plan.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// A lane with its smallest time to collision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorstLane {
+    /// min TTC, s; infinite where the ego never closed in.
+    pub min_ttc_s: f64,
+    /// Lane index in the plan.
+    pub lane: u64,
+}
+
+/// Counts of a set of units of one plan, and the worst lanes of those whose values were computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Partial {
     plan_hash: String,
     /// Ascending by unit, each unit once.
     units: Vec<UnitCounts>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Envelope {
-    version: u32,
-    sha256: String,
-    partial: Partial,
+    worst_limit: usize,
+    /// Ascending by (value, lane), `worst_limit` at most.
+    worst: Vec<WorstLane>,
+    valued_lanes: u64,
 }
 
 impl Partial {
-    /// Nothing yet.
+    /// Nothing yet; keeps [`WORST_LANES`] worst lanes.
     pub fn empty(plan: &LanePlan) -> Partial {
-        Partial { plan_hash: plan.hash().to_owned(), units: Vec::new() }
+        Partial::empty_keeping(plan, WORST_LANES)
     }
 
-    /// Counts a chunk's lanes.
+    /// Nothing yet; keeps another number of worst lanes. Only partials that keep equally many can merge.
+    pub fn empty_keeping(plan: &LanePlan, worst_limit: usize) -> Partial {
+        Partial {
+            plan_hash: plan.hash().to_owned(),
+            units: Vec::new(),
+            worst_limit,
+            worst: Vec::new(),
+            valued_lanes: 0,
+        }
+    }
+
+    /// Counts the lanes of a chunk that [`Chunk::check`] has passed, as all from [`super::sweep`] have;
+    /// [`Partial::from_chunk`] is for any other.
+    ///
+    /// # Panics
+    /// Where the chunk is not of this plan.
     pub fn of(plan: &LanePlan, chunk: &Chunk) -> Partial {
-        let mut partial = Partial::empty(plan);
+        Partial::empty(plan).counting(plan, chunk)
+    }
+
+    /// Counts a chunk's lanes. Keeps its [`WORST_LANES`] worst lanes where it has outcomes.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the chunk does not fit the plan.
+    pub fn from_chunk(plan: &LanePlan, chunk: &Chunk) -> Result<Partial> {
+        Partial::from_chunk_keeping(plan, chunk, WORST_LANES)
+    }
+
+    /// [`Partial::from_chunk`] with another number of worst lanes.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the chunk does not fit the plan.
+    pub fn from_chunk_keeping(plan: &LanePlan, chunk: &Chunk, worst_limit: usize) -> Result<Partial> {
+        chunk.check(plan)?;
+        Ok(Partial::empty_keeping(plan, worst_limit).counting(plan, chunk))
+    }
+
+    /// An empty partial with the counts of a chunk.
+    fn counting(mut self, plan: &LanePlan, chunk: &Chunk) -> Partial {
         let mut at = 0;
         for (block, inside) in plan.segments(chunk.units.clone()) {
             let block = &plan.blocks[block];
             let per_unit = plan.lanes_per_unit(block) as usize;
             for unit in inside {
                 let lanes = &chunk.verdicts[at..at + per_unit];
-                partial.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
+                self.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
                 at += per_unit;
             }
         }
-        partial
+        let lanes = chunk.outcomes.iter().zip(chunk.first_lane..);
+        let lanes = lanes.map(|(outcome, lane)| WorstLane { min_ttc_s: outcome.min_ttc, lane }).collect();
+        self.worst = keep_worst(lanes, self.worst_limit);
+        self.valued_lanes = chunk.outcomes.len() as u64;
+        self
     }
 
-    /// Joins the counts of other units of the same plan.
+    /// Joins the counts of other units of the same plan: associative, and the same in any order.
     ///
     /// # Errors
-    /// If the plans differ, or a unit is in both.
+    /// If the plans differ, the two keep different numbers of worst lanes, or a unit is in both.
     pub fn merge(self, other: Partial) -> Result<Partial> {
         if self.plan_hash != other.plan_hash {
             return Err(Error::input(
                 Place::item("partial result"),
                 format!("it belongs to plan {}, not to {}", other.plan_hash, self.plan_hash),
                 "merge only parts of the same study",
+            ));
+        }
+        if self.worst_limit != other.worst_limit {
+            return Err(Error::input(
+                Place::item("partial result"),
+                format!("it keeps {} worst lanes, the other {}", other.worst_limit, self.worst_limit),
+                "make all parts with the same number of worst lanes",
             ));
         }
         let mut units = self.units;
@@ -119,7 +178,15 @@ impl Partial {
                 "merge every part once",
             ));
         }
-        Ok(Partial { plan_hash: self.plan_hash, units })
+        let mut worst = self.worst;
+        worst.extend(other.worst);
+        Ok(Partial {
+            plan_hash: self.plan_hash,
+            units,
+            worst_limit: self.worst_limit,
+            worst: keep_worst(worst, self.worst_limit),
+            valued_lanes: self.valued_lanes + other.valued_lanes,
+        })
     }
 
     /// Hash of the plan that these counts belong to.
@@ -130,6 +197,17 @@ impl Partial {
     /// The counts, ascending by unit.
     pub fn units(&self) -> &[UnitCounts] {
         &self.units
+    }
+
+    /// The lanes with the smallest min TTC, ascending; ties by lane. Only lanes whose values were computed
+    /// compete ([`Partial::valued_lanes`]).
+    pub fn worst(&self) -> &[WorstLane] {
+        &self.worst
+    }
+
+    /// Number of lanes whose values were computed, not their verdicts alone.
+    pub fn valued_lanes(&self) -> u64 {
+        self.valued_lanes
     }
 
     /// The covered units as disjoint intervals, ascending.
@@ -151,8 +229,12 @@ impl Partial {
 
     /// As JSON with version and checksum.
     pub fn to_json(&self) -> Result<String> {
-        let envelope = Envelope { version: VERSION, sha256: self.checksum()?, partial: self.clone() };
-        serde_json::to_string(&envelope).map_err(|e| Error::Internal(format!("a partial cannot be written: {e}")))
+        let unwritable = |e: serde_json::Error| Error::Internal(format!("a partial cannot be written: {e}"));
+        let content = serde_json::to_value(self).map_err(unwritable)?;
+        let sealed = serde_json::json!({
+            "format": FORMAT, "version": VERSION, "sha256": self.checksum()?, "partial": content,
+        });
+        serde_json::to_string(&sealed).map_err(unwritable)
     }
 
     /// From JSON; `place` names the file in errors.
@@ -160,16 +242,27 @@ impl Partial {
     /// # Errors
     /// If it is no partial, of another version, or damaged.
     pub fn from_json(text: &str, place: Place) -> Result<Partial> {
-        let damaged = |problem: String| Error::input(place.clone(), problem, "delete it and compute this part again");
-        let envelope: Envelope =
-            serde_json::from_str(text).map_err(|e| damaged(format!("this is no partial result: {e}")))?;
-        if envelope.version != VERSION {
-            return Err(damaged(format!("version {} of a partial result, expected {VERSION}", envelope.version)));
+        let error = |problem: String, help: &str| Error::input(place.clone(), problem, help);
+        let damaged = "delete it and compute this part again";
+        let mut sealed: serde_json::Value =
+            serde_json::from_str(text).map_err(|e| error(format!("this is no complete JSON: {e}"), damaged))?;
+        if sealed.get("format").and_then(|f| f.as_str()) != Some(FORMAT) {
+            let problem = format!("this is no partial result: its `format` is not `{FORMAT}`");
+            return Err(error(problem, "give a file that lanesweep wrote as a partial result"));
         }
-        if envelope.partial.checksum()? != envelope.sha256 {
-            return Err(damaged("the checksum does not fit: the file is damaged".to_owned()));
+        let version = sealed.get("version").and_then(|v| v.as_u64());
+        if version != Some(VERSION) {
+            let found = version.map_or("missing".to_owned(), |v| v.to_string());
+            let problem = format!("its version is {found}; this program reads version {VERSION}");
+            return Err(error(problem, "compute this part again with this version of lanesweep"));
         }
-        Ok(envelope.partial)
+        let content = sealed.get_mut("partial").map(serde_json::Value::take).unwrap_or_default();
+        let partial: Partial =
+            serde_json::from_value(content).map_err(|e| error(format!("its content is damaged: {e}"), damaged))?;
+        if sealed.get("sha256").and_then(|s| s.as_str()) != Some(partial.checksum()?.as_str()) {
+            return Err(error("the checksum does not fit: the file is damaged".to_owned(), damaged));
+        }
+        Ok(partial)
     }
 
     fn checksum(&self) -> Result<String> {
@@ -201,4 +294,30 @@ fn count_unit(plan: &LanePlan, unit: u64, variants: usize, lanes: &[Verdicts]) -
         }
     }
     counts
+}
+
+/// The smallest of them, ascending by (value, lane): a total order, so that what is kept depends on the set
+/// alone.
+fn keep_worst(mut lanes: Vec<WorstLane>, limit: usize) -> Vec<WorstLane> {
+    let order = |a: &WorstLane, b: &WorstLane| a.min_ttc_s.total_cmp(&b.min_ttc_s).then(a.lane.cmp(&b.lane));
+    if lanes.len() > limit && limit > 0 {
+        lanes.select_nth_unstable_by(limit - 1, order);
+    }
+    lanes.truncate(limit);
+    lanes.sort_unstable_by(order);
+    lanes
+}
+
+// JSON has no infinity: it is written as null.
+impl Serialize for WorstLane {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        (self.min_ttc_s.is_finite().then_some(self.min_ttc_s), self.lane).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for WorstLane {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let (min_ttc_s, lane) = <(Option<f64>, u64)>::deserialize(deserializer)?;
+        Ok(WorstLane { min_ttc_s: min_ttc_s.unwrap_or(f64::INFINITY), lane })
+    }
 }

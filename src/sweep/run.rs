@@ -31,13 +31,16 @@ pub fn sweep(
     let mut session = backend.prepare(plan)?;
     let mut summary = SweepSummary::default();
     for range in chunks(plan, units) {
-        let chunk = match (session.run(range.clone(), wanted), fallback) {
+        let computed = session.run(range.clone(), wanted).and_then(|chunk| chunk.check(plan).map(|()| chunk));
+        let chunk = match (computed, fallback) {
             (Ok(chunk), _) => chunk,
             (Err(error), Some(fallback)) => {
                 let name = backend.describe();
                 tracing::warn!("{name} could not compute units {range:?} ({error}); {} does", fallback.describe());
                 summary.redone_chunks += 1;
-                fallback.prepare(plan)?.run(range, wanted)?
+                let chunk = fallback.prepare(plan)?.run(range, wanted)?;
+                chunk.check(plan)?;
+                chunk
             }
             (Err(error), None) => return Err(error),
         };

@@ -1,0 +1,137 @@
+//! What the score says about chosen verdicts, and that threads and chunks do not change a bit of it.
+
+mod common;
+#[path = "common/plans.rs"]
+mod plans;
+
+use lanesweep::criterion::Criterion;
+use lanesweep::driver::ModelId;
+use lanesweep::scenario::Category;
+use lanesweep::score::{ScoreOptions, ScoreTable, f1, judge_claims, precision, recall, score};
+use lanesweep::sweep::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
+use plans::{chunk, mixed, plan};
+
+const LVD: &[&str] = &["i", "ii", "iii", "iv", "v"];
+
+fn part(plan: &LanePlan, units: std::ops::Range<u64>, lane: &dyn Fn(u64) -> Verdicts) -> Partial {
+    Partial::from_chunk(plan, &chunk(plan, units, &|l| (lane(l), 1.0), false)).unwrap()
+}
+
+fn table(plan: &LanePlan, lane: &dyn Fn(u64) -> Verdicts) -> ScoreTable {
+    score(plan, &part(plan, 0..plan.unit_count(), lane), &ScoreOptions::default()).unwrap()
+}
+
+/// S fails at random; each variant repeats S but for a share (per mille) of lanes, where it is turned round.
+fn noisy<'p>(plan: &'p LanePlan, wrong: &'p [u64]) -> impl Fn(u64) -> Verdicts + 'p {
+    move |lane| {
+        let key = plan.key(lane).unwrap();
+        let recorded = plan.lane(&LaneKey { variant: 0, ..key });
+        let fails = mixed(5, recorded) % 10 < 3;
+        let turned = key.variant > 0 && mixed(7, lane) % 1000 < wrong[key.variant - 1];
+        Verdicts(if fails != turned { 0b111 } else { 0 })
+    }
+}
+
+#[test]
+fn a_study_that_never_fails_has_no_score() {
+    let plan = plan(&[(Category::Lvd, 3, LVD)]);
+    let table = table(&plan, &|_| Verdicts(0));
+    let scores = &table.categories[0];
+    for cell in &scores.cells {
+        let values = (recall(&cell.counts), precision(&cell.counts), f1(&cell.counts));
+        assert_eq!(values, (None, None, None));
+        assert_eq!((cell.f1_interval, cell.undefined_draws, cell.counts.neither), (None, 1000, 30));
+    }
+}
+
+#[test]
+fn a_failure_in_one_of_four_scenarios_is_undefined_in_about_a_third_of_the_draws() {
+    let plan = plan(&[(Category::Lvd, 4, LVD)]);
+    let table = table(&plan, &|lane| Verdicts(u8::from(plan.key(lane).unwrap().unit == 2)));
+    let scores = &table.categories[0];
+    let cell = &scores.cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()];
+    // (3/4)^4 = 0.316 of the draws miss it; sigma = 15 draws.
+    assert!((250..390).contains(&cell.undefined_draws), "{}", cell.undefined_draws);
+    let interval = cell.f1_interval.unwrap();
+    assert_eq!((f1(&cell.counts), interval.low, interval.high), (Some(1.0), 1.0, 1.0));
+}
+
+#[test]
+fn the_interval_covers_the_value_and_shrinks_with_the_number_of_scenarios() {
+    let width = |units| {
+        let plan = plan(&[(Category::Lvd, units, LVD)]);
+        let table = table(&plan, &noisy(&plan, &[100, 100, 100, 100, 100]));
+        let scores = &table.categories[0];
+        let cell = &scores.cells[scores.index(2, ModelId::Rss, Criterion::Btn).unwrap()];
+        let (value, interval) = (f1(&cell.counts).unwrap(), cell.f1_interval.unwrap());
+        assert!(interval.low < value && value < interval.high, "{value} {interval:?}");
+        interval.high - interval.low
+    };
+    let (few, many) = (width(10), width(90));
+    assert!(many < 0.6 * few, "{few} to {many}");
+}
+
+#[test]
+fn equal_variants_have_equal_counts_in_every_draw() {
+    // iii, iv and v repeat each other's lanes: differences of their scores are paired and exactly 0.
+    let plan = plan(&[(Category::Lvd, 30, LVD)]);
+    let twins = |lane: u64| {
+        let key = plan.key(lane).unwrap();
+        let variant = key.variant.min(3);
+        noisy(&plan, &[400, 400, 50, 50, 50])(plan.lane(&LaneKey { variant, ..key }))
+    };
+    let table = table(&plan, &twins);
+    let scores = &table.categories[0];
+    let at = |variant| scores.index(variant, ModelId::Rss, Criterion::Ttc).unwrap();
+    assert!(scores.draws.iter().all(|draw| draw[at(3)] == draw[at(4)] && draw[at(4)] == draw[at(5)]));
+    assert!(scores.draws.iter().any(|draw| draw[at(2)] != draw[at(3)]));
+}
+
+#[test]
+fn threads_and_chunks_do_not_change_a_bit() {
+    let plan = plan(&[(Category::CutIn, 20, &["1", "2"]), (Category::Lvd, 15, LVD)]);
+    let lane = noisy(&plan, &[100, 200, 300, 50, 10]);
+    let whole = part(&plan, 0..35, &lane);
+    let parts = part(&plan, 21..35, &lane).merge(part(&plan, 0..3, &lane)).unwrap();
+    let parts = parts.merge(part(&plan, 3..21, &lane)).unwrap();
+    assert_eq!(whole, parts);
+    let with_threads = |threads: usize, partial: &Partial| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| score(&plan, partial, &ScoreOptions::default()).unwrap())
+    };
+    let (one, two) = (with_threads(1, &whole), with_threads(2, &parts));
+    assert_eq!(one, two);
+    assert_eq!(format!("{:?}", judge_claims(&one)), format!("{:?}", judge_claims(&two)));
+    let other_seed = score(&plan, &whole, &ScoreOptions { seed: 1, ..ScoreOptions::default() }).unwrap();
+    assert_ne!(one.categories, other_seed.categories, "the seed decides the draws");
+}
+
+#[test]
+fn an_incomplete_or_foreign_sweep_is_not_scored() {
+    let plan = plan(&[(Category::Lvd, 6, LVD)]);
+    let some = part(&plan, 2..4, &|_| Verdicts(0));
+    let error = score(&plan, &some, &ScoreOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("2 of 6 units"), "{error}");
+    let whole = part(&plan, 0..6, &|_| Verdicts(0));
+    let other = plans::plan(&[(Category::Lvd, 6, &["i"])]);
+    assert!(score(&other, &whole, &ScoreOptions::default()).is_err(), "as many units, but of another plan");
+}
+
+#[test]
+fn the_papers_lvd_f1_follow_from_their_integer_counts() {
+    let golden = std::fs::read_to_string(common::golden("paper_lvd_f1.json")).unwrap();
+    let golden: serde_json::Value = serde_json::from_str(&golden).unwrap();
+    let mut checked = 0;
+    for cell in golden["lvd"].as_object().unwrap().values().flat_map(|v| v.as_object().unwrap()) {
+        let (name, cell) = cell;
+        let expected = cell["F1"].as_f64().unwrap();
+        for candidate in cell["TP_FN_FP_candidates"].as_array().unwrap() {
+            let [both, only_s, only_s_prime] = [0, 1, 2].map(|k| candidate[k].as_u64().unwrap() as u32);
+            let ours = Confusion { both, only_s, only_s_prime, neither: 4820 - both - only_s - only_s_prime };
+            assert_eq!(u64::from(both + only_s), cell["baseline_fails"].as_u64().unwrap(), "{name}");
+            assert!((f1(&ours).unwrap() - expected).abs() < 1e-9, "{name}: {:?} {expected}", f1(&ours));
+            checked += 1;
+        }
+    }
+    assert!(checked >= 60, "{checked}");
+}
