@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A file being written; dropped before [`AtomicFile::stage`], it leaves nothing behind.
 pub(crate) struct AtomicFile {
@@ -28,6 +28,7 @@ impl AtomicFile {
     /// # Errors
     /// If the folder cannot be written to.
     pub(crate) fn create(target: &Path) -> Result<Self> {
+        let target = &resolve(target)?;
         let folder = match target.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
@@ -36,7 +37,10 @@ impl AtomicFile {
         builder.prefix(".lanesweep-").suffix(".part");
         // A temporary file is private by default; a result is as readable as any other new file.
         #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.permissions(match std::fs::metadata(target) {
+            Ok(existing) => existing.permissions(),
+            Err(_) => std::os::unix::fs::PermissionsExt::from_mode(0o666),
+        });
         let file = builder.tempfile_in(folder).map_err(|source| Error::io(target, "write", source))?;
         Ok(AtomicFile { target: target.to_path_buf(), writer: BufWriter::with_capacity(1 << 16, file) })
     }
@@ -60,6 +64,21 @@ impl AtomicFile {
         file.as_file().sync_all().map_err(failed)?;
         Ok(StagedFile { target, file })
     }
+}
+
+/// Where the file really goes: a link is followed; what is neither a file nor free is refused, because the
+/// rename would put a file in its place.
+fn resolve(target: &Path) -> Result<PathBuf> {
+    let Ok(kind) = std::fs::metadata(target) else { return Ok(target.to_path_buf()) };
+    if !kind.is_file() {
+        let what = if kind.is_dir() { "a folder" } else { "a device or pipe" };
+        return Err(Error::usage(
+            Place::file(target),
+            format!("this is {what}, and a result is written to a file of its own"),
+            "give the path of a file",
+        ));
+    }
+    std::fs::canonicalize(target).map_err(|source| Error::io(target, "write", source))
 }
 
 impl Write for AtomicFile {
@@ -105,6 +124,22 @@ mod tests {
         file.stage().unwrap().publish().unwrap();
         assert_eq!(fs::read_to_string(&target).unwrap(), "new");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing else is left in the folder");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed_and_what_is_no_file_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let (file, link) = (dir.path().join("file"), dir.path().join("link"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        let mut written = AtomicFile::create(&link).unwrap();
+        written.append(b"new").unwrap();
+        written.stage().unwrap().publish().unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().file_type().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        let error = AtomicFile::create(dir.path()).err().unwrap();
+        assert!(error.to_string().contains("this is a folder"), "{error}");
     }
 
     #[test]

@@ -135,6 +135,11 @@ impl Error {
                 std::io::ErrorKind::PermissionDenied => {
                     format!("you have no permission to {action} here: change the permissions or choose another path")
                 }
+                std::io::ErrorKind::InvalidData => "save the file as UTF-8 text".to_owned(),
+                std::io::ErrorKind::IsADirectory => "this is a folder; give the path of a file".to_owned(),
+                std::io::ErrorKind::NotADirectory | std::io::ErrorKind::AlreadyExists => {
+                    "a file is where a folder is needed: choose another path".to_owned()
+                }
                 std::io::ErrorKind::StorageFull => "the disk is full: free some space and run again".to_owned(),
                 _ => "check that the disk is present and has space, then run again".to_owned(),
             }),

@@ -71,7 +71,7 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_study() {
     let numbers = |dir: &Path, file: &str| read(dir, file).replace(",synthetic\n", ",recorded\n");
     for file in ["failures.csv", "f1.csv", "claims.csv"] {
         assert!(numbers(&a, file) == numbers(&b, file), "{file}: generated against written");
-        assert!(read(&b, file) == read(&c, file), "{file}: recordings against scenario file");
+        assert!(numbers(&b, file) == numbers(&c, file), "{file}: recordings against scenario file");
     }
     let hash = |dir: &Path| {
         let record: serde_json::Value = serde_json::from_str(&read(dir, "run.json")).unwrap();

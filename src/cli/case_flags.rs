@@ -12,7 +12,7 @@ use crate::sweep::Headway;
 use crate::{Error, Place, Result};
 
 /// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
-#[derive(Debug, Clone, Default, Deserialize, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Args)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
@@ -181,20 +181,26 @@ fn needed<'a, T>(value: Option<&'a T>, key: &str, what: &str) -> Result<&'a T> {
     })
 }
 
+/// Beyond this no speed, length or acceleration is physical.
+const LARGEST: f64 = 1e6;
+
 fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
-    if value.is_finite() && value >= least {
+    if value.abs() <= LARGEST && value >= least {
         return Ok(value);
     }
-    let expected =
-        if least.is_finite() { format!("a finite number of at least {least}") } else { "a finite number".into() };
+    let expected = if least.is_finite() {
+        format!("a number of at least {least} and at most 1e6")
+    } else {
+        "a number between -1e6 and 1e6".into()
+    };
     Err(Error::usage(Place::item(key), format!("{value} cannot be used"), format!("give {expected}")))
 }
 
 fn above_zero(value: f64, key: &str) -> Result<f64> {
-    if value.is_finite() && value > 0.0 {
+    if value > 0.0 && value <= LARGEST {
         return Ok(value);
     }
-    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), "give a finite number above 0"))
+    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), "give a number above 0 and at most 1e6"))
 }
 
 /// The flags that a TOML file holds.

@@ -33,6 +33,9 @@ pub struct Mine {
 
 impl Mine {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        if let Some(path) = &self.output {
+            source::refuse_recording(path, &self.dir, "--output")?;
+        }
         let options = source::mining_options(self.mining.as_deref())?;
         let mut collection = Source::Folder(self.dir.clone()).load(&options, verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));

@@ -94,6 +94,9 @@ impl ProfileFlags {
     }
 }
 
+/// More threads than any machine has cores.
+const MOST_THREADS: usize = 4096;
+
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -124,8 +127,10 @@ pub fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> Result<Exit> {
     if let Some(threads) = cli.common.threads {
-        if threads == 0 {
-            return Err(Error::usage(Place::item("--threads"), "0 threads cannot work", "use at least 1"));
+        if threads == 0 || threads > MOST_THREADS {
+            let problem = format!("{threads} threads cannot work");
+            let help = format!("use at least 1 and at most {MOST_THREADS}; more than there are cores serve nothing");
+            return Err(Error::usage(Place::item("--threads"), problem, help));
         }
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)

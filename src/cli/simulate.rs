@@ -51,6 +51,13 @@ impl Simulate {
     pub fn run(&self) -> Result<Exit> {
         let profile = self.profile.load()?;
         let (text, summary) = match (&self.scenarios, &self.lane) {
+            (Some(_), Some(_)) if self.case != CaseFlags::default() => {
+                return Err(Error::usage(
+                    Place::item("--lane"),
+                    "the lane is a whole case: the other flags would not be heeded",
+                    "leave the case's flags out, or --scenarios and --lane",
+                ));
+            }
             (Some(scenarios), Some(lane)) => run_lane_of_study(&profile, scenarios, lane)?,
             _ => {
                 let flags = self.flags()?;

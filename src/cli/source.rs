@@ -7,7 +7,7 @@ use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generate
 use crate::scenario::{Category, Scenario, read_scenarios};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::trajectory::highd;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// What the scenarios of a run are.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +24,10 @@ impl Source {
     /// Where the scenarios are from, in one line.
     pub fn describe(&self) -> String {
         match self {
-            Source::Folder(dir) => format!("recordings in {}", dir.display()),
+            Source::Folder(dir) => match synthetic_marker(dir) {
+                Some(sentence) => sentence,
+                None => format!("recordings in {}", dir.display()),
+            },
             Source::Scenarios(path) => format!("scenarios of {}", path.display()),
             Source::Generated(options) => format!(
                 "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates {} times those of highD",
@@ -35,7 +38,11 @@ impl Source {
 
     /// Made by the program: no statement about real traffic.
     pub fn is_synthetic(&self) -> bool {
-        matches!(self, Source::Generated(_))
+        match self {
+            Source::Generated(_) => true,
+            Source::Folder(dir) => synthetic_marker(dir).is_some(),
+            Source::Scenarios(_) => false,
+        }
     }
 
     /// Reads or generates, and mines.
@@ -87,8 +94,45 @@ pub fn mining_options(path: Option<&Path>) -> Result<MiningOptions> {
 pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
     toml::from_str(&text).map_err(|e| {
-        let mut place = crate::Place::file(path);
+        let mut place = Place::file(path);
         place.row = e.span().map(|span| 1 + text[..span.start].matches('\n').count() as u64);
         Error::usage(place, e.message().to_owned(), "the keys and their defaults are in the folder `configs`")
     })
+}
+
+/// File that `synth` leaves beside its recordings, so that a study on them says what they are.
+pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
+
+fn synthetic_marker(dir: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(dir.join(SYNTHETIC_MARKER)).ok()?;
+    text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
+}
+
+/// An output must not be one of these files.
+pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
+    // Where a file does not exist yet, its folder still tells.
+    let place_of = |path: &Path| {
+        path.canonicalize().ok().or_else(|| {
+            let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(parent.canonicalize().ok()?.join(path.file_name()?))
+        })
+    };
+    let place_of = |path: &Path| place_of(path).unwrap_or_else(|| path.to_path_buf());
+    match others.iter().find(|other| place_of(other) == place_of(output)) {
+        Some(other) => Err(Error::usage(
+            Place::item(flag),
+            format!("{} would be overwritten: this run reads or writes it", other.display()),
+            "choose another path",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// An output must not be one of a folder's recordings.
+pub fn refuse_recording(output: &Path, dir: &Path, flag: &str) -> Result<()> {
+    // A folder that cannot be listed is the reader's complaint.
+    let Ok(inventory) = highd::inventory(dir) else { return Ok(()) };
+    let files: Vec<PathBuf> =
+        inventory.recordings.into_iter().flat_map(|r| [r.tracks, r.tracks_meta, r.recording_meta]).collect();
+    refuse_overwriting(output, &files, flag)
 }

@@ -13,7 +13,7 @@ use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::ParameterizationOptions;
-use crate::report::files::{make_folder, write_atomically};
+use crate::report::files::make_folder;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
@@ -102,15 +102,18 @@ impl Study {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()),
+            (None, None) => Source::Generated(self.generator.options()?),
         };
+        self.guard_inputs()?;
         tracing::info!("{}", source.describe());
 
         let mut timings = Timings::default();
         let collection = timed(&mut timings.mine_s, || source.load(&config.mining, verbosity))?;
         tracing::info!("{}", source::counts(&collection.scenarios));
         let planned = timed(&mut timings.plan_s, || plan_study(&collection.scenarios, &profile, &options))?;
-        planned.left_out.iter().for_each(console::complain);
+        for left_out in &planned.left_out {
+            tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
+        }
         if planned.plan.unit_count() == 0 {
             return Err(Error::input(
                 Place::item(source.describe()),
@@ -118,6 +121,8 @@ impl Study {
                 "use more recordings, or relax the filters in the study file (--config)",
             ));
         }
+        // Before the work, so that a folder that cannot be written to is known at once.
+        make_folder(&self.out)?;
         let backend: Box<dyn Backend> =
             if self.reference { Box::new(CpuBackend::reference()) } else { Box::new(CpuBackend::lane_arithmetic()) };
         tracing::info!("{} lanes on {}", planned.plan.lane_count(), backend.describe());
@@ -147,15 +152,22 @@ impl Study {
             score: config.score,
             timings,
         };
-        let report = StudyReport { scores, claims, run, published: self.published };
+        let report = StudyReport { scores, claims, run, published: self.published, comparison };
         let written = report.write(&self.out)?;
         console::print(&report.text())?;
-        if let Some(comparison) = comparison {
-            write_atomically(&self.out.join("reference.csv"), comparison.csv().as_bytes())?;
-            console::print(&format!("\n{}", comparison.text()))?;
-        }
         tracing::info!("{} files written to {}", written.len(), self.out.display());
         Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
+    }
+
+    /// The lane table must replace neither an input nor another result.
+    fn guard_inputs(&self) -> Result<()> {
+        let Some(lanes) = &self.lanes else { return Ok(()) };
+        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
+        let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).to_vec();
+        others.extend(self.scenarios.clone());
+        others.extend(self.config.clone());
+        source::refuse_overwriting(lanes, &others, "--lanes")?;
+        self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--lanes"))
     }
 
     fn categories(&self) -> Result<Vec<Category>> {
@@ -187,7 +199,7 @@ fn run_plan(plan: &LanePlan, backend: &dyn Backend, verbosity: Verbosity) -> Res
     let mut parts = Vec::new();
     sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
-        parts.push(Partial::of(plan, &chunk));
+        parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
     })?;
     bar.finish_and_clear();

@@ -6,9 +6,11 @@ use clap::Args;
 
 use super::Exit;
 use super::console::{self, Verbosity};
-use crate::Result;
+use super::source::{SYNTHETIC_MARKER, Source};
+use crate::report::files::{make_folder, write_atomically};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::trajectory::highd::{self, RecordingInfo};
+use crate::trajectory::highd::{self, HighdFiles, RecordingInfo};
+use crate::{Error, Place, Result};
 
 /// Flags of the generator.
 #[derive(Debug, Clone, Args)]
@@ -25,13 +27,15 @@ pub struct GeneratorFlags {
 }
 
 impl GeneratorFlags {
-    pub fn options(&self) -> GeneratorOptions {
-        GeneratorOptions {
+    pub fn options(&self) -> Result<GeneratorOptions> {
+        let options = GeneratorOptions {
             seed: self.synth_seed,
             recordings: self.synth_recordings,
             duration_s: self.synth_duration,
             ..GeneratorOptions::default()
-        }
+        };
+        options.validate()?;
+        Ok(options)
     }
 }
 
@@ -50,8 +54,19 @@ pub struct Synth {
 
 impl Synth {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
-        let options = self.generator.options();
-        options.validate()?;
+        let options = self.generator.options()?;
+        let taken = |id: &str| HighdFiles::named(&self.dir, id).tracks.exists();
+        if let Some(id) = (1..=options.recordings).map(|k| format!("{k:02}")).find(|id| taken(id)) {
+            return Err(Error::usage(
+                Place::file(&self.dir),
+                format!("it already holds a recording `{id}`, which would be overwritten"),
+                "choose an empty folder",
+            ));
+        }
+        make_folder(&self.dir)?;
+        let sentence = Source::Generated(options.clone()).describe();
+        let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
+        write_atomically(&self.dir.join(SYNTHETIC_MARKER), marker.as_bytes())?;
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
         for index in 0..options.recordings {
             let recording = generate_one(&options, index)?;

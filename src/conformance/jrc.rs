@@ -104,10 +104,10 @@ impl Replay {
 
     fn cut_in(row: &Row, mut profile: Profile, model: ModelId) -> Result<Replay> {
         let dt = profile.frame.dt_s;
-        let (v_ego, v_other) = (row.number("ego_kmh")? / 3.6, row.number("cutin_kmh")? / 3.6);
-        let v_lateral = row.number("vlat")?;
+        let (v_ego, v_other) = (row.not_negative("ego_kmh")? / 3.6, row.not_negative("cutin_kmh")? / 3.6);
+        let v_lateral = row.not_negative("vlat")?;
         let run_up = row.number("n_prepended")?;
-        if !(0.0..=1e4).contains(&run_up) {
+        if !(0.0..=1e4).contains(&run_up) || run_up.fract() != 0.0 {
             return Err(Error::input(row.place("n_prepended"), format!("{run_up}"), "expected 0 or a small count"));
         }
         let run_up = run_up as u32;
@@ -133,9 +133,9 @@ impl Replay {
     }
 
     fn lvd(row: &Row, profile: Profile, model: ModelId) -> Result<Replay> {
-        let v0 = row.number("v0_kmh")? / 3.6;
+        let v0 = row.not_negative("v0_kmh")? / 3.6;
         let v1 = (row.number("v1_kmh")? / 3.6).max(0.0);
-        let deceleration = row.number("lead_dec")?;
+        let deceleration = row.not_negative("lead_dec")?;
         let until_s = if deceleration > 0.0 { (v0 - v1).max(0.0) / deceleration } else { 0.0 };
         let speed = Speed::Kinematic { initial_mps: v0, acceleration_mps2: -deceleration, until_s };
         let case = Case {
@@ -152,8 +152,8 @@ impl Replay {
 
     fn cut_out(row: &Row, profile: Profile, model: ModelId) -> Result<Replay> {
         let dt = profile.frame.dt_s;
-        let v0 = row.number("v0_kmh")? / 3.6;
-        let front_length_m = row.number("front_length")?;
+        let v0 = row.not_negative("v0_kmh")? / 3.6;
+        let front_length_m = row.not_negative("front_length")?;
         let case = Case {
             category: Category::CutOut,
             ego_length_m: LENGTH_M,
@@ -163,13 +163,13 @@ impl Replay {
                 length_m: LENGTH_M,
                 width_m: WIDTH_M,
                 speed: Speed::constant(v0),
-                lateral: cut_out_lateral(row.number("vlat")?, dt),
+                lateral: cut_out_lateral(row.not_negative("vlat")?, dt),
             },
             ahead: Some(Ahead {
                 vehicle: Participant {
                     length_m: front_length_m,
                     width_m: WIDTH_M,
-                    speed: Speed::constant(row.number("vfront_kmh")? / 3.6),
+                    speed: Speed::constant(row.not_negative("vfront_kmh")? / 3.6),
                     lateral: Lateral::Centred,
                 },
                 // The table measures with two nominal lengths.

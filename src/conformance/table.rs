@@ -103,10 +103,22 @@ impl<'a> Row<'a> {
         Ok(self.table.rows[self.index].get(*index).unwrap_or(""))
     }
 
-    /// A number that must be there.
+    /// A finite number that must be there.
     pub fn number(&self, column: &str) -> Result<f64> {
-        self.optional(column)?
-            .ok_or_else(|| Error::input(self.place(column), "the field is empty", "expected a number"))
+        match self.optional(column)? {
+            Some(value) if value.is_finite() => Ok(value),
+            Some(value) => Err(Error::input(self.place(column), format!("{value}"), "expected a finite number")),
+            None => Err(Error::input(self.place(column), "the field is empty", "expected a number")),
+        }
+    }
+
+    /// A number of at least 0: a speed, a length, a deceleration.
+    pub fn not_negative(&self, column: &str) -> Result<f64> {
+        let value = self.number(column)?;
+        if (0.0..=1e6).contains(&value) {
+            return Ok(value);
+        }
+        Err(Error::input(self.place(column), format!("{value}"), "expected a number of at least 0 and at most 1e6"))
     }
 
     /// A number, `None` where the field is empty (the event did not happen).

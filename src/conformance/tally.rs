@@ -104,7 +104,8 @@ impl Tally {
                 entry.place = place();
             }
             if deviation > TOLERANCE {
-                self.complain(format!("{}: {quantity} is {ours:?}, the table has {theirs:?}", place()));
+                let shown = |v: Option<f64>| v.map_or("nothing".to_owned(), |v| v.to_string());
+                self.complain(format!("{}: {quantity} is {}, the table has {}", place(), shown(ours), shown(theirs)));
             }
         }
         deviation <= TOLERANCE

@@ -40,7 +40,10 @@ pub fn fit_svd(
         return Err(Error::input(
             place(),
             format!("{n} scenarios are too few for a decomposition with {needed} parameters"),
-            format!("at least {} are needed: use more data, or leave these parameterizations out", needed + 1),
+            format!(
+                "at least {} are needed: use more data; the kinematic parameterizations are run all the same",
+                needed + 1
+            ),
         ));
     }
     let p = rows[0].len();

@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::files::{make_folder, write_atomically};
 use super::radar::{RadarChart, RadarSeries, radar_svg};
+use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
 use super::{csv, tables};
-use crate::Result;
 use crate::criterion::Criterion;
 use crate::parameterization::ParameterizationId;
+use crate::scenario::Category;
 use crate::score::{CategoryScores, ClaimResult, ScoreTable, f1};
+use crate::{Error, Result};
 
 /// Everything a study says.
 pub struct StudyReport {
@@ -21,6 +23,8 @@ pub struct StudyReport {
     pub run: RunRecord,
     /// Set the paper's published numbers beside.
     pub published: bool,
+    /// f32 against f64, where it was asked for.
+    pub comparison: Option<ReferenceComparison>,
 }
 
 impl StudyReport {
@@ -35,6 +39,7 @@ impl StudyReport {
         parts.push(tables::failures(&self.scores, self.published));
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published)));
         parts.push(tables::claims(&self.claims));
+        parts.extend(self.comparison.iter().map(ReferenceComparison::text));
         if self.run.synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
@@ -57,6 +62,10 @@ impl StudyReport {
             files.push((dir.join(name), radar_svg(&self.radar(category)).into_bytes()));
         }
         files.push((dir.join("run.json"), self.run.to_json()?));
+        if let Some(comparison) = &self.comparison {
+            files.insert(0, (dir.join("reference.csv"), comparison.csv().into_bytes()));
+        }
+        remove_earlier(dir, &files)?;
         for (path, content) in &files {
             write_atomically(path, content)?;
         }
@@ -83,4 +92,19 @@ impl StudyReport {
             series: series.collect(),
         }
     }
+}
+
+/// Takes away what an earlier run left in the folder and this one does not write: the record first, so that a
+/// folder with a record is whole, then figures and comparisons of other categories.
+fn remove_earlier(dir: &Path, files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+    let figures = Category::ALL.map(|c| format!("radar-{}.svg", c.key().replace('_', "-")));
+    let ours = figures.into_iter().chain(["reference.csv".to_owned()]).map(|name| dir.join(name));
+    let stale = ours.filter(|path| files.iter().all(|(written, _)| written != path));
+    for path in std::iter::once(dir.join("run.json")).chain(stale) {
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
+            _ => {}
+        }
+    }
+    Ok(())
 }

@@ -174,16 +174,19 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     Ok(())
 }
 
+/// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
+const LARGEST: f64 = 1e6;
+
 fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value.is_finite(), field, value, "a finite number")
+    expect(value.abs() <= LARGEST, field, value, "a number between -1e6 and 1e6")
 }
 
 fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value.is_finite() && value >= 0.0, field, value, "a finite number of at least 0")
+    expect((0.0..=LARGEST).contains(&value), field, value, "a number of at least 0 and at most 1e6")
 }
 
 fn above_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value.is_finite() && value > 0.0, field, value, "a finite number above 0")
+    expect(value > 0.0 && value <= LARGEST, field, value, "a number above 0 and at most 1e6")
 }
 
 fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Result<(), Problem> {
