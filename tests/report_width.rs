@@ -26,7 +26,7 @@ fn seven_variants_with_intervals_and_large_counts_fit() {
         (Category::Lvd, 40, &["i", "ii", "iii", "iv", "v"]),
     ]);
     let lane = |lane: u64| (Verdicts((mixed(3, lane) & 0xf) as u8), 1.0);
-    let partial = Partial::of(&plan, &chunk(&plan, 0..plan.unit_count(), &lane, false));
+    let partial = Partial::from_chunk(&plan, &chunk(&plan, 0..plan.unit_count(), &lane, false)).unwrap();
     let options = ScoreOptions { bootstrap_draws: 40, ..ScoreOptions::default() };
     let table = score(&plan, &partial, &options).unwrap();
     for published in [false, true] {

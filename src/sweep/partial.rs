@@ -104,15 +104,6 @@ impl Partial {
         }
     }
 
-    /// Counts the lanes of a chunk that [`Chunk::check`] has passed, as all from [`super::sweep`] have;
-    /// [`Partial::from_chunk`] is for any other.
-    ///
-    /// # Panics
-    /// Where the chunk is not of this plan.
-    pub fn of(plan: &LanePlan, chunk: &Chunk) -> Partial {
-        Partial::empty(plan).counting(plan, chunk)
-    }
-
     /// Counts a chunk's lanes. Keeps its [`WORST_LANES`] worst lanes where it has outcomes.
     ///
     /// # Errors
