@@ -8,6 +8,7 @@ mod atomic_file;
 pub mod cli;
 pub mod conformance;
 pub mod criterion;
+#[macro_use]
 pub mod driver;
 pub mod error;
 pub mod mining;

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
-use crate::driver::{CchdmProfile, FsmProfile, Reg157Profile, RssProfile};
+use crate::driver::{self, Bound, DriverProfile};
 use crate::{Error, Place, Result};
 
 /// Which vehicles the ego's driver heeds in a cut-out.
@@ -55,27 +55,48 @@ pub struct FrameProfile {
     pub default_width_m: f64,
 }
 
-/// A profile: everything that the lanes' physics takes from outside the cases.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Profile {
-    /// Name.
-    pub name: String,
-    /// One sentence.
-    pub description: String,
-    /// Time and geometry.
-    pub frame: FrameProfile,
-    /// Criteria.
-    pub criteria: CriteriaProfile,
-    /// Reg157.
-    pub reg157: Reg157Profile,
-    /// CCHDM.
-    pub cchdm: CchdmProfile,
-    /// RSS.
-    pub rss: RssProfile,
-    /// FSM.
-    pub fsm: FsmProfile,
+impl FrameProfile {
+    /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
+    pub fn step_cap(&self) -> u32 {
+        (self.time_cap_s / self.dt_s - 1e-9).ceil() as u32
+    }
 }
+
+/// Makes [`Profile`] with one table per driver model of the registry.
+macro_rules! declare_profile {
+    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// A profile: everything that the lanes' physics takes from outside the cases.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Profile {
+            /// Name.
+            pub name: String,
+            /// One sentence.
+            pub description: String,
+            /// Time and geometry.
+            pub frame: FrameProfile,
+            /// Criteria.
+            pub criteria: CriteriaProfile,
+            $(
+                #[doc = $name]
+                pub $file: driver::$profile,
+            )+
+        }
+
+        impl Profile {
+            /// The constants of every driver model that have a range: key, value, range.
+            fn driver_bounds(&self) -> Vec<(String, f64, Bound)> {
+                let mut all = Vec::new();
+                $(
+                    let table = stringify!($file);
+                    all.extend(self.$file.bounds().into_iter().map(|(k, v, b)| (format!("{table}.{k}"), v, b)));
+                )+
+                all
+            }
+        }
+    };
+}
+for_every_driver_model!(declare_profile);
 
 const BUILT_IN: [(&str, &str); 4] = [
     ("paper", include_str!("../configs/profiles/paper.toml")),
@@ -131,56 +152,21 @@ impl Profile {
 
     /// Every constant must be finite and in its range; `place` names the profile in the error.
     pub fn check(&self, place: &Place) -> Result<()> {
-        let positive = [
-            ("frame.dt_s", self.frame.dt_s),
-            ("frame.time_cap_s", self.frame.time_cap_s),
-            ("frame.default_length_m", self.frame.default_length_m),
-            ("frame.default_width_m", self.frame.default_width_m),
-            ("criteria.ttc_threshold_s", self.criteria.ttc_threshold_s),
-            ("criteria.btn_threshold", self.criteria.btn_threshold),
-            ("criteria.max_deceleration_mps2", self.criteria.max_deceleration_mps2),
-            ("criteria.jerk_mps3", self.criteria.jerk_mps3),
-            ("reg157.deceleration_mps2", self.reg157.deceleration_mps2),
-            ("cchdm.jerk_mps3", self.cchdm.jerk_mps3),
-            ("cchdm.max_deceleration_mps2", self.cchdm.max_deceleration_mps2),
-            ("rss.ego_deceleration_mps2", self.rss.ego_deceleration_mps2),
-            ("rss.other_deceleration_mps2", self.rss.other_deceleration_mps2),
-            ("rss.lateral_acceleration_mps2", self.rss.lateral_acceleration_mps2),
-            ("rss.jerk_mps3", self.rss.jerk_mps3),
-            ("rss.max_deceleration_mps2", self.rss.max_deceleration_mps2),
-            ("fsm.comfortable_deceleration_mps2", self.fsm.comfortable_deceleration_mps2),
-            ("fsm.max_surrogate_deceleration_mps2", self.fsm.max_surrogate_deceleration_mps2),
-            ("fsm.lead_deceleration_mps2", self.fsm.lead_deceleration_mps2),
-            ("fsm.jerk_mps3", self.fsm.jerk_mps3),
-            ("fsm.max_deceleration_mps2", self.fsm.max_deceleration_mps2),
+        let (frame, criteria) = (&self.frame, &self.criteria);
+        let own = [
+            ("frame.dt_s", frame.dt_s, Bound::Above(0.0)),
+            ("frame.time_cap_s", frame.time_cap_s, Bound::Above(0.0)),
+            ("frame.default_length_m", frame.default_length_m, Bound::Above(0.0)),
+            ("frame.default_width_m", frame.default_width_m, Bound::Above(0.0)),
+            ("frame.exposure_m", frame.exposure_m, Bound::AtLeast(0.0)),
+            ("criteria.ttc_threshold_s", criteria.ttc_threshold_s, Bound::Above(0.0)),
+            ("criteria.btn_threshold", criteria.btn_threshold, Bound::Above(0.0)),
+            ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::Above(0.0)),
+            ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::Above(0.0)),
         ];
-        let not_negative = [
-            ("frame.exposure_m", self.frame.exposure_m),
-            ("reg157.reaction_time_s", self.reg157.reaction_time_s),
-            ("reg157.margin_s", self.reg157.margin_s),
-            ("reg157.visible_lateral_movement_s", self.reg157.visible_lateral_movement_s),
-            ("cchdm.ttc_s", self.cchdm.ttc_s),
-            ("cchdm.delay_s", self.cchdm.delay_s),
-            ("cchdm.coasting_mps2", self.cchdm.coasting_mps2),
-            ("cchdm.wandering_m", self.cchdm.wandering_m),
-            ("cchdm.perception_time_s", self.cchdm.perception_time_s),
-            ("cchdm.perception_travel_m", self.cchdm.perception_travel_m),
-            ("cchdm.lead_deceleration_trigger_mps2", self.cchdm.lead_deceleration_trigger_mps2),
-            ("rss.response_time_s", self.rss.response_time_s),
-            ("rss.max_acceleration_mps2", self.rss.max_acceleration_mps2),
-            ("rss.lateral_margin_m", self.rss.lateral_margin_m),
-            ("fsm.reaction_time_s", self.fsm.reaction_time_s),
-            ("fsm.margin_m", self.fsm.margin_m),
-            ("fsm.lateral_gate_margin_s", self.fsm.lateral_gate_margin_s),
-            ("reg157.lateral_gate_m", self.reg157.lateral_gate_m + 100.0),
-            ("cchdm.lateral_gate_m", self.cchdm.lateral_gate_m + 100.0),
-        ];
-        let bad = positive
-            .iter()
-            .map(|&(key, value)| (key, value, value > 0.0, "a number above 0"))
-            .chain(not_negative.iter().map(|&(key, value)| (key, value, value >= 0.0, "a number of at least 0")))
-            .find(|&(_, value, ok, _)| !ok || !value.is_finite());
-        if let Some((key, value, _, expected)) = bad {
+        let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
+        let bad = own.chain(self.driver_bounds()).find(|(_, value, bound)| !bound.holds(*value));
+        if let Some((key, value, expected)) = bad {
             return Err(Error::usage(
                 place.clone().of(format!("`{key}`")),
                 format!("{value} is not usable; expected {expected}"),
@@ -204,9 +190,9 @@ impl Profile {
         Ok(self)
     }
 
-    /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
+    /// Steps that a run evaluates at most.
     pub fn step_cap(&self) -> u32 {
-        (self.frame.time_cap_s / self.frame.dt_s - 1e-9).ceil() as u32
+        self.frame.step_cap()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::table::Table;
 use super::tally::Tally;
+use crate::driver::DriverProfile;
 use crate::profile::Profile;
 use crate::scenario::Category;
 use crate::{Error, Result};
@@ -9,8 +10,8 @@ use crate::{Error, Result};
 /// Compares every row of a function table with the profile's own functions; one tally per function.
 pub fn compare_functions(table: &Table, profile: &Profile) -> Result<Vec<Tally>> {
     let dt = profile.frame.dt_s;
-    let fsm = profile.fsm.resolve::<f64>(dt);
-    let rss = profile.rss.resolve::<f64>(dt);
+    let fsm = profile.fsm.resolve::<f64>(dt, Category::CutIn);
+    let rss = profile.rss.resolve::<f64>(dt, Category::CutIn);
     let reg157 = profile.reg157.resolve::<f64>(dt, Category::CutIn);
     let mut tallies: Vec<Tally> = Vec::new();
     for row in table.rows() {

@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DriverModel, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{
+    Attention, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps, latched_braking,
+};
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -52,9 +54,10 @@ pub struct Cchdm<R> {
     dt: R,
 }
 
-impl CchdmProfile {
-    /// Plain constants for a time step.
-    pub fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Cchdm<R> {
+impl DriverProfile for CchdmProfile {
+    type Model<R: Real> = Cchdm<R>;
+
+    fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Cchdm<R> {
         Cchdm {
             always_unsafe: self.always_unsafe.contains(&category),
             lateral_gate: R::from_f64(self.lateral_gate_m),
@@ -65,6 +68,37 @@ impl CchdmProfile {
             delay_steps: delay_steps(self.delay_s, dt_s),
             dt: R::from_f64(dt_s),
         }
+    }
+
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
+        vec![
+            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
+            ("ttc_s", self.ttc_s, Bound::AtLeast(0.0)),
+            ("delay_s", self.delay_s, Bound::AtLeast(0.0)),
+            ("coasting_mps2", self.coasting_mps2, Bound::AtLeast(0.0)),
+            ("wandering_m", self.wandering_m, Bound::AtLeast(0.0)),
+            ("perception_time_s", self.perception_time_s, Bound::AtLeast(0.0)),
+            ("perception_travel_m", self.perception_travel_m, Bound::AtLeast(0.0)),
+            ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::AtLeast(0.0)),
+            ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
+        ]
+    }
+
+    fn attend_from(&self, principal: &Attention) -> [u32; 2] {
+        let from = match principal.category {
+            Category::Lvd => principal.after_deceleration(self.lead_deceleration_trigger_mps2),
+            Category::CutIn | Category::CutOut => principal.after_wandering(Perception {
+                wandering_m: self.wandering_m,
+                time_s: self.perception_time_s,
+                travel_m: self.perception_travel_m,
+            }),
+        };
+        [from; 2]
+    }
+
+    fn abort_above_ttc_s(&self) -> f64 {
+        if self.abort_on_large_ttc { self.ttc_s } else { 0.0 }
     }
 }
 
@@ -84,6 +118,18 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
         let soon = dv != R::ZERO && view.gap.abs() <= self.ttc * dv.abs();
         let is_unsafe = !view.is_behind() && (self.always_unsafe || (near && soon));
         Hazard { is_unsafe, demand: self.max_deceleration }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
+            ("driver_lateral_gate", self.lateral_gate.to_f64()),
+            ("driver_ttc", self.ttc.to_f64()),
+            ("driver_coasting", self.coasting.to_f64()),
+            ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
+            ("driver_max_deceleration", self.max_deceleration.to_f64()),
+            ("driver_delay_steps", f64::from(self.delay_steps)),
+        ]
     }
 
     /// Coast at 0.4 m/s² during the delay, then ramp at 12.65 m/s³ up to 0.774 g.

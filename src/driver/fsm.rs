@@ -3,8 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DriverModel, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
 use crate::scalar::Real;
+use crate::scenario::Category;
 
 /// Which acceleration the CFS step divides by when the ego would be slower than the other vehicle after τ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,9 +60,10 @@ pub struct Fsm<R> {
     dt: R,
 }
 
-impl FsmProfile {
-    /// Plain constants for a time step.
-    pub fn resolve<R: Real>(&self, dt_s: f64) -> Fsm<R> {
+impl DriverProfile for FsmProfile {
+    type Model<R: Real> = Fsm<R>;
+
+    fn resolve<R: Real>(&self, dt_s: f64, _category: Category) -> Fsm<R> {
         let (comf, max) = (self.comfortable_deceleration_mps2, self.max_surrogate_deceleration_mps2);
         Fsm {
             tau: R::from_f64(self.reaction_time_s),
@@ -79,6 +81,19 @@ impl FsmProfile {
             delay_steps: delay_steps(self.reaction_time_s, dt_s),
             dt: R::from_f64(dt_s),
         }
+    }
+
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
+        vec![
+            ("comfortable_deceleration_mps2", self.comfortable_deceleration_mps2, Bound::Above(0.0)),
+            ("max_surrogate_deceleration_mps2", self.max_surrogate_deceleration_mps2, Bound::Above(0.0)),
+            ("lead_deceleration_mps2", self.lead_deceleration_mps2, Bound::Above(0.0)),
+            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
+            ("reaction_time_s", self.reaction_time_s, Bound::AtLeast(0.0)),
+            ("margin_m", self.margin_m, Bound::AtLeast(0.0)),
+            ("lateral_gate_margin_s", self.lateral_gate_margin_s, Bound::AtLeast(0.0)),
+        ]
     }
 }
 
@@ -155,6 +170,24 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         let surrogate = pfs > R::ZERO || cfs > R::ZERO;
         let demand = if cfs > R::ZERO { cfs * self.b_span + self.b_comf } else { pfs * self.b_comf };
         Hazard { is_unsafe: !view.is_behind() && surrogate && self.gate_is_open(view), demand }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("driver_tau", self.tau.to_f64()),
+            ("driver_half_tau", self.half_tau.to_f64()),
+            ("driver_b_comf", self.b_comf.to_f64()),
+            ("driver_b_span", self.b_span.to_f64()),
+            ("driver_half_inverse_comf", self.half_inverse_comf.to_f64()),
+            ("driver_half_inverse_max", self.half_inverse_max.to_f64()),
+            ("driver_half_inverse_lead", self.half_inverse_lead.to_f64()),
+            ("driver_margin", self.margin.to_f64()),
+            ("driver_gate_margin", self.gate_margin.to_f64()),
+            ("driver_limited_step", f64::from(u8::from(self.limited_step))),
+            ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
+            ("driver_max_deceleration", self.max_deceleration.to_f64()),
+            ("driver_delay_steps", f64::from(self.delay_steps)),
+        ]
     }
 
     /// Hold the speed for τ, then the demand: reached with 12.65 m/s³ upwards, at once downwards.

@@ -5,52 +5,58 @@
 //! no time loop: the latched step stands once, in [`crate::sweep`]. Parameters come from a profile;
 //! decisions go to the lane's frame.
 //!
-//! To add a model: one file here, its twin in `shaders/`, one line in [`ModelId`].
+//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`).
+
+#[macro_use]
+mod registry;
 
 mod attention;
-mod cchdm;
-mod fsm;
-mod reg157;
-mod rss;
+mod profile;
 
-pub use attention::{Attention, Perception};
-pub use cchdm::{Cchdm, CchdmProfile};
-pub use fsm::{CfsStep, Fsm, FsmProfile};
-pub use reg157::{Reg157, Reg157Profile};
-pub use rss::{Rss, RssProfile};
+pub use attention::{Attention, NEVER, Perception};
+pub use profile::{Bound, DriverProfile};
 
 use crate::scalar::Real;
 
-/// The registry of driver models, in the order of every table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub enum ModelId {
-    /// UN R157, 5.2.5.2.
-    Reg157,
-    /// Careful and competent human driver, UN R157, Annex 3.
-    #[serde(rename = "CCHDM")]
-    Cchdm,
-    /// Responsibility-Sensitive Safety.
-    #[serde(rename = "RSS")]
-    Rss,
-    /// Fuzzy Safety Model, UN R157, Annex 3.
-    #[serde(rename = "FSM")]
-    Fsm,
+/// Makes the modules, their public names and [`ModelId`] from the registry.
+macro_rules! declare_models {
+    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        $(
+            mod $file;
+            pub use $file::{$model, $profile};
+        )+
+
+        /// A driver model, in the order of every table.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+        pub enum ModelId {
+            $(
+                #[doc = concat!("See [`", stringify!($model), "`].")]
+                #[serde(rename = $name)]
+                $model,
+            )+
+        }
+
+        impl ModelId {
+            /// All, in the order of every table.
+            pub const ALL: [ModelId; MODELS] = [$(ModelId::$model),+];
+
+            /// Name in tables, files and lane keys.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(ModelId::$model => $name,)+
+                }
+            }
+        }
+
+        /// Number of driver models.
+        pub const MODELS: usize = [$($name),+].len();
+    };
 }
+for_every_driver_model!(declare_models);
+
+pub use fsm::CfsStep;
 
 impl ModelId {
-    /// All, in the order of every table.
-    pub const ALL: [ModelId; 4] = [ModelId::Reg157, ModelId::Cchdm, ModelId::Rss, ModelId::Fsm];
-
-    /// Name in tables, files and lane keys.
-    pub fn name(self) -> &'static str {
-        match self {
-            ModelId::Reg157 => "Reg157",
-            ModelId::Cchdm => "CCHDM",
-            ModelId::Rss => "RSS",
-            ModelId::Fsm => "FSM",
-        }
-    }
-
     /// From its name, whatever the case; `CC` and `CC_human_driver` are the JRC's names of CCHDM.
     pub fn parse(text: &str) -> Option<ModelId> {
         let folded = text.to_ascii_lowercase();
@@ -123,6 +129,8 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
     fn check(&self, view: &View<R>) -> Hazard<R>;
+    /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.
+    fn shader_constants(&self) -> Vec<(&'static str, f64)>;
     /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0.
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R);
 }

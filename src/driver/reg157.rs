@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DriverModel, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{Attention, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -42,9 +42,10 @@ pub struct Reg157<R> {
     dt: R,
 }
 
-impl Reg157Profile {
-    /// Plain constants for a time step.
-    pub fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Reg157<R> {
+impl DriverProfile for Reg157Profile {
+    type Model<R: Real> = Reg157<R>;
+
+    fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Reg157<R> {
         Reg157 {
             always_unsafe: self.always_unsafe.contains(&category),
             lateral_gate: R::from_f64(self.lateral_gate_m),
@@ -54,6 +55,20 @@ impl Reg157Profile {
             delay_steps: delay_steps(self.reaction_time_s, dt_s),
             dt: R::from_f64(dt_s),
         }
+    }
+
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
+        vec![
+            ("deceleration_mps2", self.deceleration_mps2, Bound::Above(0.0)),
+            ("reaction_time_s", self.reaction_time_s, Bound::AtLeast(0.0)),
+            ("margin_s", self.margin_s, Bound::AtLeast(0.0)),
+            ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::AtLeast(0.0)),
+            ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
+        ]
+    }
+
+    fn attend_from(&self, principal: &Attention) -> [u32; 2] {
+        [principal.after_visible_movement(self.visible_lateral_movement_s, self.lateral_gate_m), 0]
     }
 }
 
@@ -78,6 +93,17 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
         let soon = dv != R::ZERO && view.gap.abs() <= dv.abs() * self.ttc_threshold(dv);
         let is_unsafe = !view.is_behind() && (self.always_unsafe || (near && soon));
         Hazard { is_unsafe, demand: self.deceleration }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
+            ("driver_lateral_gate", self.lateral_gate.to_f64()),
+            ("driver_half_inverse_deceleration", self.half_inverse_deceleration.to_f64()),
+            ("driver_constant", self.constant.to_f64()),
+            ("driver_deceleration", self.deceleration.to_f64()),
+            ("driver_delay_steps", f64::from(self.delay_steps)),
+        ]
     }
 
     /// Hold the speed for 0.35 s, then 6 m/s² at once, no jerk limit.

@@ -3,8 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DriverModel, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
 use crate::scalar::Real;
+use crate::scenario::Category;
 
 /// Constants of the model as a profile gives them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,9 +54,10 @@ pub struct Rss<R> {
     dt: R,
 }
 
-impl RssProfile {
-    /// Plain constants for a time step.
-    pub fn resolve<R: Real>(&self, dt_s: f64) -> Rss<R> {
+impl DriverProfile for RssProfile {
+    type Model<R: Real> = Rss<R>;
+
+    fn resolve<R: Real>(&self, dt_s: f64, _category: Category) -> Rss<R> {
         let rho = self.response_time_s;
         Rss {
             response_time: R::from_f64(rho),
@@ -72,6 +74,19 @@ impl RssProfile {
             delay_steps: delay_steps(rho, dt_s),
             dt: R::from_f64(dt_s),
         }
+    }
+
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
+        vec![
+            ("ego_deceleration_mps2", self.ego_deceleration_mps2, Bound::Above(0.0)),
+            ("other_deceleration_mps2", self.other_deceleration_mps2, Bound::Above(0.0)),
+            ("lateral_acceleration_mps2", self.lateral_acceleration_mps2, Bound::Above(0.0)),
+            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
+            ("response_time_s", self.response_time_s, Bound::AtLeast(0.0)),
+            ("max_acceleration_mps2", self.max_acceleration_mps2, Bound::AtLeast(0.0)),
+            ("lateral_margin_m", self.lateral_margin_m, Bound::AtLeast(0.0)),
+        ]
     }
 }
 
@@ -107,6 +122,23 @@ impl<R: Real> DriverModel<R> for Rss<R> {
         let close = view.gap < self.longitudinal_distance(view.v_ego, view.v_other);
         let beside = view.lateral_gap < self.lateral_distance(view.lateral_towards);
         Hazard { is_unsafe: !view.is_behind() && close && beside, demand: self.max_deceleration }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("driver_response_time", self.response_time.to_f64()),
+            ("driver_response_distance", self.response_distance.to_f64()),
+            ("driver_response_speed", self.response_speed.to_f64()),
+            ("driver_half_inverse_ego", self.half_inverse_ego.to_f64()),
+            ("driver_half_inverse_other", self.half_inverse_other.to_f64()),
+            ("driver_lateral_response_speed", self.lateral_response_speed.to_f64()),
+            ("driver_half_inverse_lateral", self.half_inverse_lateral.to_f64()),
+            ("driver_half_response_time", self.half_response_time.to_f64()),
+            ("driver_lateral_margin", self.lateral_margin.to_f64()),
+            ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
+            ("driver_max_deceleration", self.max_deceleration.to_f64()),
+            ("driver_delay_steps", f64::from(self.delay_steps)),
+        ]
     }
 
     /// Hold the speed for ρ, then ramp from 0 at 12.65 m/s³ up to 0.774 g.

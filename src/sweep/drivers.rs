@@ -1,7 +1,7 @@
 //! The profile's constants for one category, resolved, and the dispatch over driver models.
 
 use crate::criterion::Criteria;
-use crate::driver::{Cchdm, Fsm, ModelId, Reg157, Rss};
+use crate::driver::{self, DriverModel, DriverProfile, ModelId};
 use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
@@ -10,78 +10,65 @@ use super::frame::{Frame, Observer, Simulation, Start, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 
-/// Everything a lane of one category takes from the profile, as plain constants.
-#[derive(Debug, Clone, Copy)]
-pub struct Constants<R> {
-    /// Time and end rules.
-    pub frame: Frame<R>,
-    /// Criteria.
-    pub criteria: Criteria<R>,
-    /// Reg157.
-    pub reg157: Reg157<R>,
-    /// CCHDM.
-    pub cchdm: Cchdm<R>,
-    /// RSS.
-    pub rss: Rss<R>,
-    /// FSM.
-    pub fsm: Fsm<R>,
-    /// CCHDM only: abort at lateral overlap with |TTC| above this, s; 0 is off.
-    pub cchdm_abort: R,
-}
-
-impl<R: Real> Constants<R> {
-    /// Resolves a profile, in f64, and rounds once.
-    pub fn resolve(profile: &Profile, category: Category) -> Self {
-        let dt_s = profile.frame.dt_s;
-        let abort = if profile.cchdm.abort_on_large_ttc { profile.cchdm.ttc_s } else { 0.0 };
-        Constants {
-            frame: Frame {
-                dt: R::from_f64(dt_s),
-                inverse_dt: R::from_f64(1.0 / dt_s),
-                step_cap: profile.step_cap(),
-                start_shift: profile.frame.start_shift,
-                end_when_settled: profile.frame.end_when_settled,
-                abort_above_ttc: R::ZERO,
-            },
-            criteria: profile.criteria.resolve(),
-            reg157: profile.reg157.resolve(dt_s, category),
-            cchdm: profile.cchdm.resolve(dt_s, category),
-            rss: profile.rss.resolve(dt_s),
-            fsm: profile.fsm.resolve(dt_s),
-            cchdm_abort: R::from_f64(abort),
+/// Makes [`Constants`] and its dispatch from the registry of driver models.
+macro_rules! declare_constants {
+    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// Everything a lane of one category takes from the profile, as plain constants.
+        #[derive(Debug, Clone, Copy)]
+        pub struct Constants<R> {
+            /// Criteria.
+            pub criteria: Criteria<R>,
+            /// Time and end rules, per model in the order of [`ModelId::ALL`].
+            pub frames: [Frame<R>; driver::MODELS],
+            $(
+                #[doc = $name]
+                pub $file: driver::$model<R>,
+            )+
         }
-    }
 
-    /// Runs one lane with the chosen model.
-    #[inline]
-    pub fn run(
-        &self,
-        model: ModelId,
-        case: &LaneCase<R>,
-        tables: &Tables<R>,
-        start: Start<R>,
-        observer: &mut impl Observer<R>,
-    ) -> Outcome<R> {
-        let (criteria, model_index) = (&self.criteria, model.index());
-        let frame = &self.frame;
-        match model {
-            ModelId::Reg157 => {
-                let model = &self.reg157;
-                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+        impl<R: Real> Constants<R> {
+            /// Resolves a profile, in f64, and rounds once.
+            pub fn resolve(profile: &Profile, category: Category) -> Self {
+                let dt_s = profile.frame.dt_s;
+                Constants {
+                    criteria: profile.criteria.resolve(),
+                    frames: [$(Frame::resolve(&profile.frame, profile.$file.abort_above_ttc_s())),+],
+                    $($file: profile.$file.resolve(dt_s, category),)+
+                }
             }
-            ModelId::Cchdm => {
-                let frame = &Frame { abort_above_ttc: self.cchdm_abort, ..self.frame };
-                let model = &self.cchdm;
-                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+
+            /// Runs one lane with the chosen model.
+            #[inline]
+            pub fn run(
+                &self,
+                id: ModelId,
+                case: &LaneCase<R>,
+                tables: &Tables<R>,
+                start: Start<R>,
+                observer: &mut impl Observer<R>,
+            ) -> Outcome<R> {
+                let (criteria, model_index) = (&self.criteria, id.index());
+                let frame = &self.frames[model_index];
+                match id {
+                    $(ModelId::$model => {
+                        let model = &self.$file;
+                        run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+                    })+
+                }
             }
-            ModelId::Rss => {
-                let model = &self.rss;
-                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
-            }
-            ModelId::Fsm => {
-                let model = &self.fsm;
-                run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+
+            /// The constants of a model by the names that its shader gives them.
+            pub fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
+                match id {
+                    $(ModelId::$model => self.$file.shader_constants(),)+
+                }
             }
         }
-    }
+
+        /// First steps at which each driver model may react to the principal vehicle and to the one ahead.
+        pub(super) fn attend_from(profile: &Profile, principal: &driver::Attention) -> [[u32; 2]; driver::MODELS] {
+            [$(profile.$file.attend_from(principal)),+]
+        }
+    };
 }
+for_every_driver_model!(declare_constants);

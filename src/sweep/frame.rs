@@ -5,6 +5,7 @@
 
 use crate::criterion::{BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact};
 use crate::driver::{DriverModel, DriverState, Hazard, View};
+use crate::profile::FrameProfile;
 use crate::scalar::Real;
 use crate::scenario::Tables;
 
@@ -26,6 +27,20 @@ pub struct Frame<R> {
     pub end_when_settled: bool,
     /// Abort at lateral overlap with |TTC| above this, s (the JRC's rule for CCHDM); off where not positive.
     pub abort_above_ttc: R,
+}
+
+impl<R: Real> Frame<R> {
+    /// Plain constants; `abort_above_ttc_s` is the driver model's.
+    pub fn resolve(profile: &FrameProfile, abort_above_ttc_s: f64) -> Self {
+        Frame {
+            dt: R::from_f64(profile.dt_s),
+            inverse_dt: R::from_f64(1.0 / profile.dt_s),
+            step_cap: profile.step_cap(),
+            start_shift: profile.start_shift,
+            end_when_settled: profile.end_when_settled,
+            abort_above_ttc: R::from_f64(abort_above_ttc_s),
+        }
+    }
 }
 
 /// The headway of a lane: it sets the initial gap, bumper to bumper.

@@ -1,13 +1,13 @@
 //! From a [`Case`] to the record that lanes read: motions encoded, sizes summed, everything that depends
 //! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
 
-use crate::driver::{Attention, ModelId, Perception};
+pub use crate::driver::NEVER;
+use crate::driver::{Attention, MODELS};
 use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
 
-/// "Never" as a step index.
-pub const NEVER: u32 = u32::MAX;
+use super::drivers::attend_from;
 
 /// One other vehicle of a lane.
 #[repr(C)]
@@ -25,8 +25,9 @@ pub struct LaneOther<R> {
     pub present_from: u32,
     /// First step at which it does no longer.
     pub present_until: u32,
-    /// First step at which each driver model may react to it, in the order of [`ModelId::ALL`].
-    pub attend_from: [u32; 4],
+    /// First step at which each driver model may react to it, in the order of
+    /// [`ModelId::ALL`](crate::driver::ModelId::ALL).
+    pub attend_from: [u32; MODELS],
     /// 1 where the slot is used.
     pub used: u32,
     /// 1 where the criteria judge it.
@@ -114,7 +115,7 @@ fn encode_other(
         gap_offset,
         present_from: 0,
         present_until: NEVER,
-        attend_from: [0; 4],
+        attend_from: [0; MODELS],
         used: 1,
         judged: 1,
     }
@@ -147,19 +148,9 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
         speed_mps: &series.speed_mps,
         half_widths_m: others[0].half_widths,
     };
-    let reg157 =
-        attention.after_visible_movement(profile.reg157.visible_lateral_movement_s, profile.reg157.lateral_gate_m);
-    let cchdm = match case.category {
-        Category::Lvd => attention.after_deceleration(profile.cchdm.lead_deceleration_trigger_mps2),
-        Category::CutIn | Category::CutOut => attention.after_wandering(Perception {
-            wandering_m: profile.cchdm.wandering_m,
-            time_s: profile.cchdm.perception_time_s,
-            travel_m: profile.cchdm.perception_travel_m,
-        }),
-    };
-    others[0].attend_from[ModelId::Reg157.index()] = reg157;
-    for other in others.iter_mut() {
-        other.attend_from[ModelId::Cchdm.index()] = cchdm;
+    for (model, [principal, ahead]) in attend_from(profile, &attention).into_iter().enumerate() {
+        others[0].attend_from[model] = principal;
+        others[1].attend_from[model] = ahead;
     }
 }
 

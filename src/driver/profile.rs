@@ -1,0 +1,57 @@
+//! What every driver model's constants in a profile can do.
+
+use super::{Attention, DriverModel};
+use crate::scalar::Real;
+use crate::scenario::Category;
+
+/// Range of a constant; every one is finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// Above this.
+    Above(f64),
+    /// This or more.
+    AtLeast(f64),
+}
+
+impl Bound {
+    /// Does the value lie in the range?
+    pub fn holds(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Bound::Above(limit) => value > limit,
+                Bound::AtLeast(limit) => value >= limit,
+            }
+    }
+}
+
+impl std::fmt::Display for Bound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Bound::Above(limit) => write!(f, "a number above {limit}"),
+            Bound::AtLeast(limit) => write!(f, "a number of at least {limit}"),
+        }
+    }
+}
+
+/// Constants of a driver model as a profile gives them.
+pub trait DriverProfile {
+    /// The model in a lane's arithmetic.
+    type Model<R: Real>: DriverModel<R>;
+
+    /// Plain constants at a time step, in a category; worked out in f64 and rounded once.
+    fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Self::Model<R>;
+
+    /// Constants with a range: key, value, range.
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)>;
+
+    /// First step at which the driver may react to the principal vehicle and to the one ahead of it, as far
+    /// as that depends on the principal vehicle's motion alone.
+    fn attend_from(&self, _principal: &Attention) -> [u32; 2] {
+        [0; 2]
+    }
+
+    /// A run is aborted at lateral overlap with |TTC| above this, s; 0 never aborts.
+    fn abort_above_ttc_s(&self) -> f64 {
+        0.0
+    }
+}
