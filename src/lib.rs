@@ -11,6 +11,7 @@ pub mod criterion;
 #[macro_use]
 pub mod driver;
 pub mod error;
+pub mod gpu;
 pub mod mining;
 pub mod parameterization;
 pub mod profile;

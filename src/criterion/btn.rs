@@ -71,6 +71,11 @@ impl<R: Real> BrakeThreatMaximum<R> {
         BrakeThreatMaximum { numerator: R::ZERO, denominator: R::ONE, failed: false }
     }
 
+    /// As a device gives it back: numerator and denominator.
+    pub fn from_quotient(numerator: R, denominator: R, failed: bool) -> Self {
+        BrakeThreatMaximum { numerator, denominator, failed }
+    }
+
     /// A collision that counts: infinite.
     #[inline(always)]
     pub fn fail(self) -> Self {
@@ -110,6 +115,23 @@ impl<R: Real> BrakeThreat<R> {
             short_ramp: R::from_f64(8.0 / (9.0 * jerk)),
             two_jerk: R::from_f64(2.0 * jerk),
         }
+    }
+
+    /// The constants by the names that the shaders give them; the form counts from 0.
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("btn_form", f64::from(self.form as u32)),
+            ("btn_threshold", self.threshold.to_f64()),
+            ("btn_a_max", self.a_max.to_f64()),
+            ("btn_two_a_max", self.two_a_max.to_f64()),
+            ("btn_two_a_limit", self.two_a_limit.to_f64()),
+            ("btn_ramp_delay", self.ramp_delay.to_f64()),
+            ("btn_a_limit", self.a_limit.to_f64()),
+            ("btn_inverse_jerk", self.inverse_jerk.to_f64()),
+            ("btn_quartic", self.quartic.to_f64()),
+            ("btn_short_ramp", self.short_ramp.to_f64()),
+            ("btn_two_jerk", self.two_jerk.to_f64()),
+        ]
     }
 
     /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s.

@@ -114,6 +114,17 @@ impl CriteriaProfile {
 }
 
 impl<R: Real> Criteria<R> {
+    /// The constants by the names that the shaders give them; flags are 0 or 1, alternatives count from 0.
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        let mut all = vec![
+            ("criteria_gate", f64::from(self.gate as u32)),
+            ("criteria_any_contact", f64::from(u8::from(self.btn_contact == BtnContact::Any))),
+            ("ttc_threshold_s", self.ttc.threshold.to_f64()),
+        ];
+        all.extend(self.btn.shader_constants());
+        all
+    }
+
     /// Do TTC and BTN look at a vehicle here? In front by its centre, and near enough across the road.
     #[inline(always)]
     pub fn sees(&self, gap: R, half_lengths: R, lateral_gap: R, lateral_position: R, ego_width: R) -> bool {

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
+use crate::criterion::Criterion;
+use crate::scalar::Real;
 use crate::{Error, Result};
 
 /// How much of a lane comes back.
@@ -13,6 +15,56 @@ pub enum Wanted {
     Verdicts,
     /// Verdict bits and the continuous values.
     Outcomes,
+    /// No lane at all: failures and smallest values per variant and model.
+    Counts,
+}
+
+/// Failures and smallest values of the lanes of one block, variant and model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellCounts {
+    /// Lanes.
+    pub lanes: u64,
+    /// Lanes that failed, per criterion in the order of [`Criterion::ALL`].
+    pub failed: [u64; Criterion::ALL.len()],
+    /// Lanes that ended at the time cap.
+    pub capped: u64,
+    /// Smallest TTC, s; infinite where no ego closed in.
+    pub min_ttc_s: f64,
+    /// Smallest gap, m; infinite where there was none.
+    pub min_gap_m: f64,
+}
+
+impl CellCounts {
+    /// No lane yet.
+    pub const EMPTY: CellCounts = CellCounts {
+        lanes: 0,
+        failed: [0; Criterion::ALL.len()],
+        capped: 0,
+        min_ttc_s: f64::INFINITY,
+        min_gap_m: f64::INFINITY,
+    };
+
+    /// Counts one lane.
+    pub fn count<R: Real>(&mut self, outcome: &Outcome<R>) {
+        self.lanes += 1;
+        for criterion in Criterion::ALL {
+            self.failed[criterion.index()] += u64::from(outcome.verdicts.failed(criterion));
+        }
+        self.capped += u64::from(outcome.verdicts.capped());
+        self.min_ttc_s = self.min_ttc_s.min(outcome.min_ttc.to_f64());
+        self.min_gap_m = self.min_gap_m.min(outcome.min_gap.to_f64());
+    }
+
+    /// Counts other lanes of the same cell.
+    pub fn add(&mut self, other: &CellCounts) {
+        self.lanes += other.lanes;
+        for (ours, theirs) in self.failed.iter_mut().zip(other.failed) {
+            *ours += theirs;
+        }
+        self.capped += other.capped;
+        self.min_ttc_s = self.min_ttc_s.min(other.min_ttc_s);
+        self.min_gap_m = self.min_gap_m.min(other.min_gap_m);
+    }
 }
 
 /// The lanes of an interval of units, in the plan's order.
@@ -22,10 +74,12 @@ pub struct Chunk {
     pub units: Range<u64>,
     /// Index of the first lane.
     pub first_lane: u64,
-    /// One per lane.
+    /// One per lane; empty where counts were wanted.
     pub verdicts: Vec<Verdicts>,
     /// One per lane where outcomes were wanted, else empty. Values are exact widenings of the lane's own.
     pub outcomes: Vec<Outcome<f64>>,
+    /// One per cell of the plan ([`LanePlan::cell`]) where counts were wanted, else empty.
+    pub counts: Vec<CellCounts>,
 }
 
 impl Chunk {
@@ -39,8 +93,13 @@ impl Chunk {
         let fits = self.units.start <= self.units.end
             && self.units.end <= plan.unit_count()
             && self.first_lane == first_lane
-            && self.verdicts.len() == lanes
-            && [0, lanes].contains(&self.outcomes.len());
+            && [0, lanes].contains(&self.outcomes.len())
+            && if self.counts.is_empty() {
+                self.verdicts.len() == lanes
+            } else {
+                self.counts.len() == plan.cell_count()
+                    && self.counts.iter().map(|c| c.lanes).sum::<u64>() == lanes as u64
+            };
         if fits {
             Ok(())
         } else {
@@ -61,4 +120,9 @@ pub trait Backend: Send + Sync {
 pub trait Session {
     /// Computes all lanes of an interval of units. On an error the interval can be given to another session.
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk>;
+    /// Lanes that one call should hold: enough to keep the backend busy, little enough to show progress.
+    /// Results do not depend on it.
+    fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
+        1 << 17
+    }
 }

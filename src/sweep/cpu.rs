@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::backend::{Backend, Chunk, Session, Wanted};
+use super::backend::{Backend, CellCounts, Chunk, Session, Wanted};
 use super::drivers::Constants;
 use super::frame::{Silent, Start};
 use super::outcome::{Outcome, Verdicts};
@@ -83,6 +83,7 @@ impl<R: Real> Session for CpuSession<'_, R> {
         let first_lane = plan.first_lane_of(units.start);
         let mut verdicts = Vec::new();
         let mut outcomes = Vec::new();
+        let mut counts = Vec::new();
         for (block, inside) in plan.segments(units.clone()) {
             let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
             let count = (inside.end - inside.start) as usize;
@@ -108,8 +109,31 @@ impl<R: Real> Session for CpuSession<'_, R> {
                         outcomes.extend(lanes);
                     }
                 }
+                Wanted::Counts => {
+                    counts.resize(plan.cell_count(), CellCounts::EMPTY);
+                    let cells = plan.blocks[block].variants.len() * plan.models.len();
+                    let empty = || vec![CellCounts::EMPTY; cells];
+                    let lanes_per_variant = plan.headways.len() * plan.models.len();
+                    let of_units = (0..count).into_par_iter().fold(empty, |mut cells, k| {
+                        self.run_unit(block, inside.start + k as u64, |at, outcome| {
+                            let cell = at / lanes_per_variant * plan.models.len() + at % plan.models.len();
+                            cells[cell].count(&outcome);
+                        });
+                        cells
+                    });
+                    // Whole numbers and smallest values: the order of the sum does not matter.
+                    let sum = of_units.reduce(empty, |mut a, b| {
+                        a.iter_mut().zip(&b).for_each(|(a, b)| a.add(b));
+                        a
+                    });
+                    let first = plan.cell(block, 0, 0);
+                    counts[first..first + cells].iter_mut().zip(&sum).for_each(|(a, b)| a.add(b));
+                }
             }
         }
-        Ok(Chunk { units, first_lane, verdicts, outcomes })
+        if wanted == Wanted::Counts {
+            counts.resize(plan.cell_count(), CellCounts::EMPTY);
+        }
+        Ok(Chunk { units, first_lane, verdicts, outcomes, counts })
     }
 }

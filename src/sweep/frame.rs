@@ -41,6 +41,18 @@ impl<R: Real> Frame<R> {
             abort_above_ttc: R::from_f64(abort_above_ttc_s),
         }
     }
+
+    /// The constants by the names that the shaders give them; flags are 0 or 1.
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("frame_dt", self.dt.to_f64()),
+            ("frame_inverse_dt", self.inverse_dt.to_f64()),
+            ("frame_step_cap", f64::from(self.step_cap.max(1))),
+            ("frame_start_shift", f64::from(u8::from(self.start_shift))),
+            ("frame_end_when_settled", f64::from(u8::from(self.end_when_settled))),
+            ("frame_abort_above_ttc", self.abort_above_ttc.to_f64()),
+        ]
+    }
 }
 
 /// The headway of a lane: it sets the initial gap, bumper to bumper.

@@ -15,7 +15,7 @@ mod plan;
 mod run;
 mod study;
 
-pub use backend::{Backend, Chunk, Session, Wanted};
+pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
 pub use cpu::CpuBackend;
 pub use drivers::Constants;
 pub use frame::{Frame, Observer, Seen, Silent, Simulation, Start, Step, run_lane};

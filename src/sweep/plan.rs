@@ -158,6 +158,17 @@ impl LanePlan {
         (block.variants.len() * self.headways.len() * self.models.len()) as u64
     }
 
+    /// Number of cells: blocks × their variants × models.
+    pub fn cell_count(&self) -> usize {
+        self.blocks.iter().map(|b| b.variants.len()).sum::<usize>() * self.models.len()
+    }
+
+    /// Index of a cell.
+    pub fn cell(&self, block: usize, variant: usize, model: usize) -> usize {
+        let before: usize = self.blocks[..block].iter().map(|b| b.variants.len()).sum();
+        (before + variant) * self.models.len() + model
+    }
+
     /// Index of the first lane of a unit (counted over all blocks), or the number of lanes at the end.
     pub fn first_lane_of(&self, unit: u64) -> u64 {
         let found = self.blocks.iter().rev().find(|b| b.first_unit <= unit && !b.units.is_empty());

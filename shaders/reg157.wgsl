@@ -1,0 +1,35 @@
+// Reg157: the performance model of UN R157, 5.2.5.2. Twin of src/driver/reg157.rs.
+
+override driver_always_unsafe: bool;
+// m
+override driver_lateral_gate: f32;
+// 1/(2·deceleration), s²/m
+override driver_half_inverse_deceleration: f32;
+// reaction time + margin, s
+override driver_constant: f32;
+// m/s²
+override driver_deceleration: f32;
+override driver_delay_steps: u32;
+
+// TTC threshold dv/(2·6) + 0.35 + margin, s, at closing speed `dv`.
+fn ttc_threshold(dv: f32) -> f32 {
+    return dv * driver_half_inverse_deceleration + driver_constant;
+}
+
+fn initial() -> DriverState {
+    return DriverState(0.0, driver_delay_steps);
+}
+
+// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC, signed dv on the right.
+fn check(view: View) -> Hazard {
+    let dv = closing(view);
+    let near = view.lateral_gap <= driver_lateral_gate;
+    let soon = (dv != 0.0) & (abs(view.gap) <= abs(dv) * ttc_threshold(dv));
+    let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
+    return Hazard(is_unsafe, driver_deceleration);
+}
+
+// Hold the speed for 0.35 s, then 6 m/s² at once, no jerk limit.
+fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
+    return latched_braking(state, 0.0, hazard.demand, v_ego);
+}

@@ -1,0 +1,23 @@
+// The criteria together: their gate and what they have gathered. Twin of src/criterion/mod.rs and of the
+// record in src/sweep/frame.rs.
+
+const GATE_EGO_WIDTH: u32 = 0u;
+const GATE_OVERLAP: u32 = 1u;
+
+override criteria_gate: u32;
+// A side contact fails BTN too.
+override criteria_any_contact: bool;
+
+// What the steps of a lane have gathered so far.
+struct Record {
+    ttc: TtcMinimum,
+    btn: BrakeThreatMaximum,
+    // UNBOUNDED where nothing was seen.
+    min_gap: f32,
+}
+
+// Do TTC and BTN look at a vehicle here? In front by its centre, and near enough across the road.
+fn criteria_sees(gap: f32, half_lengths: f32, lateral_gap: f32, lateral_position: f32, ego_width: f32) -> bool {
+    let near = select(lateral_gap < 0.0, abs(lateral_position) <= ego_width, criteria_gate == GATE_EGO_WIDTH);
+    return (gap + half_lengths >= 0.0) & near;
+}

@@ -1,0 +1,87 @@
+// The records that host and device share, field by field the `repr(C)` types of the host:
+// Motion (src/scenario/motion.rs), LaneOther and LaneCase (src/sweep/lane_case.rs), Start, Launch and
+// OutcomeRecord (src/gpu/records.rs). A test compares every size and offset. MODELS comes from the registry.
+
+struct Motion {
+    kind: u32,
+    speed_offset: u32,
+    speed_len: u32,
+    lateral_offset: u32,
+    lateral_len: u32,
+    speed_until: u32,
+    lateral_until: u32,
+    speed_initial: f32,
+    speed_per_step: f32,
+    speed_end: f32,
+    lateral_initial: f32,
+    lateral_per_step: f32,
+    lateral_end: f32,
+    lateral_towards: f32,
+    reserved: array<u32, 2>,
+}
+
+struct LaneOther {
+    motion: Motion,
+    half_lengths: f32,
+    half_widths: f32,
+    gap_offset: f32,
+    present_from: u32,
+    present_until: u32,
+    attend_from: array<u32, MODELS>,
+    used: u32,
+    judged: u32,
+}
+
+struct LaneCase {
+    others: array<LaneOther, 2>,
+    ego_speed: f32,
+    ego_width: f32,
+    horizon: u32,
+    pair: u32,
+}
+
+// The headway of a lane: a time headway, s, or a gap, m.
+struct Start {
+    is_gap: u32,
+    value: f32,
+}
+
+// One dispatch: the lanes of one model over an interval of cases.
+struct Launch {
+    // Lanes of this dispatch.
+    lanes: u32,
+    // Headways per case, at least 1.
+    headways: u32,
+    // Variants per unit, at least 1.
+    variants: u32,
+    // First case in the buffer of cases.
+    first_case: u32,
+    // First word of this dispatch in the verdicts.
+    first_word: u32,
+    // First record of this dispatch in the outcomes.
+    first_outcome: u32,
+    // First word of this dispatch's cells in the counts: one cell per variant.
+    first_cell_word: u32,
+    // Word of the counts that counts the lanes of this dispatch, whatever is wanted.
+    done_word: u32,
+    // WANTED_…
+    wanted: u32,
+}
+
+const WANTED_VERDICTS: u32 = 0u;
+const WANTED_OUTCOMES: u32 = 1u;
+const WANTED_COUNTS: u32 = 2u;
+
+// What a lane says when it is over. Infinite minima are given as bits: WGSL has no infinite literal.
+struct OutcomeRecord {
+    // Bits 0–3 verdicts (collision, TTC, BTN, capped), 4–5 contact, 6 vehicle of the contact, 8–10 end.
+    word: u32,
+    reaction_step: u32,
+    end_step: u32,
+    impact_speed: f32,
+    impact_closing_speed: f32,
+    min_ttc_bits: u32,
+    btn_numerator: f32,
+    btn_denominator: f32,
+    min_gap_bits: u32,
+}

@@ -1,0 +1,32 @@
+// What comes back. Integer atomics only, so that the order of the lanes cannot matter.
+
+// Lanes per verdict word: four bits each.
+const LANES_PER_WORD: u32 = 8u;
+// Words per cell of the counts: lanes, collisions, TTC, BTN, capped, smallest TTC, smallest gap, unused.
+const CELL_WORDS: u32 = 8u;
+
+// Four verdict bits among those of the seven neighbours.
+fn pack_verdicts(launch: Launch, lane: u32, word: u32) {
+    let bits = (word & 0xfu) << ((lane % LANES_PER_WORD) * 4u);
+    if bits != 0u {
+        atomicOr(&verdicts[launch.first_word + lane / LANES_PER_WORD], bits);
+    }
+}
+
+// Failures and smallest values of the lanes of one variant.
+fn count_lane(launch: Launch, variant: u32, record: OutcomeRecord) {
+    let cell = launch.first_cell_word + variant * CELL_WORDS;
+    atomicAdd(&counts[cell], 1u);
+    for (var bit = 0u; bit < 4u; bit++) {
+        if (record.word & (1u << bit)) != 0u {
+            atomicAdd(&counts[cell + 1u + bit], 1u);
+        }
+    }
+    atomicMin(&counts[cell + 5u], ordered(record.min_ttc_bits));
+    atomicMin(&counts[cell + 6u], ordered(record.min_gap_bits));
+}
+
+// The bits of a number as an integer that is ordered as the number is.
+fn ordered(bits: u32) -> u32 {
+    return select(bits | 0x80000000u, ~bits, (bits & 0x80000000u) != 0u);
+}

@@ -1,0 +1,37 @@
+// Time to collision: gap over closing speed, 0 at contact. Twin of src/criterion/ttc.rs.
+
+// s
+override ttc_threshold_s: f32;
+
+// Smallest TTC so far, kept as a quotient so that a step never divides.
+struct TtcMinimum {
+    gap: f32,
+    closing: f32,
+    failed: bool,
+}
+
+// Nothing seen yet: infinite.
+fn ttc_nothing() -> TtcMinimum {
+    return TtcMinimum(1.0, 0.0, false);
+}
+
+// The value's bits, s, ≥ 0; infinite where the ego never closed in.
+fn ttc_value_bits(minimum: TtcMinimum) -> u32 {
+    var bits = INFINITY_BITS;
+    if minimum.closing > 0.0 {
+        bits = bitcast<u32>(exact_div(minimum.gap, minimum.closing));
+    }
+    return bits;
+}
+
+// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0.
+fn ttc_update(minimum: TtcMinimum, seen: bool, signed_gap: f32, closing: f32) -> TtcMinimum {
+    let gap = larger(signed_gap, 0.0);
+    let counts = seen & (closing > 0.0);
+    let is_smaller = counts & (gap * minimum.closing < minimum.gap * closing);
+    return TtcMinimum(
+        select(minimum.gap, gap, is_smaller),
+        select(minimum.closing, closing, is_smaller),
+        minimum.failed | (counts & (gap < ttc_threshold_s * closing)),
+    );
+}
