@@ -58,15 +58,34 @@ impl fmt::Display for DeviceName {
 }
 
 /// What is to compute the lanes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum BackendChoice {
-    /// The first GPU; the processor where there is none
+    /// The first GPU; the processor where there is none.
     #[default]
     Auto,
-    /// The processor
+    /// The processor.
     Cpu,
-    /// A GPU, or an error where there is none
+    /// A GPU, or an error where there is none.
     Gpu,
+}
+
+impl FromStr for BackendChoice {
+    type Err = Error;
+
+    /// # Errors
+    /// [`Error::Usage`] for any other word than `auto`, `cpu` and `gpu`.
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "auto" => Ok(BackendChoice::Auto),
+            "cpu" => Ok(BackendChoice::Cpu),
+            "gpu" => Ok(BackendChoice::Gpu),
+            _ => Err(Error::usage(
+                Place::item("--backend"),
+                format!("there is no backend `{text}`"),
+                "write auto, cpu or gpu; a certain device: --device, see `lanesweep devices`",
+            )),
+        }
+    }
 }
 
 /// The index of the device to use, or `None` for the processor.
@@ -395,6 +414,13 @@ mod tests {
         assert!(matches!(error, Error::Device { .. }) && says(error).contains("hides every GPU"));
         let error = choose(&cards, BackendChoice::Gpu, None, Some(&ids(&["0000:ff:00.0"]))).unwrap_err();
         assert!(says(error).contains("it allows pci:0000:ff:00.0, which the graphics driver does not show"));
+    }
+
+    #[test]
+    fn a_backend_is_one_of_three_words() {
+        let parsed = ["auto", "cpu", "gpu"].map(|word| word.parse::<BackendChoice>().unwrap());
+        assert_eq!(parsed, [BackendChoice::Auto, BackendChoice::Cpu, BackendChoice::Gpu]);
+        assert!(says("cuda".parse::<BackendChoice>().unwrap_err()).contains("auto, cpu or gpu"));
     }
 
     #[test]
