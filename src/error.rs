@@ -102,6 +102,17 @@ pub enum Error {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// There is no compute device that can be used, or the one in use failed.
+    #[error("{device}: {problem}")]
+    Device {
+        /// Which device, as a user names it: its name, index or PCI bus id; or the flag that asked for one.
+        /// Boxed, as the problem is, so that results which carry no error stay small.
+        device: Box<str>,
+        /// What is wrong with it.
+        problem: Box<str>,
+        /// What to do.
+        help: String,
+    },
     /// A check that the user asked for did not pass (conformance, verification).
     #[error("{0}")]
     Verification(String),
@@ -121,6 +132,11 @@ impl Error {
         Error::Usage { place: Box::new(place), problem: problem.into(), help: help.into() }
     }
 
+    /// A compute device that is missing or failed.
+    pub fn device(device: impl Into<String>, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        Error::Device { device: device.into().into(), problem: problem.into().into(), help: help.into() }
+    }
+
     /// The system's refusal, with the path and what was tried.
     pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
         Error::Io { path: path.as_ref().to_path_buf(), action, source }
@@ -129,7 +145,9 @@ impl Error {
     /// What the user can do about it, where there is something to say beyond the message.
     pub fn help(&self) -> Option<String> {
         match self {
-            Error::Input { help, .. } | Error::Usage { help, .. } => (!help.is_empty()).then(|| help.clone()),
+            Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => {
+                (!help.is_empty()).then(|| help.clone())
+            }
             Error::Io { action, source, .. } => Some(match source.kind() {
                 std::io::ErrorKind::NotFound => "check the path for typing errors".to_owned(),
                 std::io::ErrorKind::PermissionDenied => {

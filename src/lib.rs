@@ -2,7 +2,8 @@
 //!
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
-//! (the number a lane computes with), [`conformance`] (other simulators' tables) and [`cli`].
+//! (the number a lane computes with), [`gpu`] (compute devices), [`conformance`] (other simulators' tables) and
+//! [`cli`].
 
 mod atomic_file;
 pub mod cli;

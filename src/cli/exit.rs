@@ -20,14 +20,24 @@ pub enum Exit {
     VerificationFailed = 5,
     /// The system refused to read or write.
     Io = 6,
+    /// No usable compute device, or the device failed.
+    NoDevice = 7,
     /// A defect of the program.
     Internal = 70,
 }
 
 impl Exit {
     /// All, for documentation.
-    pub const ALL: [Exit; 7] =
-        [Exit::Ok, Exit::Usage, Exit::BadInput, Exit::Incomplete, Exit::VerificationFailed, Exit::Io, Exit::Internal];
+    pub const ALL: [Exit; 8] = [
+        Exit::Ok,
+        Exit::Usage,
+        Exit::BadInput,
+        Exit::Incomplete,
+        Exit::VerificationFailed,
+        Exit::Io,
+        Exit::NoDevice,
+        Exit::Internal,
+    ];
 
     /// The number.
     pub fn code(self) -> u8 {
@@ -43,6 +53,7 @@ impl Exit {
             Exit::Incomplete => "a result was written, but parts of the input were left out",
             Exit::VerificationFailed => "a check did not pass",
             Exit::Io => "the system refused to read or write",
+            Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a defect of the program",
         }
     }
@@ -60,6 +71,7 @@ impl From<&Error> for Exit {
             Error::Input { .. } => Exit::BadInput,
             Error::Usage { .. } => Exit::Usage,
             Error::Io { .. } => Exit::Io,
+            Error::Device { .. } => Exit::NoDevice,
             Error::Verification(_) => Exit::VerificationFailed,
             Error::Internal(_) => Exit::Internal,
         }

@@ -4,6 +4,7 @@
 mod case_flags;
 mod conformance;
 mod console;
+mod devices;
 mod exit;
 mod mine;
 mod simulate;
@@ -71,6 +72,7 @@ enum Verb {
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
+    Devices(devices::Devices),
 }
 
 /// Profile flags of every verb that simulates.
@@ -143,6 +145,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
+        Verb::Devices(verb) => verb.run(),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::score::{
 };
 
 /// Columns of a terminal that every table fits in.
-pub(super) const WIDTH: usize = 120;
+pub(crate) const WIDTH: usize = 120;
 
 /// An empty table that breaks its cells rather than the terminal's lines.
 fn table(header: Vec<String>) -> Table {
@@ -143,7 +143,7 @@ fn difference(row: &ClaimRow) -> String {
 }
 
 /// The text broken between words; a longer word stays whole.
-pub(super) fn wrap(text: &str, width: usize) -> String {
+pub(crate) fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.len() - 1;

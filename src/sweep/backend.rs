@@ -125,4 +125,8 @@ pub trait Session {
     fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
         1 << 17
     }
+    /// Time that the device itself has computed so far, s, where it can tell.
+    fn device_seconds(&self) -> Option<f64> {
+        None
+    }
 }

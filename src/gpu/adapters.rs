@@ -1,0 +1,300 @@
+//! Which compute devices this machine has, and what each can do.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::{Error, Result};
+
+/// What kind of processor stands behind an adapter, as its driver says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DeviceKind {
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU that shares the processor's memory.
+    Integrated,
+    /// A GPU that a hypervisor passes on, whole or in part.
+    Virtual,
+    /// A rasterizer that runs on the processor: llvmpipe, WARP.
+    Software,
+    /// The driver does not say; OpenGL never does for a discrete GPU.
+    Other,
+}
+
+impl DeviceKind {
+    /// Name in tables.
+    pub fn label(self) -> &'static str {
+        match self {
+            DeviceKind::Discrete => "discrete",
+            DeviceKind::Integrated => "integrated",
+            DeviceKind::Virtual => "virtual",
+            DeviceKind::Software => "software",
+            DeviceKind::Other => "other",
+        }
+    }
+}
+
+impl From<wgpu::DeviceType> for DeviceKind {
+    fn from(kind: wgpu::DeviceType) -> Self {
+        match kind {
+            wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
+            wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
+            wgpu::DeviceType::VirtualGpu => DeviceKind::Virtual,
+            wgpu::DeviceType::Cpu => DeviceKind::Software,
+            wgpu::DeviceType::Other => DeviceKind::Other,
+        }
+    }
+}
+
+/// Interface to a device, in order of preference: Vulkan first, because only there the shader reaches the
+/// driver with every rounding pinned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub enum Api {
+    /// Vulkan.
+    Vulkan,
+    /// Metal (macOS).
+    Metal,
+    /// Direct3D 12 (Windows).
+    #[serde(rename = "DX12")]
+    Dx12,
+    /// OpenGL or OpenGL ES.
+    #[serde(rename = "GL")]
+    Gl,
+}
+
+impl Api {
+    /// Name in tables.
+    pub fn label(self) -> &'static str {
+        match self {
+            Api::Vulkan => "Vulkan",
+            Api::Metal => "Metal",
+            Api::Dx12 => "DX12",
+            Api::Gl => "GL",
+        }
+    }
+
+    fn of(backend: wgpu::Backend) -> Option<Api> {
+        match backend {
+            wgpu::Backend::Vulkan => Some(Api::Vulkan),
+            wgpu::Backend::Metal => Some(Api::Metal),
+            wgpu::Backend::Dx12 => Some(Api::Dx12),
+            wgpu::Backend::Gl => Some(Api::Gl),
+            wgpu::Backend::Noop | wgpu::Backend::BrowserWebGpu => None,
+        }
+    }
+}
+
+impl fmt::Display for Api {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.label())
+    }
+}
+
+/// The limits that bound a chunk of lanes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct AdapterLimits {
+    /// Largest buffer, bytes.
+    pub max_buffer_size: u64,
+    /// Largest part of a buffer that a shader can see at once, bytes.
+    pub max_storage_buffer_binding_size: u64,
+    /// Most workgroups along one axis of a dispatch.
+    pub max_compute_workgroups_per_dimension: u32,
+    /// Most lanes in a workgroup.
+    pub max_compute_invocations_per_workgroup: u32,
+}
+
+/// One device under one interface, described without the interface's types.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AdapterCard {
+    /// Position in [`Adapters::cards`]; what `--device INDEX` counts.
+    pub index: usize,
+    /// The device's name, as its driver says.
+    pub name: String,
+    /// Kind of processor.
+    pub kind: DeviceKind,
+    /// Interface it is reached through.
+    pub api: Api,
+    /// Driver; empty where the interface does not tell.
+    pub driver: String,
+    /// Version of the driver, in its own words; may be empty.
+    pub driver_info: String,
+    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case ([`pci_bus_id`]); `None` where the interface does
+    /// not tell and for what is on no bus.
+    pub pci_bus_id: Option<String>,
+    /// Vendor, as a PCI id where the vendor has one.
+    pub vendor: u32,
+    /// Model, by the vendor's numbering; 0 where the interface does not tell.
+    pub device: u32,
+    /// Limits of a dispatch.
+    pub limits: AdapterLimits,
+    /// The device can time its own work.
+    pub timestamps: bool,
+    /// The shader can be handed over as SPIR-V with every float operation kept as written, so that results
+    /// equal the processor's: Vulkan with shader passthrough. Elsewhere equality is not promised.
+    pub exact_path: bool,
+}
+
+impl AdapterCard {
+    fn of(adapter: &wgpu::Adapter) -> Option<AdapterCard> {
+        let info = adapter.get_info();
+        let api = Api::of(info.backend)?;
+        let limits = adapter.limits();
+        let features = adapter.features();
+        Some(AdapterCard {
+            index: 0,
+            name: info.name.trim().to_owned(),
+            kind: info.device_type.into(),
+            api,
+            driver: info.driver,
+            driver_info: info.driver_info,
+            pci_bus_id: pci_bus_id(&info.device_pci_bus_id),
+            vendor: info.vendor,
+            device: info.device,
+            limits: AdapterLimits {
+                max_buffer_size: limits.max_buffer_size,
+                max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
+                max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
+                max_compute_invocations_per_workgroup: limits.max_compute_invocations_per_workgroup,
+            },
+            timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+            exact_path: api == Api::Vulkan && features.contains(wgpu::Features::PASSTHROUGH_SHADERS),
+        })
+    }
+
+    /// A GPU, as far as its driver says so; `Other` could be anything and counts as none.
+    pub fn is_real(&self) -> bool {
+        matches!(self.kind, DeviceKind::Discrete | DeviceKind::Virtual | DeviceKind::Integrated)
+    }
+
+    /// Whether the environment hides it ([`super::visible()`]): a GPU that is not in the list of allowed PCI bus
+    /// ids, also one without an id. A software rasterizer never: the environment speaks of GPUs.
+    pub fn is_hidden_by(&self, visible: Option<&[String]>) -> bool {
+        let Some(visible) = visible else { return false };
+        self.kind != DeviceKind::Software && !self.pci_bus_id.as_ref().is_some_and(|bus| visible.contains(bus))
+    }
+
+    /// Index, name, interface and PCI bus id, to tell devices apart in a message.
+    pub fn one_line(&self) -> String {
+        let bus = self.pci_bus_id.as_ref().map(|bus| format!(", pci:{bus}")).unwrap_or_default();
+        format!("{}: {} ({}, {}{bus})", self.index, self.name, self.kind.label(), self.api)
+    }
+}
+
+/// The devices of this machine, in an order that does not change from run to run.
+#[derive(Debug, Clone)]
+pub struct Adapters {
+    cards: Vec<AdapterCard>,
+    adapters: Vec<wgpu::Adapter>,
+}
+
+impl Adapters {
+    /// Asks every driver for its devices. A machine without any gives an empty list, never an error.
+    ///
+    /// OpenGL is asked only where no other interface answers: it shows the same devices again, without bus ids.
+    ///
+    /// Nothing is written to stdout. On stderr Mesa's device-select layer of Vulkan says twice that
+    /// `XDG_RUNTIME_DIR` is not set, where it is not and there is no display; `NODEVICE_SELECT=1` silences it.
+    pub fn enumerate() -> Adapters {
+        let mut found = ask(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
+        if found.is_empty() {
+            found = ask(wgpu::Backends::GL);
+        }
+        found.sort_by(|(a, _), (b, _)| order(a).cmp(&order(b)));
+        let (mut cards, adapters): (Vec<AdapterCard>, Vec<wgpu::Adapter>) = found.into_iter().unzip();
+        for (index, card) in cards.iter_mut().enumerate() {
+            card.index = index;
+        }
+        Adapters { cards, adapters }
+    }
+
+    /// What is known of each: by interface, real before software, by PCI bus id, by name.
+    pub fn cards(&self) -> &[AdapterCard] {
+        &self.cards
+    }
+
+    /// The adapter of a card, to open the device with; the list keeps its own.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if there is no card with this index.
+    pub fn take(&self, index: usize) -> Result<wgpu::Adapter> {
+        let adapter = self.adapters.get(index).cloned();
+        adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was asked for", self.adapters.len())))
+    }
+}
+
+fn ask(backends: wgpu::Backends) -> Vec<(AdapterCard, wgpu::Adapter)> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = backends;
+    // The same in every build: validation layers are slow and talk.
+    descriptor.flags = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    let instance = wgpu::Instance::new(descriptor);
+    let adapters = pollster::block_on(instance.enumerate_adapters(backends));
+    adapters.into_iter().filter_map(|adapter| Some((AdapterCard::of(&adapter)?, adapter))).collect()
+}
+
+/// What the list is ordered by. Model numbers last, for twins without a bus id.
+fn order(card: &AdapterCard) -> impl Ord {
+    let software = card.kind == DeviceKind::Software;
+    let bus = card.pci_bus_id.clone();
+    (card.api, software, bus.is_none(), bus.map(|b| (b.len(), b)), card.name.clone(), card.vendor, card.device)
+}
+
+/// A place on the PCI bus in one form: `dddd:bb:dd.f`, hexadecimal, lower case.
+///
+/// Takes what tools print: `65:00.0`, `0000:65:00.0`, `00000000:65:00.0`, with or without `pci:` and the function.
+/// `None` if the text is no PCI bus id.
+pub fn pci_bus_id(text: &str) -> Option<String> {
+    let text = text.trim();
+    let text = match text.get(..4) {
+        Some(prefix) if prefix.eq_ignore_ascii_case("pci:") => &text[4..],
+        _ => text,
+    };
+    let hex = |digits: &str, most: u32| {
+        let plain = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_hexdigit());
+        plain.then(|| u32::from_str_radix(digits, 16).ok()).flatten().filter(|&n| n <= most)
+    };
+    let parts: Vec<&str> = text.split(':').collect();
+    let (domain, bus, rest) = match parts[..] {
+        [domain, bus, rest] => (hex(domain, u32::MAX)?, bus, rest),
+        [bus, rest] => (0, bus, rest),
+        _ => return None,
+    };
+    let (device, function) = rest.split_once('.').unwrap_or((rest, "0"));
+    let (bus, device, function) = (hex(bus, 0xff)?, hex(device, 0x1f)?, hex(function, 7)?);
+    Some(format!("{domain:04x}:{bus:02x}:{device:02x}.{function:x}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_id_has_one_form_however_a_tool_prints_it() {
+        for text in ["65:00.0", "0000:65:00.0", "00000000:65:00.0", "pci:0:65:0", "PCI:0000:65:00", " 0000:65:00.0\n"] {
+            assert_eq!(pci_bus_id(text).as_deref(), Some("0000:65:00.0"), "{text}");
+        }
+        assert_eq!(pci_bus_id("10000:E1:1F.7").as_deref(), Some("10000:e1:1f.7"));
+    }
+
+    #[test]
+    fn what_is_no_bus_id_gives_none() {
+        for text in ["", "65", "0000:65:00.8", "0000:100:00.0", "0000:65:20.0", "x:65:00.0", "1:2:3:4", "+1:00.0", ":"]
+        {
+            assert_eq!(pci_bus_id(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_list_is_ordered_numbered_and_the_same_twice() {
+        let (first, second) = (Adapters::enumerate(), Adapters::enumerate());
+        assert_eq!(first.cards(), second.cards());
+        assert!(first.cards().is_sorted_by(|a, b| order(a) <= order(b)));
+        for (at, card) in first.cards().iter().enumerate() {
+            assert_eq!(card.index, at);
+            let info = first.take(at).unwrap().get_info();
+            assert_eq!((info.name.trim(), Api::of(info.backend)), (&card.name[..], Some(card.api)));
+        }
+        assert!(matches!(first.take(first.cards().len()), Err(Error::Internal(_))));
+    }
+}

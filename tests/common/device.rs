@@ -1,0 +1,23 @@
+//! Where device tests find a device: a software Vulkan, which any machine can have.
+
+#![allow(dead_code)] // every test binary uses its own part
+
+use std::io::Write;
+
+use lanesweep::gpu::{Adapters, Api, DeviceKind};
+
+/// The devices of this machine and the index of its software Vulkan (Mesa's llvmpipe: on Debian, libvulkan1 and
+/// mesa-vulkan-drivers); where there is none, says so loudly and gives `None`: the test returns. With the
+/// environment variable `LANESWEEP_REQUIRE_DEVICE` it fails instead, so that no check is skipped unseen.
+pub fn software_device() -> Option<(Adapters, usize)> {
+    let adapters = Adapters::enumerate();
+    let is_it = |kind, api| kind == DeviceKind::Software && api == Api::Vulkan;
+    if let Some(index) = adapters.cards().iter().position(|card| is_it(card.kind, card.api)) {
+        return Some((adapters, index));
+    }
+    let why = "needs a software Vulkan (Debian: libvulkan1 mesa-vulkan-drivers)";
+    assert!(std::env::var_os("LANESWEEP_REQUIRE_DEVICE").is_none(), "LANESWEEP_REQUIRE_DEVICE is set, but this {why}");
+    // Past the test harness, which shows the output of failing tests only.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    None
+}
