@@ -119,7 +119,8 @@ impl<'a> Seen<'a> {
         let visible = match &self.visible {
             Ok(visible) => visible.as_deref(),
             Err(_) => {
-                return "--backend auto takes nothing: the environment cannot be understood (see the error).".to_owned();
+                return "--backend auto takes nothing: the environment cannot be understood (see the error)."
+                    .to_owned();
             }
         };
         let real = self.cards.iter().filter(|card| card.is_real()).count();

@@ -106,18 +106,28 @@ fn resolve<'a>(variable: &str, entry: &str, gpus: &'a [NvidiaGpu]) -> Result<&'a
     let Ok(number) = entry.parse::<u32>() else {
         return fail(format!("`{entry}` is neither an index nor a UUID (GPU-…)"));
     };
-    // Slurm's numbers are device files; an old driver that does not tell them numbers along the bus.
-    let by_minor = variable != CUDA && gpus.iter().all(|gpu| gpu.minor.is_some());
-    let found = if by_minor { gpus.iter().find(|gpu| gpu.minor == Some(number)) } else { gpus.get(number as usize) };
+    let found = gpus.iter().enumerate().find(|&(at, gpu)| number_of(variable, at, gpu, gpus) == number as usize);
     match found {
-        Some(gpu) => Ok(gpu),
+        Some((_, gpu)) => Ok(gpu),
         None => fail(format!("there is no GPU {entry}")),
     }
 }
 
+/// The number of the GPU at this place of the bus in the variable's count. Slurm's numbers are device files; an old
+/// driver that does not tell those is taken to number along the bus.
+fn number_of(variable: &str, at: usize, gpu: &NvidiaGpu, gpus: &[NvidiaGpu]) -> usize {
+    match gpu.minor {
+        Some(minor) if variable != CUDA && gpus.iter().all(|gpu| gpu.minor.is_some()) => minor as usize,
+        _ => at,
+    }
+}
+
 fn unusable(variable: &str, problem: String, gpus: &[NvidiaGpu]) -> Error {
-    let known: Vec<String> =
-        gpus.iter().enumerate().map(|(at, gpu)| format!("{at} = {} = pci:{}", gpu.uuid, gpu.bus)).collect();
+    let known: Vec<String> = gpus
+        .iter()
+        .enumerate()
+        .map(|(at, gpu)| format!("{} = {} = pci:{}", number_of(variable, at, gpu, gpus), gpu.uuid, gpu.bus))
+        .collect();
     Error::usage(
         Place::item(variable),
         problem,
@@ -258,6 +268,8 @@ mod tests {
         let node = node();
         assert_eq!(on(node.path(), &[("SLURM_JOB_GPUS", "0,1")]).unwrap(), buses([2, 1]));
         assert_eq!(on(node.path(), &[(CUDA, "0,1")]).unwrap(), buses([0, 1]));
+        let problem = problem(on(node.path(), &[("SLURM_JOB_GPUS", "7")]));
+        assert!(problem.contains("0 = GPU-2222cccc-0000 = pci:0000:ca:00.0"), "{problem}");
     }
 
     #[test]
