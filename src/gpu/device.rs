@@ -117,10 +117,8 @@ impl Device {
         let (uncaptured, lost) = (note(&trouble), note(&trouble));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaptured(error.to_string())));
         device.set_device_lost_callback(move |reason, message| lost(format!("it was lost ({reason:?}): {message}")));
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("lane"),
-            entries: &entries(),
-        });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lane"), entries: &entries() });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("lane"),
             bind_group_layouts: &[Some(&layout)],

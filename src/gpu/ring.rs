@@ -230,10 +230,8 @@ impl Slot {
             .map_err(|e| device.failed(e.to_string()))?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let answer = {
-            let view = buffers
-                .readback
-                .get_mapped_range(0..flight.parts.total())
-                .map_err(|e| device.failed(e.to_string()))?;
+            let view =
+                buffers.readback.get_mapped_range(0..flight.parts.total()).map_err(|e| device.failed(e.to_string()))?;
             read(device, &flight, &view, wall_s)
         };
         buffers.readback.unmap();

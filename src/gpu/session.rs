@@ -137,8 +137,8 @@ impl<'p> GpuSession<'p> {
                     .into_par_iter()
                     .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
                     .collect();
-                let outcomes =
-                    outcomes.ok_or_else(|| Error::device(&self.device, "it left a lane unwritten", "use --backend cpu"))?;
+                let outcomes = outcomes
+                    .ok_or_else(|| Error::device(&self.device, "it left a lane unwritten", "use --backend cpu"))?;
                 // Pieces come in the plan's order.
                 chunk.outcomes.extend(outcomes);
             }

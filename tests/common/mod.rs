@@ -73,3 +73,4 @@ fn folder_with_tracks(folder: &std::path::Path) -> Option<PathBuf> {
     let below = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
     below.filter(|path| path.is_dir()).find_map(|path| folder_with_tracks(&path))
 }
+pub mod device;
