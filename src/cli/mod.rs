@@ -1,6 +1,7 @@
 //! The command line: one file per verb. What was typed is parsed here; what it means is decided in the
 //! library. Data goes to stdout, log and progress to stderr.
 
+mod backend_flags;
 mod case_flags;
 mod conformance;
 mod console;
