@@ -17,6 +17,8 @@ pub(super) enum Purpose {
     Freeze = 3,
     /// Cases on thresholds.
     Threshold = 4,
+    /// The series that cases on thresholds share.
+    ThresholdPool = 5,
 }
 
 /// A stream of random numbers.

@@ -1,14 +1,20 @@
 //! Lane sets for verification: plans whose lanes a backend must compute word for word like the CPU.
 //!
-//! Here lives the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers). Here
+//! Here live the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers) and the
+//! set on the decision thresholds ([`threshold_plan`]: lanes where one unit in the last place decides). Here
 //! lives no comparison of backends and no physics. Cases are pure functions of (seed, category, unit,
 //! variant), so the key of a lane alone says how to make it again. Plans go to [`crate::sweep`].
 
 mod draw;
 mod pool;
 mod random;
+mod scene;
+mod series;
+mod solve;
+mod thresholds;
 
 pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
+pub use thresholds::{SIDES, Threshold, ThresholdOptions, threshold_plan};
 
 use crate::scenario::Category;
 use crate::{Error, Place, Result};
