@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
-use lanesweep::criterion::{Criterion, LateralGate};
+use lanesweep::criterion::Criterion;
 use lanesweep::driver::{ModelId, View};
 use lanesweep::profile::Profile;
 use lanesweep::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED};
@@ -311,63 +311,133 @@ fn sides(threshold: Threshold, p: &Profile, view: &View<f32>, y: f32, ego_width:
     })
 }
 
-/// Units of each threshold in the tests below.
+/// Units of each threshold in the tests below; each has four headways.
 const UNITS: u64 = 24;
 
+/// Units of a threshold in a block.
+fn units_of(plan: &LanePlan, block: usize, threshold: Threshold) -> impl Iterator<Item = u64> {
+    (0..plan.blocks[block].units.len() as u64).filter(move |&unit| Threshold::of_unit(unit) == threshold)
+}
+
 #[test]
-fn probe() {
+fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
     for name in ["paper", "jrc-2021", "un-r157"] {
         let plan = thresholds(name, 157, UNITS);
-        let all = outcomes(&plan, 0..plan.unit_count());
-        let steps: f64 = all.iter().map(|o| f64::from(o.end_step) + 1.0).sum();
-        println!("{name}: {} lanes, {:.0} steps", all.len(), steps / all.len() as f64);
-        for (at, block) in plan.blocks.iter().enumerate() {
+        for block in 0..plan.blocks.len() {
             for threshold in Threshold::ALL {
-                let mut equal = 0;
-                let mut changes = [0; 3];
-                let mut values = 0;
-                for unit in (0..block.units.len() as u64).filter(|&u| Threshold::of_unit(u) == threshold) {
-                    let case = plan.case(at, unit, 0);
-                    for headway in 0..4 {
-                        equal += usize::from(first_step(&plan, at, &case, headway).iter().any(|(view, y)| {
+                let (mut on, mut between, mut in_time) = (0, 0, false);
+                for (unit, headway) in
+                    units_of(&plan, block, threshold).flat_map(|u| (0..plan.headways.len()).map(move |h| (u, h)))
+                {
+                    // Per side, per vehicle.
+                    let seen = [0, 1, 2].map(|side| {
+                        let case = plan.case(block, unit, side);
+                        let both = |(view, y): &(View<f32>, f32)| {
                             sides(threshold, &plan.profile, view, *y, case.ego_width as f32)
-                                .is_some_and(|(a, b)| a == b)
-                        }));
-                    }
-                    let first = plan.first_lane_of(block.first_unit + unit) as usize;
-                    for lane in 0..16 {
-                        let o = [0, 1, 2].map(|side| &all[first + side * 16 + lane]);
-                        let word = |o: &Outcome<f64>| (o.verdicts, o.reaction_step);
-                        let full =
-                            |o: &Outcome<f64>| (o.verdicts, o.reaction_step, o.end_step, o.contact_step, o.contact);
-                        let c = (word(o[0]) != word(o[1])) as usize | (((word(o[0]) != word(o[2])) as usize) << 1);
-                        if c & 1 != 0 {
-                            changes[0] += 1
-                        }
-                        if c & 2 != 0 {
-                            changes[1] += 1
-                        }
-                        if full(o[0]) != full(o[1]) || full(o[0]) != full(o[2]) {
-                            changes[2] += 1
-                        }
-                        if o[0].max_btn != o[1].max_btn || o[0].max_btn != o[2].max_btn {
-                            values += 1
-                        }
-                    }
+                        };
+                        first_step(&plan, block, &case, headway).iter().map(both).collect::<Option<Vec<_>>>()
+                    });
+                    let [Some(exact), Some(below), Some(above)] = seen else {
+                        in_time = true;
+                        continue;
+                    };
+                    let equal = |k: usize| exact[k].0 == exact[k].1;
+                    let turns = |k: usize| {
+                        let (low, high) = (below[k].0 - below[k].1, above[k].0 - above[k].1);
+                        // Where products round, the comparison may still be equal on one side.
+                        equal(k) && low * high.signum() <= 0.0 && low != high
+                    };
+                    on += u64::from((0..exact.len()).any(equal));
+                    between += u64::from((0..exact.len()).any(turns));
                 }
-                println!(
-                    "  {:8} {:18} equal {:3}/{}  below {:3} above {:3} any word {:3} btn {}",
-                    block.category.key(),
-                    threshold.name(),
-                    equal,
-                    UNITS,
-                    changes[0],
-                    changes[1],
-                    changes[2],
-                    values
-                );
+                if in_time {
+                    continue;
+                }
+                assert!(on >= UNITS, "{name}, block {block}, {}: {on} lanes", threshold.name());
+                // A speed has nothing below 0; there the other vehicle is the faster one.
+                let enough = between >= UNITS / 2 || threshold == Threshold::StandingEgo;
+                assert!(enough, "{name}, block {block}, {}: {between} lanes between", threshold.name());
             }
         }
     }
-    let _ = LateralGate::Overlap;
+}
+
+#[test]
+fn one_unit_in_the_last_place_decides_somewhere_at_every_threshold() {
+    for name in ["paper", "un-r157"] {
+        let plan = thresholds(name, 157, UNITS);
+        let all = outcomes(&plan, 0..plan.unit_count());
+        for (at, block) in plan.blocks.iter().enumerate() {
+            let per_variant = plan.headways.len() * plan.models.len();
+            for threshold in Threshold::ALL {
+                // Differences between the sides of one lane.
+                let differ = |of: &dyn Fn(&Outcome<f64>) -> String| {
+                    let lanes = units_of(&plan, at, threshold).flat_map(|unit| {
+                        let first = plan.first_lane_of(block.first_unit + unit) as usize;
+                        (0..per_variant).map(move |k| [0, 1, 2].map(|side| first + side * per_variant + k))
+                    });
+                    lanes.filter(|&[s, b, a]| of(&all[s]) != of(&all[b]) || of(&all[s]) != of(&all[a])).count()
+                };
+                let count = match threshold {
+                    // The verdict failed long before the room is gone; only the number becomes infinite.
+                    Threshold::BtnRoom => differ(&|o| o.max_btn.is_infinite().to_string()),
+                    // Kinks of the demand, which only counts after the reaction time.
+                    Threshold::PfsUnsafe | Threshold::CfsSafe | Threshold::CfsUnsafe => continue,
+                    // One step more of an acceleration is rarely a verdict.
+                    Threshold::SpeedEvent => differ(&|o| format!("{o:?}")),
+                    Threshold::Horizon => differ(&|o| o.end_step.to_string()),
+                    _ => differ(&|o| format!("{:?} {}", o.verdicts, o.reaction_step)),
+                };
+                // Braked from the first moment on, whatever the check says.
+                let always = match threshold {
+                    Threshold::Reg157Ttc | Threshold::Reg157Gate => &plan.profile.reg157.always_unsafe,
+                    Threshold::CchdmTtc | Threshold::CchdmGate => &plan.profile.cchdm.always_unsafe,
+                    _ => &Vec::new(),
+                };
+                let enough = count >= UNITS as usize / 2 || always.contains(&block.category);
+                assert!(enough, "{name}, {:?}, {}: {count} lanes", block.category, threshold.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn thresholds_in_time_are_met_to_the_step() {
+    let plan = thresholds("paper", 157, UNITS);
+    let all = outcomes(&plan, 0..plan.unit_count());
+    let cap = plan.profile.step_cap();
+    let met = |threshold: Threshold, holds: &dyn Fn(&LaneCase<f64>, &Outcome<f64>) -> bool| {
+        for (at, block) in plan.blocks.iter().enumerate() {
+            for side in 0..SIDES.len() {
+                let met = units_of(&plan, at, threshold).filter(|&unit| {
+                    let from = plan.first_lane_of(block.first_unit + unit) as usize;
+                    let per_variant = plan.headways.len() * plan.models.len();
+                    let lanes = &all[from + side * per_variant..from + (side + 1) * per_variant];
+                    let case = plan.case(at, unit, side);
+                    lanes.iter().any(|outcome| holds(&case, outcome))
+                });
+                let (met, side) = (met.count() as u64, SIDES[side]);
+                assert!(met >= UNITS / 2, "{:?} {} {side}: {met}", block.category, threshold.name());
+            }
+        }
+    };
+    // The vehicle that decides is the one that is noticed at all.
+    let noticed = |c: &LaneCase<f64>| c.others.map(|o| o.attend_from[0]).into_iter().min().unwrap();
+    met(Threshold::Attention, &|case, o| o.reaction_step == noticed(case));
+    let appears = |c: &LaneCase<f64>| c.others.map(|o| o.present_from).into_iter().max().unwrap();
+    met(Threshold::Appearance, &|case, o| o.reaction_step == appears(case));
+    met(Threshold::Horizon, &|case, o| o.end_step == case.horizon && o.end == EndReason::Settled);
+    met(Threshold::StepCap, &|case, o| (o.end == EndReason::Cap) == (case.horizon >= cap));
+    for (at, block) in plan.blocks.iter().enumerate() {
+        // The vehicle leaves in the step of the contact, or one step later.
+        let hit = units_of(&plan, at, Threshold::Disappearance).filter(|&unit| {
+            let per_variant = plan.headways.len() * plan.models.len();
+            let from = plan.first_lane_of(block.first_unit + unit) as usize;
+            (from..from + per_variant).any(|lane| {
+                let [exact, above] = [all[lane], all[lane + 2 * per_variant]];
+                exact.contact_step == NO_STEP && above.contact_step != NO_STEP
+            })
+        });
+        assert!(hit.count() as u64 >= UNITS / 2);
+    }
 }

@@ -3,7 +3,7 @@
 
 use super::draw::{Draw, Purpose};
 use super::series::{Across, Series, TINY, rounded};
-use super::solve::{hit, turn};
+use super::solve::{hit, next_other, turn};
 use super::thresholds::{HEADWAYS, Threshold};
 use crate::criterion::BrakeThreatMaximum;
 use crate::driver::{DriverModel, View};
@@ -245,10 +245,11 @@ impl Scenes {
                 return Some([0, 1, 2].map(|side| Scene { motion: self.series.still(s.motion, side), ..s }));
             }
         };
-        s.half_widths = hit(-lateral_gap, f64::from(y) - f64::from(lateral_gap), |width| -(y - width))?;
-        let width = s.half_widths;
-        (width >= 0.2)
-            .then(|| [width, width.next_up(), width.next_down()].map(|half_widths| Scene { half_widths, ..s }))
+        let minus_gap = |width: f32| -(y - width);
+        let width = hit(-lateral_gap, f64::from(y) - f64::from(lateral_gap), minus_gap)?;
+        // A smaller lateral gap is a larger width.
+        let widths = [width, next_other(width, true, minus_gap), next_other(width, false, minus_gap)];
+        (width >= 0.2).then(|| widths.map(|half_widths| Scene { half_widths, ..s }))
     }
 
     /// Thresholds that a step meets.

@@ -15,6 +15,19 @@ pub(super) fn hit(target: f32, guess: f64, f: impl Fn(f32) -> f32) -> Option<f32
     None
 }
 
+/// The nearest number below (`up` false) or above `x` that `f` turns into something else: where `f` rounds more
+/// coarsely than its argument, one ULP of the argument would change nothing.
+pub(super) fn next_other(x: f32, up: bool, f: impl Fn(f32) -> f32) -> f32 {
+    let mut other = x;
+    for _ in 0..1024 {
+        other = if up { other.next_up() } else { other.next_down() };
+        if f(other) != f(x) {
+            break;
+        }
+    }
+    other
+}
+
 /// The two neighbours in [low, high] between which `holds` turns from its value at `low` to its value at
 /// `high`; `None` where it is the same at both ends.
 pub(super) fn turn(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> Option<(f32, f32)> {
@@ -52,6 +65,13 @@ mod tests {
             assert!(below < at && above >= at && below.next_up() == above, "{at}: {below} {above}");
         }
         assert_eq!(turn(0.0, 1.0, |_| true), None);
+    }
+
+    #[test]
+    fn the_next_other_number_is_past_the_rounding() {
+        assert_eq!(next_other(1.0, true, |x| x), 1.0_f32.next_up());
+        let other = next_other(0.5, true, |x| 4.0 - x);
+        assert!(other > 0.5_f32.next_up() && 4.0 - other != 3.5 && 4.0 - other.next_down() == 3.5);
     }
 
     #[test]
