@@ -52,6 +52,23 @@ impl BackendFlags {
         }
     }
 
+    /// Opens what is to be verified: no check before the check, and no silent CPU.
+    ///
+    /// # Errors
+    /// As [`BackendFlags::open`]; [`Error::Device`] also where nothing was asked for and there is no GPU.
+    pub fn open_to_verify(&self) -> Result<Opened> {
+        let cpu = CpuBackend::lane_arithmetic();
+        if self.backend == BackendChoice::Cpu && self.device.is_none() {
+            return Ok(Opened { cpu, gpu: None });
+        }
+        let adapters = Adapters::enumerate();
+        let visible = visible_here()?;
+        let backend = if self.backend == BackendChoice::Cpu { BackendChoice::Cpu } else { BackendChoice::Gpu };
+        let chosen = choose(adapters.cards(), backend, self.device.as_ref(), visible.as_deref())?;
+        let index = chosen.ok_or_else(|| Error::Internal("a device was asked for and none was chosen".to_owned()))?;
+        Ok(Opened { cpu, gpu: Some(GpuBackend::open(&adapters, index, GpuOptions::default())?) })
+    }
+
     /// The CPU, for a flag that leaves no choice.
     ///
     /// # Errors
@@ -71,7 +88,8 @@ fn open_checked(adapters: &Adapters, index: usize) -> Result<GpuBackend> {
     if !gpu.is_exact() {
         let check = self_check(&gpu)?;
         if check.differing > 0 {
-            let problem = format!("{} of {} lanes of the self-check differ from the CPU's", check.differing, check.lanes);
+            let problem =
+                format!("{} of {} lanes of the self-check differ from the CPU's", check.differing, check.lanes);
             return Err(Error::device(&gpu.card().name, problem, "use --backend cpu, or the device through Vulkan"));
         }
     }

@@ -65,7 +65,8 @@ impl<R: Real> Session for CpuSession<'_, R> {
                     let from = verdicts.len();
                     verdicts.resize(from + count * per_unit, Verdicts::default());
                     verdicts[from..].par_chunks_mut(per_unit).enumerate().for_each(|(k, lanes)| {
-                        self.runner.run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
+                        self.runner
+                            .run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
                     });
                 }
                 Wanted::Outcomes => {

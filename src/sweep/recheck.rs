@@ -83,7 +83,8 @@ impl<'p> Recheck<'p> {
         outcome: Option<&Outcome<f64>>,
     ) -> Error {
         let found = outcome.map_or(format!("verdict bits {:#06b}", theirs.0), |o| format!("{o:?}"));
-        let expected = outcome.map_or(format!("verdict bits {:#06b}", ours.verdicts.0), |_| format!("{:?}", ours.widen()));
+        let expected =
+            outcome.map_or(format!("verdict bits {:#06b}", ours.verdicts.0), |_| format!("{:?}", ours.widen()));
         Error::Verification(format!(
             "lane {}: {device} says {found}, the CPU {expected}. Nothing that this device computed can be trusted; \
              `lanesweep verify` tells how often it errs, --backend cpu computes without it",

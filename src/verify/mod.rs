@@ -1,10 +1,11 @@
-//! Lane sets for verification: plans whose lanes a backend must compute word for word like the CPU.
+//! Verification: lanes that a backend must compute word for word like the CPU, and the comparison.
 //!
-//! Here live the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers) and the
+//! Here live the comparison of a backend with the CPU and the f64 reference ([`compare`]), the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers) and the
 //! set on the decision thresholds ([`threshold_plan`]: lanes where one unit in the last place decides). Here
-//! lives no comparison of backends and no physics. Cases are pure functions of (seed, category, unit,
+//! lives no physics. Cases are pure functions of (seed, category, unit,
 //! variant), so the key of a lane alone says how to make it again. Plans go to [`crate::sweep`].
 
+mod comparison;
 mod draw;
 mod pool;
 mod random;
@@ -13,6 +14,7 @@ mod series;
 mod solve;
 mod thresholds;
 
+pub use comparison::{Comparison, DifferingLane, SelfCheck, Tally, WORDS, compare, self_check};
 pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
 pub use thresholds::{SIDES, Threshold, ThresholdOptions, threshold_plan};
 

@@ -6,7 +6,7 @@ use super::series::{Across, Series, TINY, rounded};
 use super::solve::{hit, next_other, turn};
 use super::thresholds::{HEADWAYS, Threshold};
 use crate::criterion::BrakeThreatMaximum;
-use crate::driver::{DriverModel, View};
+use crate::driver::{DriverModel, MODELS, View};
 use crate::profile::Profile;
 use crate::scenario::{Category, Lateral, Motion, Tables};
 use crate::sweep::{Constants, LaneCase, LaneOther, NO_STEP, Start};
@@ -254,7 +254,7 @@ impl Scenes {
 
     /// Thresholds that a step meets.
     fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
-        let (dt, dt_s) = (self.constants[block].frame.dt, self.profile.frame.dt_s);
+        let (dt, dt_s) = (self.constants[block].frames[0].dt, self.profile.frame.dt_s);
         let dv = s.v_ego - s.v_other;
         let step = 1 + draw.below(5) as u32;
         let around = |step: u32| [step, step.saturating_sub(1), step + 1];
@@ -340,7 +340,7 @@ impl Scenes {
 
     /// What is added to the headway so that the lane's first gap is the scene's.
     fn gap_offset(&self, s: &Scene, block: usize) -> Option<f32> {
-        let frame = &self.constants[block].frame;
+        let frame = &self.constants[block].frames[0];
         let start = match HEADWAYS[s.start].start::<f32>() {
             Start::Headway(time) => time * s.v_ego,
             Start::Gap(gap) => gap,
@@ -359,7 +359,7 @@ impl Scenes {
             gap_offset: f64::from(offset),
             present_from: s.present_from,
             present_until: s.present_until,
-            attend_from: [s.attend_from; 4],
+            attend_from: [s.attend_from; MODELS],
             used: 1,
             judged: 1,
         };
