@@ -5,13 +5,13 @@ use super::draw::{Draw, Purpose};
 use super::series::{Across, Series, TINY, rounded};
 use super::solve::{hit, next_other, turn};
 use super::thresholds::{HEADWAYS, Threshold};
-use crate::criterion::BrakeThreatMaximum;
+use crate::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::driver::{DriverModel, MODELS, View};
 use crate::profile::Profile;
 use crate::scenario::{Category, Lateral, Motion, Tables};
 use crate::sweep::{Constants, LaneCase, LaneOther, NO_STEP, Start};
 
-/// Neighbours of gap 0 where 2⁻⁴⁰ cannot be had (behind a start of 10 m): one ULP of 10 m.
+/// Neighbours of gap 0 where 2⁻³² cannot be had (behind a start of 10 m): one ULP of 10 m.
 const SMALL: f32 = 1.0 / (1 << 20) as f32;
 /// Tries per unit: not every speed has a gap that f32 hits exactly.
 const TRIES: usize = 64;
@@ -203,7 +203,28 @@ impl Scenes {
             _ => return None,
         };
         let kept = s.gap >= nearest || on == Threshold::Behind;
-        kept.then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| Scene { gap, ..s }))
+        (kept && self.products_meet(on, &s))
+            .then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| Scene { gap, ..s }))
+    }
+
+    /// Where both sides are products, the turn may jump over equality: only scenes that meet it count.
+    fn products_meet(&self, on: Threshold, s: &Scene) -> bool {
+        let dv = s.v_ego - s.v_other;
+        let criteria = &self.profile.criteria;
+        match on {
+            Threshold::Btn if criteria.btn == BtnForm::EquivalentDelay => {
+                let limit = rounded(2.0 * criteria.btn_threshold * criteria.max_deceleration_mps2);
+                let delay = rounded(criteria.max_deceleration_mps2 / (2.0 * criteria.jerk_mps3));
+                dv * dv == limit * (s.gap - dv * delay)
+            }
+            Threshold::FsmGate => {
+                let view = self.view(s);
+                let passing = s.gap + s.half_lengths + s.half_lengths;
+                let margin = rounded(self.profile.fsm.lateral_gate_margin_s);
+                view.lateral_gap * dv == view.lateral_towards * (passing + margin * dv)
+            }
+            _ => true,
+        }
     }
 
     /// Thresholds that a width or a lateral speed meets.

@@ -4,9 +4,9 @@
 use super::draw::{Draw, Purpose};
 use crate::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
 
-/// Neighbour of 0 on either side: smaller than any step of a lane, and so far from the subnormals, which
-/// devices may flush, that neither its square nor a quotient of squares becomes one.
-pub(super) const TINY: f32 = 1.0 / (1_u64 << 40) as f32;
+/// Neighbour of 0 on either side: far below what a step moves, and so far from the subnormals, which devices
+/// may flush, that neither its third power (a form of the BTN) nor a quotient of its squares becomes one.
+pub(super) const TINY: f32 = 1.0 / (1_u64 << 32) as f32;
 
 /// Series per kind.
 const PER_KIND: usize = 32;
@@ -32,7 +32,7 @@ pub(super) struct Series {
     /// Begin and length of each speed series.
     speeds: Vec<[u32; 2]>,
     /// Begin and length of each lateral series, in the order of [`Across`]. Those of `Beside` stand in
-    /// threes: lateral speed 0, −2⁻⁴⁰, 2⁻⁴⁰.
+    /// threes: lateral speed 0, −2⁻³², 2⁻³².
     across: [Vec<[u32; 2]>; 3],
 }
 
@@ -96,7 +96,7 @@ impl Series {
         motion
     }
 
-    /// The same motion beside the ego with lateral speed 0, −2⁻⁴⁰ or 2⁻⁴⁰.
+    /// The same motion beside the ego with lateral speed 0, −2⁻³² or 2⁻³².
     pub fn still(&self, mut motion: Motion<f64>, side: usize) -> Motion<f64> {
         motion.lateral_offset += motion.lateral_len * side as u32;
         motion.lateral_towards = f64::from([0.0, -TINY, TINY][side]);

@@ -11,7 +11,7 @@ use crate::sweep::{Block, CaseSource, Headway, LaneCase, LanePlan};
 use crate::{Error, Place, Result};
 
 /// Variants of every unit: on the threshold (`S`), and the quantity that decides one ULP smaller and larger.
-/// Around 0 the neighbours are ±2⁻⁴⁰, which no device flushes; steps and times move by a step.
+/// Around 0 the neighbours are ±2⁻³², which no device flushes; steps and times move by a step.
 pub const SIDES: [&str; 3] = ["S", "below", "above"];
 
 /// A decision of the lanes.
