@@ -237,7 +237,7 @@ impl Pairs {
             let shift = 23 + self.below(2);
             // a·2^shift ≡ remainder (mod b)
             for _ in 0..shift {
-                a = if a % 2 == 0 { a / 2 } else { (a + b) / 2 };
+                a = if a.is_multiple_of(2) { a / 2 } else { (a + b) / 2 };
             }
             // Smaller mantissas are divided with 24 bits more, larger ones with 23.
             let a = if shift == 24 { a } else { a + b };
@@ -337,7 +337,7 @@ fn the_quotient_is_correctly_rounded_as_plain_wgsl() {
 
 /// The number of the specification: `cargo test --release --test exact_division -- --ignored --nocapture`.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "a longer run of the same"]
 fn twenty_million_quotients_are_correctly_rounded_from_every_guess() {
     assert_correct(Path::Exact(Checks::Checked), 20_000_000);
 }
