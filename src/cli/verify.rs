@@ -74,8 +74,7 @@ impl Verify {
             return self.one_lane(key, &profile, tested, verbosity);
         }
         let mut text = format!("Under test: {}\nProfile {}, seed {}\n\n", tested.describe(), profile.name, self.seed);
-        let mut equal = true;
-        let mut lanes = 0;
+        let (mut equal, mut lanes, mut differing) = (true, 0, 0);
         for (name, plan) in self.sets(&profile, verbosity)? {
             let bar = console::progress(verbosity, plan.lane_count(), name);
             let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
@@ -84,9 +83,14 @@ impl Verify {
             text.push('\n');
             equal &= comparison.is_equal();
             lanes += comparison.lanes();
+            differing += comparison.differing();
         }
-        text += &format!("{} of {lanes} lanes computed by the device itself: ", if equal { "All" } else { "NOT all" });
-        text += if equal { "every word equals the CPU's.\n" } else { "words differ from the CPU's.\n" };
+        text += &format!("{lanes} lanes, all computed by what is under test itself: ");
+        text += &if differing == 0 {
+            "every word equals the CPU's.\n".to_owned()
+        } else {
+            format!("{differing} DIFFER from the CPU's.\n")
+        };
         console::print(&text)?;
         if equal {
             Ok(Exit::Ok)
