@@ -26,8 +26,10 @@ fn lanes(
     }
     let at = lane / launch.headways;
     let record = run_lane(cases[launch.first_case + at], starts[lane - at * launch.headways]);
-    // Tells the host that this device computed every lane.
-    atomicAdd(&counts[launch.done_word], 1u);
+    // Tells the host that this device computed every lane, to its end.
+    if (record.word >> 8u) != END_NOT_YET {
+        atomicAdd(&counts[launch.done_word], 1u);
+    }
     if launch.wanted == WANTED_COUNTS {
         count_lane(launch, at % launch.variants, record);
     } else {

@@ -22,5 +22,6 @@ pub mod scenario;
 pub mod score;
 pub mod sweep;
 pub mod trajectory;
+pub mod verify;
 
 pub use error::{Error, Place, Result};

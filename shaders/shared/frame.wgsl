@@ -71,7 +71,8 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
     var v_before = v_ego;
     var reaction_step = NO_STEP;
     var record = Record(ttc_nothing(), btn_nothing(), UNBOUNDED);
-    var last = Last(END_CAP, 0u, CONTACT_NONE, 0u, 0.0, 0.0);
+    // Stays so only where a device leaves the loop before its end.
+    var last = Last(END_NOT_YET, 0u, CONTACT_NONE, 0u, 0.0, 0.0);
     for (var index = 0u; index < frame_step_cap; index++) {
         let a_ego = (v_ego - v_before) * frame_inverse_dt;
         let ego = EgoState(v_ego, a_ego, lane.ego_width);

@@ -1,6 +1,7 @@
 //! The command line: one file per verb. What was typed is parsed here; what it means is decided in the
 //! library. Data goes to stdout, log and progress to stderr.
 
+mod backend_flags;
 mod case_flags;
 mod conformance;
 mod console;
@@ -11,6 +12,7 @@ mod simulate;
 mod source;
 mod study;
 mod synth;
+mod verify;
 
 pub use exit::Exit;
 
@@ -72,6 +74,7 @@ enum Verb {
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
+    Verify(verify::Verify),
     Devices(devices::Devices),
 }
 
@@ -145,6 +148,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
+        Verb::Verify(verb) => verb.run(cli.common.verbosity()),
         Verb::Devices(verb) => verb.run(),
     }
 }

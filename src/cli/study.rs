@@ -7,6 +7,7 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
 use super::source::{self, Source};
 use super::synth::GeneratorFlags;
@@ -16,12 +17,13 @@ use crate::parameterization::ParameterizationOptions;
 use crate::report::files::make_folder;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
-use crate::report::run_record::{CategoryRecord, RunRecord, Timings};
+use crate::report::run_record::{CategoryRecord, RunRecord, SweepRecord, Timings};
 use crate::report::study::StudyReport;
 use crate::scenario::Category;
 use crate::score::{ScoreOptions, f1, judge_claims, score};
 use crate::sweep::{
-    Backend, CpuBackend, LanePlan, Partial, StudyOptions, StudyPlan, Wanted, chunks, plan_study, sweep,
+    Backend, CpuBackend, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, SweepOptions, SweepSummary,
+    Wanted, chunks, plan_study, sweep,
 };
 use crate::{Error, Place, Result};
 
@@ -64,6 +66,8 @@ pub struct Study {
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
+    #[command(flatten)]
+    backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
     #[command(flatten)]
@@ -121,17 +125,20 @@ impl Study {
                 "use more recordings, or relax the filters in the study file (--config)",
             ));
         }
+        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let reference = CpuBackend::reference();
+        let backend: &dyn Backend = if self.reference { &reference } else { opened.backend() };
+        let recheck = opened.device().map(|_| Recheck::new(&planned.plan, config.score.seed, ONE_IN));
         // Before the work, so that a folder that cannot be written to is known at once.
         make_folder(&self.out)?;
-        let backend: Box<dyn Backend> =
-            if self.reference { Box::new(CpuBackend::reference()) } else { Box::new(CpuBackend::lane_arithmetic()) };
+        let how = How { backend, fallback: opened.fallback(), recheck: recheck.as_ref() };
         tracing::info!("{} lanes on {}", planned.plan.lane_count(), backend.describe());
-        let partial = timed(&mut timings.sweep_s, || run_plan(&planned.plan, backend.as_ref(), verbosity))?;
+        let (partial, swept) = timed(&mut timings.sweep_s, || run_plan(&planned.plan, &how, verbosity))?;
         let scores = timed(&mut timings.score_s, || score(&planned.plan, &partial, &config.score))?;
         let claims = judge_claims(&scores);
         if let Some(path) = &self.lanes {
             let digits = if self.reference { Digits::Binary64 } else { Digits::Binary32 };
-            write_lanes(path, &planned.plan, backend.as_ref(), digits)?;
+            write_lanes(path, &planned.plan, &how, digits)?;
         }
         let comparison = self.compare_reference.then(|| compare_reference(&planned.plan)).transpose()?;
         let categories = category_records(&collection, &planned, &scores);
@@ -140,6 +147,13 @@ impl Study {
             data: source.describe(),
             synthetic: source.is_synthetic(),
             backend: backend.describe(),
+            device: opened.device(),
+            sweep: SweepRecord {
+                rechecked_lanes: swept.rechecked_lanes,
+                recheck_seed: config.score.seed,
+                redone_lanes: swept.redone_lanes,
+                device_s: swept.device_s,
+            },
             plan_sha256: planned.plan.hash().to_owned(),
             scenario_file_sha256: self.scenarios.as_deref().map(checksum).transpose()?,
             left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
@@ -194,16 +208,29 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     result
 }
 
-fn run_plan(plan: &LanePlan, backend: &dyn Backend, verbosity: Verbosity) -> Result<Partial> {
+/// Who computes the lanes, who stands in, who checks.
+struct How<'a> {
+    backend: &'a dyn Backend,
+    fallback: Option<&'a dyn Backend>,
+    recheck: Option<&'a Recheck<'a>>,
+}
+
+impl How<'_> {
+    fn options(&self, wanted: Wanted) -> SweepOptions<'_> {
+        SweepOptions { wanted, fallback: self.fallback, recheck: self.recheck }
+    }
+}
+
+fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
+    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &how.options(Wanted::Verdicts), |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
     })?;
     bar.finish_and_clear();
-    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)
+    Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
 }
 
 /// Every lane in f32 and in f64, chunk by chunk.
@@ -219,24 +246,21 @@ fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
-fn write_lanes(path: &Path, plan: &LanePlan, backend: &dyn Backend, digits: Digits) -> Result<()> {
+fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<()> {
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         make_folder(dir)?;
     }
-    let mut session = backend.prepare(plan)?;
     let mut failure = None;
     let written = crate::report::files::write_atomically_with(path, |out| {
         lanes::write_header(out)?;
-        for units in chunks(plan, 0..plan.unit_count()) {
-            match session.run(units, Wanted::Outcomes) {
-                Ok(chunk) => lanes::write_chunk(out, plan, &chunk, digits)?,
-                Err(error) => {
-                    failure = Some(error);
-                    return Err(std::io::Error::other("the sweep failed"));
-                }
-            }
-        }
-        Ok(())
+        let options = how.options(Wanted::Outcomes);
+        let swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
+            lanes::write_chunk(out, plan, &chunk, digits).map_err(|e| Error::io(path, "write", e))
+        });
+        swept.map(drop).map_err(|error| {
+            failure = Some(error);
+            std::io::Error::other("the sweep failed")
+        })
     });
     match failure {
         Some(error) => Err(error),

@@ -107,7 +107,8 @@ impl OutcomeRecord {
             _ => return None,
         };
         let end = match self.word >> 8 {
-            0 => EndReason::Contact,
+            // A record that no lane wrote reads as 0.
+            0 if contact != Contact::None => EndReason::Contact,
             1 => EndReason::Settled,
             2 => EndReason::Standstill,
             3 => EndReason::Cap,

@@ -295,12 +295,8 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let counts: Vec<u32> = bytemuck::pod_collect_to_vec(counts);
     let (done, cells) = counts.split_at(models);
     if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
-        return Err(device.failed(format!(
-            "it computed {} of {} lanes of {}",
-            done[model],
-            job.lanes(),
-            job.pipelines[model].model.name()
-        )));
+        let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
+        return Err(device.failed(format!("it computed {} of {lanes} lanes of {name} to their end", done[model])));
     }
     let per_model = |part: &[u8], model: usize| {
         let length = part.len() / models;

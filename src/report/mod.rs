@@ -12,3 +12,4 @@ pub mod reference;
 pub mod run_record;
 pub mod study;
 pub mod tables;
+pub mod verification;

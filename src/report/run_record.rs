@@ -44,6 +44,34 @@ pub struct Timings {
     pub score_s: f64,
 }
 
+/// The device that computed the lanes, where one did.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceRecord {
+    /// Name.
+    pub name: String,
+    /// Interface: Vulkan, Metal, DX12, GL.
+    pub api: &'static str,
+    /// Driver and its version.
+    pub driver: String,
+    /// Place on the PCI bus, where it is known.
+    pub pci_bus_id: Option<String>,
+    /// Float operations reached the driver as written.
+    pub exact_path: bool,
+}
+
+/// How the sweep went.
+#[derive(Debug, Clone, Serialize)]
+pub struct SweepRecord {
+    /// Lanes of the device that the CPU computed again, all equal.
+    pub rechecked_lanes: u64,
+    /// Seed of their choice.
+    pub recheck_seed: u64,
+    /// Lanes that the CPU computed because the device could not.
+    pub redone_lanes: u64,
+    /// Time that the device itself computed, s, where it can tell.
+    pub device_s: Option<f64>,
+}
+
 /// The whole record.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunRecord {
@@ -55,6 +83,10 @@ pub struct RunRecord {
     pub synthetic: bool,
     /// What computed the lanes.
     pub backend: String,
+    /// The device, where one did.
+    pub device: Option<DeviceRecord>,
+    /// How the sweep went.
+    pub sweep: SweepRecord,
     /// SHA-256 of the plan: everything that decides the outcomes.
     pub plan_sha256: String,
     /// SHA-256 of the scenario file, where one was read.

@@ -13,7 +13,7 @@ use crate::score::{
 pub(crate) const WIDTH: usize = 120;
 
 /// An empty table that breaks its cells rather than the terminal's lines.
-fn table(header: Vec<String>) -> Table {
+pub(super) fn table(header: Vec<String>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH as u16).set_header(header);
@@ -21,7 +21,7 @@ fn table(header: Vec<String>) -> Table {
 }
 
 /// Numbers to the right, the first `texts` columns to the left.
-fn aligned(mut table: Table, texts: usize) -> String {
+pub(super) fn aligned(mut table: Table, texts: usize) -> String {
     for (at, column) in table.column_iter_mut().enumerate() {
         column.set_cell_alignment(if at < texts { CellAlignment::Left } else { CellAlignment::Right });
     }

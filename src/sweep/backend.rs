@@ -83,6 +83,11 @@ pub struct Chunk {
 }
 
 impl Chunk {
+    /// Number of lanes.
+    pub fn lanes(&self) -> u64 {
+        if self.counts.is_empty() { self.verdicts.len() as u64 } else { self.counts.iter().map(|c| c.lanes).sum() }
+    }
+
     /// Checks that it holds exactly the lanes of its units in this plan.
     ///
     /// # Errors

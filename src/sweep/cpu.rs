@@ -7,13 +7,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::backend::{Backend, CellCounts, Chunk, Session, Wanted};
-use super::drivers::Constants;
-use super::frame::{Silent, Start};
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
+use super::runner::LaneRunner;
 use crate::Result;
 use crate::scalar::Real;
-use crate::scenario::Tables;
 
 /// Rayon over units, scalar lanes, in the arithmetic `R`.
 #[derive(Debug, Default)]
@@ -43,38 +41,13 @@ impl<R: Real> Backend for CpuBackend<R> {
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        Ok(Box::new(CpuSession::<R> {
-            plan,
-            tables: plan.tables().cast(),
-            constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
-            starts: plan.headways.iter().map(|h| h.start()).collect(),
-        }))
+        Ok(Box::new(CpuSession::<R> { plan, runner: LaneRunner::new(plan) }))
     }
 }
 
 struct CpuSession<'p, R> {
     plan: &'p LanePlan,
-    tables: Tables<R>,
-    /// One per block.
-    constants: Vec<Constants<R>>,
-    starts: Vec<Start<R>>,
-}
-
-impl<R: Real> CpuSession<'_, R> {
-    /// All lanes of one unit, in the plan's order.
-    fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
-        let variants = self.plan.blocks[block].variants.len();
-        let mut at = 0;
-        for variant in 0..variants {
-            let case = self.plan.case(block, unit, variant).cast::<R>();
-            for &start in &self.starts {
-                for &model in &self.plan.models {
-                    each(at, self.constants[block].run(model, &case, &self.tables, start, &mut Silent));
-                    at += 1;
-                }
-            }
-        }
-    }
+    runner: LaneRunner<'p, R>,
 }
 
 impl<R: Real> Session for CpuSession<'_, R> {
@@ -92,7 +65,8 @@ impl<R: Real> Session for CpuSession<'_, R> {
                     let from = verdicts.len();
                     verdicts.resize(from + count * per_unit, Verdicts::default());
                     verdicts[from..].par_chunks_mut(per_unit).enumerate().for_each(|(k, lanes)| {
-                        self.run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
+                        self.runner
+                            .run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
                     });
                 }
                 Wanted::Outcomes => {
@@ -100,7 +74,7 @@ impl<R: Real> Session for CpuSession<'_, R> {
                         .into_par_iter()
                         .map(|k| {
                             let mut lanes = Vec::with_capacity(per_unit);
-                            self.run_unit(block, inside.start + k as u64, |_, o| lanes.push(o.widen()));
+                            self.runner.run_unit(block, inside.start + k as u64, |_, o| lanes.push(o.widen()));
                             lanes
                         })
                         .collect();
@@ -115,7 +89,7 @@ impl<R: Real> Session for CpuSession<'_, R> {
                     let empty = || vec![CellCounts::EMPTY; cells];
                     let lanes_per_variant = plan.headways.len() * plan.models.len();
                     let of_units = (0..count).into_par_iter().fold(empty, |mut cells, k| {
-                        self.run_unit(block, inside.start + k as u64, |at, outcome| {
+                        self.runner.run_unit(block, inside.start + k as u64, |at, outcome| {
                             let cell = at / lanes_per_variant * plan.models.len() + at % plan.models.len();
                             cells[cell].count(&outcome);
                         });

@@ -12,7 +12,9 @@ mod lane_case;
 mod outcome;
 mod partial;
 mod plan;
+mod recheck;
 mod run;
+mod runner;
 mod study;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
@@ -24,5 +26,7 @@ pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Confusion, Partial, UnitCounts, WORST_LANES, WorstLane};
 pub(crate) use plan::hex;
 pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
-pub use run::{SweepSummary, chunks, sweep};
+pub use recheck::{ONE_IN, Recheck, same_words, words};
+pub use run::{SweepOptions, SweepSummary, chunks, sweep};
+pub use runner::LaneRunner;
 pub use study::{StudyOptions, StudyPlan, plan_study};

@@ -118,6 +118,9 @@ impl Partial {
     /// [`Error::Internal`] if the chunk does not fit the plan.
     pub fn from_chunk_keeping(plan: &LanePlan, chunk: &Chunk, worst_limit: usize) -> Result<Partial> {
         chunk.check(plan)?;
+        if !chunk.counts.is_empty() {
+            return Err(Error::Internal("a chunk of counts has no lanes to compare".to_owned()));
+        }
         Ok(Partial::empty_keeping(plan, worst_limit).counting(plan, chunk))
     }
 

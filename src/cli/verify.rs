@@ -1,0 +1,161 @@
+//! `lanesweep verify`: does this device compute what the CPU computes?
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::backend_flags::BackendFlags;
+use super::console::{self, Verbosity};
+use super::source::Source;
+use super::synth::GeneratorFlags;
+use super::{Exit, ProfileFlags};
+use crate::mining::MiningOptions;
+use crate::profile::Profile;
+use crate::report::verification;
+use crate::scenario::Category;
+use crate::sweep::{Backend, LanePlan, LaneRunner, StudyOptions, Wanted, plan_study};
+use crate::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
+use crate::{Error, Place, Result};
+
+/// Check that a device computes every lane as the CPU does
+///
+/// Runs the same lanes on the f64 reference, the CPU and the device: random ones, ones on the thresholds of
+/// every rule, and a study. Every output word of the device must equal the CPU's; the exit code tells.
+/// Without a GPU name a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --lanes 20000\n  lanesweep \
+                        verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM"
+)]
+pub struct Verify {
+    /// Folder of highD-format recordings for the study [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    dir: Option<PathBuf>,
+    /// Scenario file (JSON Lines) for the study
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Random lanes of each model in each category
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    lanes: u64,
+    /// Units of 12 lanes of each model on each threshold in each category
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    threshold_units: u64,
+    /// Seed of the random lanes and of those on thresholds
+    #[arg(long, value_name = "N", default_value_t = 157)]
+    seed: u64,
+    /// Run one lane again and print its words on each backend
+    #[arg(long, value_name = "KEY")]
+    lane: Option<String>,
+    #[command(flatten)]
+    backend: BackendFlags,
+    #[command(flatten)]
+    profile: ProfileFlags,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+/// Random lanes of a model and category at most: their units are named one by one.
+const MOST_LANES: u64 = 100_000_000;
+
+impl Verify {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        for (flag, value, most) in
+            [("--lanes", self.lanes, MOST_LANES), ("--threshold-units", self.threshold_units, MOST_LANES / 1000)]
+        {
+            if value == 0 || value > most {
+                let problem = format!("{value} is not usable; expected 1 to {most}");
+                return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
+            }
+        }
+        let profile = self.profile.load()?;
+        let opened = self.backend.open_to_verify()?;
+        let tested = opened.backend();
+        if let Some(key) = &self.lane {
+            return self.one_lane(key, &profile, tested, verbosity);
+        }
+        let mut text = format!("Under test: {}\nProfile {}, seed {}\n\n", tested.describe(), profile.name, self.seed);
+        let mut equal = true;
+        let mut lanes = 0;
+        for (name, plan) in self.sets(&profile, verbosity)? {
+            let bar = console::progress(verbosity, plan.lane_count(), name);
+            let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
+            bar.finish_and_clear();
+            text += &verification::comparison(&comparison);
+            text.push('\n');
+            equal &= comparison.is_equal();
+            lanes += comparison.lanes();
+        }
+        text += &format!("{} of {lanes} lanes computed by the device itself: ", if equal { "All" } else { "NOT all" });
+        text += if equal { "every word equals the CPU's.\n" } else { "words differ from the CPU's.\n" };
+        console::print(&text)?;
+        if equal {
+            Ok(Exit::Ok)
+        } else {
+            Err(Error::Verification(format!("{} does not compute what the CPU computes", tested.describe())))
+        }
+    }
+
+    /// The sets, by name.
+    fn sets(&self, profile: &Profile, verbosity: Verbosity) -> Result<Vec<(&'static str, LanePlan)>> {
+        Ok(vec![
+            ("Random lanes", self.random(profile)?),
+            ("Lanes on thresholds", self.thresholds(profile)?),
+            ("Study", self.study(profile, verbosity)?),
+        ])
+    }
+
+    fn random(&self, profile: &Profile) -> Result<LanePlan> {
+        let lanes_per_model_and_category = self.lanes;
+        random_plan(profile, &RandomOptions { seed: self.seed, lanes_per_model_and_category, ..Default::default() })
+    }
+
+    fn thresholds(&self, profile: &Profile) -> Result<LanePlan> {
+        let units_per_threshold = self.threshold_units;
+        threshold_plan(profile, &ThresholdOptions { seed: self.seed, units_per_threshold, ..Default::default() })
+    }
+
+    fn study(&self, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
+        let source = match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(self.generator.options()?),
+        };
+        let collection = source.load(&MiningOptions::default(), verbosity)?;
+        let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
+        Ok(plan_study(&collection.scenarios, profile, &options)?.plan)
+    }
+
+    /// One lane on the three backends.
+    fn one_lane(&self, text: &str, profile: &Profile, tested: &dyn Backend, verbosity: Verbosity) -> Result<Exit> {
+        let plan = match text.split('-').next() {
+            Some("random") => self.random(profile)?,
+            Some("threshold") => self.thresholds(profile)?,
+            _ => self.study(profile, verbosity)?,
+        };
+        let key = plan.parse_key(text).ok_or_else(|| {
+            Error::usage(
+                Place::item("--lane"),
+                format!("there is no lane `{text}` in this set"),
+                "copy the key from the list of differing lanes, and give the same --seed, --lanes and data",
+            )
+        })?;
+        let unit = plan.blocks[key.block].first_unit + key.unit;
+        let at = (plan.lane(&key) - plan.first_lane_of(unit)) as usize;
+        let chunk = tested.prepare(&plan)?.run(unit..unit + 1, Wanted::Outcomes)?;
+        chunk.check(&plan)?;
+        let reference = LaneRunner::<f64>::new(&plan).run(&key);
+        let cpu = LaneRunner::<f32>::new(&plan).run(&key).widen();
+        let theirs = chunk.outcomes[at];
+        let names = ["f64 reference", "CPU, f32", "under test"];
+        console::print(&format!(
+            "Under test: {}\n{}",
+            tested.describe(),
+            verification::lane(text, names, &[reference, cpu, theirs])
+        ))?;
+        if crate::sweep::same_words(&cpu, &theirs) {
+            Ok(Exit::Ok)
+        } else {
+            Err(Error::Verification(format!("lane {text} differs from the CPU's")))
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Single lanes on the CPU: what the CPU backend is made of, and what any other backend is checked with.
+
+use super::drivers::Constants;
+use super::frame::{Silent, Start};
+use super::lane_case::LaneCase;
+use super::outcome::Outcome;
+use super::plan::{LaneKey, LanePlan};
+use crate::driver::ModelId;
+use crate::scalar::Real;
+use crate::scenario::Tables;
+
+/// Runs lanes of a plan one by one, in the arithmetic `R`.
+pub struct LaneRunner<'p, R> {
+    plan: &'p LanePlan,
+    tables: Tables<R>,
+    /// One per block.
+    constants: Vec<Constants<R>>,
+    starts: Vec<Start<R>>,
+}
+
+impl<'p, R: Real> LaneRunner<'p, R> {
+    /// Rounds what the plan holds, once.
+    pub fn new(plan: &'p LanePlan) -> Self {
+        LaneRunner {
+            plan,
+            tables: plan.tables().cast(),
+            constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
+            starts: plan.headways.iter().map(|h| h.start()).collect(),
+        }
+    }
+
+    /// One lane.
+    pub fn run(&self, key: &LaneKey) -> Outcome<R> {
+        let case = self.plan.case(key.block, key.unit, key.variant).cast();
+        self.run_case(key.block, &case, self.starts[key.headway], self.plan.models[key.model])
+    }
+
+    /// All lanes of one unit, in the plan's order: position within the unit, outcome.
+    pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
+        let mut at = 0;
+        for variant in 0..self.plan.blocks[block].variants.len() {
+            let case = self.plan.case(block, unit, variant).cast();
+            for &start in &self.starts {
+                for &model in &self.plan.models {
+                    each(at, self.run_case(block, &case, start, model));
+                    at += 1;
+                }
+            }
+        }
+    }
+
+    fn run_case(&self, block: usize, case: &LaneCase<R>, start: Start<R>, model: ModelId) -> Outcome<R> {
+        self.constants[block].run(model, case, &self.tables, start, &mut Silent)
+    }
+}
