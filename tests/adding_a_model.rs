@@ -79,12 +79,15 @@ fn added_lines(old: &[u8], new: &[u8]) -> Vec<String> {
     added
 }
 
-/// Builds the program of the copy. Dependencies are those that are built already, because the folder of intermediate files is
-/// shared; the finished program goes to a folder of its own, so that it does not replace the ordinary one.
+/// Builds the program of the copy. Dependencies are those that are built already, because the folder of intermediate
+/// files is shared. Cargo knows a package by its path from its own root, which is the same for the copy and for us; only
+/// the profile tells the two apart there, and without a difference in it each would be taken for the other. The
+/// finished program goes to a folder of its own, so that it does not replace the ordinary one.
 fn build(copy: &Path) {
     let build_dir = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(copy).args(["build", "--release", "--offline", "--locked", "--bin", "lanesweep"]);
+    command.args(["--config", "profile.release.package.lanesweep.debug=false"]);
     command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
     let output = command.output().unwrap();
     assert!(output.status.success(), "{command:?}: {}\n{}", output.status, said(&output));
