@@ -4,20 +4,20 @@
 //! `cargo bench --bench paper_size` prints one CSV row per part and repetition to stdout (kept under
 //! `benches/runs` with the machine's facts) and a summary to stderr. Synthetic data; repetitions in turn.
 
+mod common;
+
 use std::path::Path;
 use std::time::Instant;
 
-use lanesweep::mining::{MiningOptions, mine_folder, mine_generated};
+use common::{lane_steps, paper_size_scenarios};
+use lanesweep::mining::{MiningOptions, mine_folder};
 use lanesweep::profile::Profile;
-use lanesweep::scenario::{Category, Scenario};
 use lanesweep::score::{ScoreOptions, score};
-use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, Wanted, plan_study, sweep};
+use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, SweepOptions, Wanted, plan_study, sweep};
 use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::trajectory::highd::{self, RecordingInfo};
 
 const REPETITIONS: usize = 5;
-/// The paper's kept scenarios.
-const PAPER: [(Category, usize); 3] = [(Category::CutIn, 362), (Category::CutOut, 819), (Category::Lvd, 482)];
 const LEAST_BYTES: u64 = 1_000_000_000;
 
 fn main() {
@@ -63,39 +63,14 @@ fn time<T>(part: &str, repetition: usize, amount: u64, unit: &str, work: impl Fn
     result
 }
 
-/// Synthetic scenarios, repeated under new keys up to the paper's numbers.
-fn paper_size_scenarios() -> Vec<Scenario> {
-    let mined = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap();
-    let mut scenarios = Vec::new();
-    for (category, count) in PAPER {
-        let kept: Vec<&Scenario> = mined.scenarios.iter().filter(|s| s.category == category && s.kept).collect();
-        for k in 0..count {
-            let mut scenario = kept[k % kept.len()].clone();
-            scenario.id = format!("{}#{}", scenario.id, k / kept.len());
-            scenarios.push(scenario);
-        }
-    }
-    scenarios
-}
-
 fn run(plan: &LanePlan, backend: &dyn Backend) -> Partial {
     let mut parts = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Verdicts, |chunk| {
+    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
         parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
     })
     .unwrap();
     parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
-}
-
-fn lane_steps(plan: &LanePlan, backend: &dyn Backend) -> u64 {
-    let mut steps = 0;
-    sweep(plan, 0..plan.unit_count(), backend, None, Wanted::Outcomes, |chunk| {
-        steps += chunk.outcomes.iter().map(|o| u64::from(o.end_step) + 1).sum::<u64>();
-        Ok(())
-    })
-    .unwrap();
-    steps
 }
 
 /// Recordings of ever new seeds until there is a gigabyte of files.

@@ -185,3 +185,18 @@ fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
     let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();
     assert!(error.to_string().contains("of 400 lanes") || error.to_string().contains("lanes of"), "{error}");
 }
+
+/// The plain path (naga's own module, as on Metal, DX12 and GL) may contract and reassociate: equality is not
+/// promised there, and what the drivers at hand do is printed.
+#[test]
+fn the_self_check_finds_what_the_plain_path_changes() {
+    let Some(gpu) = open(GpuOptions { plain: true, ..Default::default() }) else { return };
+    assert!(!gpu.is_exact());
+    let profile = Profile::load("paper").unwrap();
+    let found = compare("random", &random(&profile, 20_000), &gpu, |_| ()).unwrap();
+    let differing: u64 = found.tallies.iter().map(|t| t.lanes_differing).sum();
+    let verdicts: u64 = found.tallies.iter().map(|t| t.verdicts_differing).sum();
+    println!("{}: {differing} of {} lanes, {verdicts} verdict bits differ", gpu.describe(), found.lanes());
+    // One lane in a thousand is enough for the self-check, which decides there.
+    assert!(differing < found.lanes() / 1000 || self_check(&gpu).unwrap().differing > 0);
+}

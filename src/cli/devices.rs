@@ -6,8 +6,9 @@ use clap::Args;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, presets};
 
 use super::{Exit, console};
-use crate::gpu::{AdapterCard, Adapters, BackendChoice, choose, visible_here};
+use crate::gpu::{AdapterCard, Adapters, BackendChoice, GpuBackend, GpuOptions, choose, visible_here};
 use crate::report::tables::{WIDTH, wrap};
+use crate::verify::self_check;
 use crate::{Error, Result};
 
 /// List the compute devices and tell which one is used
@@ -20,16 +21,29 @@ pub struct Devices {
     /// Write JSON instead of a table
     #[arg(long)]
     json: bool,
+    /// Leave out the self-check, which opens every device
+    #[arg(long)]
+    no_self_check: bool,
 }
 
 impl Devices {
     pub fn run(&self) -> Result<Exit> {
         let adapters = Adapters::enumerate();
         let seen = Seen::new(adapters.cards(), visible_here());
-        let self_check = |_: usize| "-".to_owned();
+        let self_check = |index: usize| if self.no_self_check { "-".to_owned() } else { check(&adapters, index) };
         console::print(&if self.json { seen.json(&self_check)? } else { seen.text(&self_check) })?;
         // The list helps to correct the environment, so it comes first.
         seen.visible.map(|_| Exit::Ok)
+    }
+}
+
+/// Some thousand lanes on the device and on the CPU, in a word.
+fn check(adapters: &Adapters, index: usize) -> String {
+    let opened = GpuBackend::open(adapters, index, GpuOptions::default());
+    match opened.and_then(|gpu| self_check(&gpu)) {
+        Ok(check) if check.differing == 0 => format!("{} lanes equal", check.lanes),
+        Ok(check) => format!("{} of {} differ", check.differing, check.lanes),
+        Err(error) => format!("failed: {error}"),
     }
 }
 
@@ -183,7 +197,8 @@ impl<'a> Seen<'a> {
 const LEGEND: &str =
     "limits: largest buffer; largest part of one that a shader sees; workgroups along an axis; lanes in a workgroup.
 exact: the shader reaches the driver with every rounding pinned, so results can equal the processor's bit for bit;
-elsewhere the self-check decides. timing: the device can time its own work.
+elsewhere the self-check decides. self-check: random lanes and lanes on thresholds, word for word.
+timing: the device can time its own work.
 ";
 
 const NOTHING: &str = "No compute device: no driver of Vulkan, Metal, Direct3D 12 or OpenGL shows one.

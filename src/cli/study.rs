@@ -109,6 +109,8 @@ impl Study {
             (None, None) => Source::Generated(self.generator.options()?),
         };
         self.guard_inputs()?;
+        // Before the work: a device that is not there is known at once.
+        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         tracing::info!("{}", source.describe());
 
         let mut timings = Timings::default();
@@ -125,7 +127,6 @@ impl Study {
                 "use more recordings, or relax the filters in the study file (--config)",
             ));
         }
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if self.reference { &reference } else { opened.backend() };
         let recheck = opened.device().map(|_| Recheck::new(&planned.plan, config.score.seed, ONE_IN));

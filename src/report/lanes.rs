@@ -2,9 +2,11 @@
 
 use std::io::Write;
 
+use rayon::prelude::*;
+
 use crate::criterion::Criterion;
 use crate::scalar::Real;
-use crate::sweep::{Chunk, Constants, Headway, LaneCase, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
+use crate::sweep::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
 
 /// The header.
 pub const HEADER: &str = "id,category,param,thw,model,collision,ttc,btn,min_ttc,max_btn,crash_type,t_react,t_crash,\
@@ -44,17 +46,16 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: 
     let dt = plan.profile.frame.dt_s;
     let constants: Vec<Constants<f64>> =
         plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
-    let mut cached: Option<(LaneKey, LaneCase<f64>)> = None;
+    // Three more lanes for each: the only part that is worth the other threads.
+    let robust: Vec<bool> = (0..chunk.outcomes.len())
+        .into_par_iter()
+        .map(|at| {
+            plan.key(chunk.first_lane + at as u64).is_some_and(|key| is_robust(&constants[key.block], plan, &key))
+        })
+        .collect();
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
-        let case = match &cached {
-            Some((known, case)) if (known.block, known.unit, known.variant) == (key.block, key.unit, key.variant) => {
-                *case
-            }
-            _ => plan.case(key.block, key.unit, key.variant),
-        };
-        cached = Some((key, case));
         let headway = plan.headways[key.headway];
         let thw = match headway {
             Headway::ThwS(thw) => decimal(thw),
@@ -63,7 +64,6 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: 
         let judged = |c: Criterion| u8::from(outcome.verdicts.failed(c));
         let time = |step: u32| if step == NO_STEP { String::new() } else { time(step, dt) };
         let impact = if outcome.contact_step == NO_STEP { String::new() } else { digits.write(outcome.impact_speed) };
-        let robust = is_robust(&constants[key.block], plan, &key, &case, headway);
         writeln!(
             out,
             "{},{},{},{thw},{},{},{},{},{},{},{},{},{},{impact},{},{}",
@@ -80,25 +80,20 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: 
             time(outcome.reaction_step),
             time(outcome.contact_step),
             time(outcome.end_step),
-            u8::from(robust)
+            u8::from(robust[at])
         )?;
     }
     Ok(())
 }
 
-fn is_robust(
-    constants: &Constants<f64>,
-    plan: &LanePlan,
-    key: &LaneKey,
-    case: &LaneCase<f64>,
-    headway: Headway,
-) -> bool {
-    let gap = match headway.start::<f64>() {
+fn is_robust(constants: &Constants<f64>, plan: &LanePlan, key: &LaneKey) -> bool {
+    let case = plan.case(key.block, key.unit, key.variant);
+    let gap = match plan.headways[key.headway].start::<f64>() {
         Start::Headway(thw) => thw * case.ego_speed,
         Start::Gap(gap) => gap,
     };
     let run = |gap: f64| -> Outcome<f64> {
-        constants.run(plan.models[key.model], case, plan.tables(), Start::Gap(gap), &mut Silent)
+        constants.run(plan.models[key.model], &case, plan.tables(), Start::Gap(gap), &mut Silent)
     };
     let seen = |o: Outcome<f64>| (o.verdicts.0 & 0b111, o.contact);
     let middle = seen(run(gap));

@@ -1,0 +1,35 @@
+//! What benchmarks share: a study of the paper's size on synthetic data.
+
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::sweep::{Backend, LanePlan, SweepOptions, Wanted, sweep};
+use lanesweep::trajectory::generator::GeneratorOptions;
+
+/// The paper's kept scenarios.
+pub const PAPER: [(Category, usize); 3] = [(Category::CutIn, 362), (Category::CutOut, 819), (Category::Lvd, 482)];
+
+/// Synthetic scenarios, repeated under new keys up to the paper's numbers.
+pub fn paper_size_scenarios() -> Vec<Scenario> {
+    let mined = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap();
+    let mut scenarios = Vec::new();
+    for (category, count) in PAPER {
+        let kept: Vec<&Scenario> = mined.scenarios.iter().filter(|s| s.category == category && s.kept).collect();
+        for k in 0..count {
+            let mut scenario = kept[k % kept.len()].clone();
+            scenario.id = format!("{}#{}", scenario.id, k / kept.len());
+            scenarios.push(scenario);
+        }
+    }
+    scenarios
+}
+
+/// Evaluated steps of all lanes.
+pub fn lane_steps(plan: &LanePlan, backend: &dyn Backend) -> u64 {
+    let mut steps = 0;
+    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Outcomes), |chunk| {
+        steps += chunk.outcomes.iter().map(|o| u64::from(o.end_step) + 1).sum::<u64>();
+        Ok(())
+    })
+    .unwrap();
+    steps
+}
