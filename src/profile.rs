@@ -64,7 +64,7 @@ impl FrameProfile {
 
 /// Makes [`Profile`] with one table per driver model of the registry.
 macro_rules! declare_profile {
-    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// A profile: everything that the lanes' physics takes from outside the cases.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -79,6 +79,7 @@ macro_rules! declare_profile {
             pub criteria: CriteriaProfile,
             $(
                 #[doc = $name]
+                $(#[$attribute])*
                 pub $file: driver::$profile,
             )+
         }

@@ -4,6 +4,7 @@
 mod plans;
 
 use lanesweep::Place;
+use lanesweep::criterion::Criterion;
 use lanesweep::scenario::Category;
 use lanesweep::sweep::{LanePlan, Partial, Verdicts};
 use plans::{chunk, mixed, plan};
@@ -101,7 +102,7 @@ fn counts_are_over_the_headways_of_one_scenario() {
     let partial = Partial::from_chunk(&plan, &chunk(&plan, 0..9, &lane, false)).unwrap();
     let unit = &partial.units()[2];
     assert_eq!(unit.unit, 2);
-    let cell = |variant: usize| unit.cells[variant * 12];
+    let cell = |variant: usize| unit.cells[variant * plan.models.len() * Criterion::ALL.len()];
     assert_eq!((cell(0).both, cell(0).neither), (10, 0), "S against itself");
     assert_eq!((cell(1).both, cell(1).only_s, cell(1).only_s_prime, cell(1).neither), (3, 7, 0, 0));
     assert_eq!((cell(2).both, cell(2).only_s), (0, 10));

@@ -18,8 +18,7 @@ pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME")]
     category: Option<String>,
-    /// Driver model: Reg157, CCHDM, RSS, FSM
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = format!("Driver model: {}", ModelId::names()))]
     model: Option<String>,
     /// Initial speed of the ego, m/s
     #[arg(long, value_name = "MPS")]
@@ -97,10 +96,10 @@ impl CaseFlags {
     }
 
     pub(super) fn model(&self) -> Result<ModelId> {
-        let text = needed(self.model.as_ref(), "model", "Reg157, CCHDM, RSS or FSM")?;
+        let text = needed(self.model.as_ref(), "model", &format!("one of {}", ModelId::names()))?;
         ModelId::parse(text).ok_or_else(|| {
             let problem = format!("there is no model `{text}`");
-            Error::usage(Place::item("model"), problem, "use Reg157, CCHDM, RSS or FSM")
+            Error::usage(Place::item("model"), problem, format!("use one of {}", ModelId::names()))
         })
     }
 

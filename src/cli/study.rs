@@ -30,7 +30,7 @@ use crate::{Error, Place, Result};
 /// How far do parameterized scenarios agree with recorded ones?
 ///
 /// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S')
-/// from ten time headways against four driver models, judges collision, TTC and BTN, and scores S' against
+/// from ten time headways against every driver model, judges collision, TTC and BTN, and scores S' against
 /// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \

@@ -81,7 +81,7 @@ impl Replay {
             Error::input(
                 row.place("model"),
                 format!("there is no model `{name}`"),
-                "known: Reg157, CC_human_driver, RSS, FSM",
+                format!("known: {}; CC_human_driver is CCHDM", ModelId::names()),
             )
         })?;
         let mut profile = profile.clone();

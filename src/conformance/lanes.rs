@@ -72,7 +72,11 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         let lane = &encoded[&key];
         let name = row.text("model")?;
         let model = ModelId::parse(name).ok_or_else(|| {
-            Error::input(row.place("model"), format!("there is no model `{name}`"), "known: Reg157, CCHDM, RSS, FSM")
+            Error::input(
+                row.place("model"),
+                format!("there is no model `{name}`"),
+                format!("known: {}", ModelId::names()),
+            )
         })?;
         let thw = row.number("thw")?;
         let reference = run(&constants64[&scenario.category], model, &lane.case64, &lane.tables64, thw);

@@ -5,7 +5,8 @@
 //! no time loop: the latched step stands once, in [`crate::sweep`]. Parameters come from a profile;
 //! decisions go to the lane's frame.
 //!
-//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`).
+//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`). A worked
+//! example, which a test builds and runs, stands in `examples/adding-a-driver-model`.
 
 #[macro_use]
 mod registry;
@@ -20,7 +21,7 @@ use crate::scalar::Real;
 
 /// Makes the modules, their public names and [`ModelId`] from the registry.
 macro_rules! declare_models {
-    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         $(
             mod $file;
             pub use $file::{$model, $profile};
@@ -64,6 +65,11 @@ impl ModelId {
             "cc" | "cc_human_driver" => Some(ModelId::Cchdm),
             _ => ModelId::ALL.into_iter().find(|m| m.name().to_ascii_lowercase() == folded),
         }
+    }
+
+    /// The names of all, as messages list them: `Reg157, CCHDM, RSS, FSM`.
+    pub fn names() -> String {
+        ModelId::ALL.map(ModelId::name).join(", ")
     }
 
     /// Position in [`ModelId::ALL`].

@@ -25,7 +25,7 @@ pub const SHARED: [(&str, &str); 11] = [
 
 /// Makes the list of the models' files from the registry.
 macro_rules! declare_shaders {
-    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// File name and text of a model's shader.
         pub fn driver_shader(model: ModelId) -> (&'static str, &'static str) {
             match model {

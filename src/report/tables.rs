@@ -44,9 +44,11 @@ pub fn failures(scores: &ScoreTable, published: bool) -> String {
             row.extend(Criterion::ALL.map(|c| count(c).to_string()));
             row.extend([category.simulations.to_string(), category.capped[at].to_string()]);
             if published {
-                let theirs = Criterion::ALL.map(|c| published_failures(category.category, model, c));
-                let counts: Vec<String> = theirs.iter().map(|p| p.failures.to_string()).collect();
-                row.push(format!("{} ({})", counts.join(" "), theirs[0].simulations));
+                let theirs = |c| published_failures(category.category, model, c);
+                let counts: Vec<_> = Criterion::ALL.into_iter().filter_map(theirs).collect();
+                let failures: Vec<String> = counts.iter().map(|p| p.failures.to_string()).collect();
+                let of = counts.first().map(|p| format!("{} ({})", failures.join(" "), p.simulations));
+                row.push(of.unwrap_or_else(|| "-".to_owned()));
             }
             table.add_row(row);
         }

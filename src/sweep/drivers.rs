@@ -12,7 +12,7 @@ use super::outcome::Outcome;
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
-    ($($file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// Everything a lane of one category takes from the profile, as plain constants.
         #[derive(Debug, Clone, Copy)]
         pub struct Constants<R> {

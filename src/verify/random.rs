@@ -4,7 +4,7 @@
 use super::check_categories;
 use super::draw::{Draw, Purpose};
 use super::pool::{Across, Pool, Slice};
-use crate::driver::ModelId;
+use crate::driver::{MODELS, ModelId};
 use crate::profile::{CutOutTarget, Profile};
 use crate::scenario::{Ahead, Case, Category, LATERAL_SAMPLED, Lateral, Participant, SPEED_SAMPLED, Speed, Tables};
 use crate::sweep::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
@@ -379,7 +379,7 @@ fn late(draw: &mut Draw, lane: &mut LaneCase<f64>) {
         if draw.chance(0.5) {
             other.present_until = other.present_from + draw.below(150) as u32;
         }
-        other.attend_from = [0; 4].map(|_: u32| draw.below(80) as u32);
+        other.attend_from = [0; MODELS].map(|_: u32| draw.below(80) as u32);
         other.judged = u32::from(draw.chance(0.8));
     };
     let used = 1 + lane.pair as usize;

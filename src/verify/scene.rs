@@ -391,7 +391,7 @@ impl Scenes {
             gap_offset: 150.0,
             present_from: 0,
             present_until: NO_STEP,
-            attend_from: [NO_STEP; 4],
+            attend_from: [NO_STEP; MODELS],
             ..deciding
         };
         let others = match s.pairing {
