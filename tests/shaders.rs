@@ -239,10 +239,12 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
         };
         record.outcome(&criteria)
     };
+    let settled = constant(&module, "END_SETTLED") << 8;
+    let frontal = constant(&module, "CONTACT_FRONTAL") << 4;
     for (name, contact) in
         [("CONTACT_NONE", Contact::None), ("CONTACT_BY_SIDE", Contact::BySide), ("CONTACT_FRONTAL", Contact::Frontal)]
     {
-        assert_eq!(read(constant(&module, name) << 4).unwrap().contact, contact);
+        assert_eq!(read(constant(&module, name) << 4 | settled).unwrap().contact, contact);
     }
     for (name, end) in [
         ("END_CONTACT", EndReason::Contact),
@@ -251,17 +253,19 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
         ("END_CAP", EndReason::Cap),
         ("END_ABORTED", EndReason::Aborted),
     ] {
-        assert_eq!(read(constant(&module, name) << 8).unwrap().end, end);
+        assert_eq!(read(constant(&module, name) << 8 | frontal).unwrap().end, end);
     }
     assert_eq!(read(constant(&module, "END_NOT_YET") << 8), None);
-    assert_eq!(read(3 << 4), None);
+    assert_eq!(read(3 << 4 | settled), None);
+    // What no lane wrote: an end by contact, without one.
+    assert_eq!(read(0), None);
     // The bits that `outcome` in shared/frame.wgsl sets, in its order.
     let bits = [Criterion::Collision, Criterion::Ttc, Criterion::Btn].map(|c| 1 << c.index());
     assert_eq!([bits[0], bits[1], bits[2], Verdicts::CAPPED], [1, 2, 4, 8]);
     for bit in 0..4 {
-        assert_eq!(read(1 << bit).unwrap().verdicts, Verdicts(1 << bit));
+        assert_eq!(read(1 << bit | settled).unwrap().verdicts, Verdicts(1 << bit));
     }
-    assert_eq!(read(1 << 6).unwrap().contact_with, 1);
+    assert_eq!(read(1 << 6 | settled).unwrap().contact_with, 1);
 }
 
 fn in_crate(path: &str) -> PathBuf {
