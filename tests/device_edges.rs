@@ -159,3 +159,16 @@ fn after_a_job_without_memory_nothing_wrong_is_computed() {
         assert!(failed > 0);
     }
 }
+
+#[test]
+fn a_device_may_go_before_its_sessions_which_then_hear_of_it() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let plan = random(400, 5, &[ModelId::Rss]);
+    let (sender, done) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let mut session = gpu.prepare(&plan).unwrap();
+        drop(gpu);
+        sender.send(session.run(0..1, Wanted::Verdicts).is_err()).unwrap();
+    });
+    assert!(done.recv_timeout(std::time::Duration::from_secs(20)).expect("the drop hangs"));
+}

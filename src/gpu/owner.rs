@@ -32,9 +32,16 @@ pub(super) struct Request {
 }
 
 pub(super) enum Command {
-    Prepare { setup: Box<Setup>, reply: Sender<Result<Prepared>> },
+    Prepare {
+        setup: Box<Setup>,
+        reply: Sender<Result<Prepared>>,
+    },
     Run(Box<Request>),
-    Close { session: u64 },
+    Close {
+        session: u64,
+    },
+    /// The backend goes; sessions that it leaves behind hear that the device is gone.
+    End,
 }
 
 /// A session on the device.
@@ -83,7 +90,7 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "its driver failed and took its thread along", "use --backend cpu")
+    Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
 }
 
 struct Owner {
@@ -114,14 +121,14 @@ impl Owner {
                 commands.try_recv()
             };
             match command {
-                Ok(command) => self.obey(command),
-                Err(TryRecvError::Empty) => self.finish_oldest(),
-                Err(TryRecvError::Disconnected) => {
+                Ok(Command::End) | Err(TryRecvError::Disconnected) => {
                     while !self.flying.is_empty() {
                         self.finish_oldest();
                     }
                     return;
                 }
+                Ok(command) => self.obey(command),
+                Err(TryRecvError::Empty) => self.finish_oldest(),
             }
         }
     }
@@ -144,6 +151,7 @@ impl Owner {
             Command::Close { session } => {
                 self.sessions.remove(&session);
             }
+            Command::End => (),
         }
     }
 
