@@ -9,7 +9,8 @@ use lanesweep::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
 use lanesweep::profile::Profile;
 use lanesweep::scenario::Tables;
 use lanesweep::sweep::{
-    Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Wanted, same_words, sweep,
+    Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Recheck, SweepOptions, Wanted, same_words,
+    sweep,
 };
 use lanesweep::verify::{RandomOptions, random_plan};
 
@@ -171,4 +172,26 @@ fn a_device_may_go_before_its_sessions_which_then_hear_of_it() {
         sender.send(session.run(0..1, Wanted::Verdicts).is_err()).unwrap();
     });
     assert!(done.recv_timeout(std::time::Duration::from_secs(20)).expect("the drop hangs"));
+}
+
+#[test]
+fn a_device_that_fails_while_counts_are_checked_leaves_complete_counts() {
+    let plan = random(400, 6, &ModelId::ALL);
+    let cpu = CpuBackend::lane_arithmetic();
+    let expected = cpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Counts).unwrap();
+    // One job per category, then those of the check.
+    for at_job in [2, 3, 10] {
+        let fault = Some(Fault { at_job, kind: FaultKind::Lost });
+        let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+        let recheck = Recheck::new(&plan, 1, 1);
+        let options = SweepOptions { wanted: Wanted::Counts, fallback: Some(&cpu), recheck: Some(&recheck) };
+        let mut chunks = Vec::new();
+        let summary = sweep(&plan, 0..plan.unit_count(), &gpu, &options, |chunk| {
+            chunks.push(chunk);
+            Ok(())
+        });
+        let summary = summary.unwrap();
+        assert!(chunks.len() == 1 && chunks[0] == expected, "lost at job {at_job}");
+        assert_eq!((summary.redone_lanes, summary.rechecked_lanes), (plan.lane_count(), 0));
+    }
 }
