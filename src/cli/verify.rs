@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::source::Source;
+use super::source::{self, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::MiningOptions;
@@ -122,7 +122,13 @@ impl Verify {
         };
         let collection = source.load(&MiningOptions::default(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
-        Ok(plan_study(&collection.scenarios, profile, &options)?.plan)
+        let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
+        if plan.unit_count() == 0 {
+            let problem = format!("no scenario to simulate ({})", source::counts(&collection.scenarios));
+            let help = "use more recordings or scenarios that pass the paper's filters";
+            return Err(Error::input(Place::item(source.describe()), problem, help));
+        }
+        Ok(plan)
     }
 
     /// One lane on the three backends.
