@@ -85,8 +85,8 @@ impl Verify {
             equal &= comparison.is_equal();
             lanes += comparison.lanes();
         }
-        text += &format!("{} of {lanes} lanes computed by the device itself: ", if equal { "All" } else { "NOT all" });
-        text += if equal { "every word equals the CPU's.\n" } else { "words differ from the CPU's.\n" };
+        let found = if equal { "every word equals the CPU's" } else { "words DIFFER from the CPU's" };
+        text += &format!("{lanes} lanes, all computed by what is under test itself: {found}.\n");
         console::print(&text)?;
         if equal {
             Ok(Exit::Ok)
