@@ -136,3 +136,11 @@ fn contradicting_flags_are_answered_with_what_to_write() {
         assert!(stderr(&output).contains(part), "{args:?}: {}", stderr(&output));
     }
 }
+
+#[test]
+fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
+    let args = ["-q", "verify", "--backend", "cpu", "--lanes", "40", "--threshold-units", "1"];
+    let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--synth-duration", "1"]].concat());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("no scenario to simulate"), "{}", stderr(&output));
+}

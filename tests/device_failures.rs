@@ -88,6 +88,21 @@ fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
 
 #[test]
 fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
+    let plan = plan();
+    let planted = Some(("index < frame_step_cap; index++".to_owned(), "index < 100u; index++".to_owned()));
+    let options = GpuOptions { planted, ..Default::default() };
+    let Some(gpu) = open(options.clone()) else { return };
+    for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
+        let Some(gpu) = open(options.clone()) else { return };
+        let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), wanted).unwrap_err();
+        assert!(error.to_string().contains("lanes of") && error.to_string().contains("to their end"), "{error}");
+    }
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0);
+}
+
+#[test]
+fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
     // llvmpipe ends every loop after 65,535 turns: at a millisecond a lane may have 120,000 steps.
     let profile = Profile::load("jrc-2021").unwrap();
     let mut long = profile.with_dt(0.001).unwrap();
@@ -95,11 +110,9 @@ fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
     let options = RandomOptions { lanes_per_model_and_category: 40, ..Default::default() };
     let plan = random_plan(&long, &options).unwrap();
     let Some(gpu) = open(GpuOptions::default()) else { return };
-    let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();
-    assert!(error.to_string().contains("lanes of") && error.to_string().contains("to their end"), "{error}");
-    let Some(gpu) = open(GpuOptions::default()) else { return };
     let (verdicts, summary) = swept(&plan, &gpu);
-    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0);
+    assert!(verdicts == expected(&plan));
+    assert!(!gpu.card().name.starts_with("llvmpipe") || summary.redone_lanes > 0, "{summary:?}");
 }
 
 #[test]

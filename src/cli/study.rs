@@ -134,12 +134,12 @@ impl Study {
         make_folder(&self.out)?;
         let how = How { backend, fallback: opened.fallback(), recheck: recheck.as_ref() };
         tracing::info!("{} lanes on {}", planned.plan.lane_count(), backend.describe());
-        let (partial, swept) = timed(&mut timings.sweep_s, || run_plan(&planned.plan, &how, verbosity))?;
+        let (partial, mut swept) = timed(&mut timings.sweep_s, || run_plan(&planned.plan, &how, verbosity))?;
         let scores = timed(&mut timings.score_s, || score(&planned.plan, &partial, &config.score))?;
         let claims = judge_claims(&scores);
         if let Some(path) = &self.lanes {
             let digits = if self.reference { Digits::Binary64 } else { Digits::Binary32 };
-            write_lanes(path, &planned.plan, &how, digits)?;
+            swept.add(&write_lanes(path, &planned.plan, &how, digits)?);
         }
         let comparison = self.compare_reference.then(|| compare_reference(&planned.plan)).transpose()?;
         let categories = category_records(&collection, &planned, &scores);
@@ -147,7 +147,10 @@ impl Study {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             data: source.describe(),
             synthetic: source.is_synthetic(),
-            backend: backend.describe(),
+            backend: match (how.fallback, swept.redone_lanes) {
+                (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
+                _ => backend.describe(),
+            },
             device: opened.device(),
             sweep: SweepRecord {
                 rechecked_lanes: swept.rechecked_lanes,
@@ -247,26 +250,22 @@ fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
-fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<()> {
+fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<SweepSummary> {
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         make_folder(dir)?;
     }
-    let mut failure = None;
+    let mut swept = Ok(SweepSummary::default());
     let written = crate::report::files::write_atomically_with(path, |out| {
         lanes::write_header(out)?;
         let options = how.options(Wanted::Outcomes);
-        let swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
+        swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
             lanes::write_chunk(out, plan, &chunk, digits).map_err(|e| Error::io(path, "write", e))
         });
-        swept.map(drop).map_err(|error| {
-            failure = Some(error);
-            std::io::Error::other("the sweep failed")
-        })
+        // The sweep's own error is the one to tell.
+        if swept.is_ok() { Ok(()) } else { Err(std::io::Error::other("the sweep failed")) }
     });
-    match failure {
-        Some(error) => Err(error),
-        None => written,
-    }
+    let summary = swept?;
+    written.map(|()| summary)
 }
 
 fn category_records(

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::source::Source;
+use super::source::{self, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::MiningOptions;
@@ -73,25 +73,22 @@ impl Verify {
         if let Some(key) = &self.lane {
             return self.one_lane(key, &profile, tested, verbosity);
         }
-        let mut text = format!("Under test: {}\nProfile {}, seed {}\n\n", tested.describe(), profile.name, self.seed);
+        let head = format!("Under test: {}\nProfile {}, seed {}\n", tested.describe(), profile.name, self.seed);
+        console::print(&head)?;
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
         for (name, plan) in self.sets(&profile, verbosity)? {
             let bar = console::progress(verbosity, plan.lane_count(), name);
             let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
             bar.finish_and_clear();
-            text += &verification::comparison(&comparison);
-            text.push('\n');
+            // Set by set: a device that fails later takes nothing back.
+            console::print(&format!("\n{}", verification::comparison(&comparison)))?;
             equal &= comparison.is_equal();
             lanes += comparison.lanes();
             differing += comparison.differing();
         }
-        text += &format!("{lanes} lanes, all computed by what is under test itself: ");
-        text += &if differing == 0 {
-            "every word equals the CPU's.\n".to_owned()
-        } else {
-            format!("{differing} DIFFER from the CPU's.\n")
-        };
-        console::print(&text)?;
+        let found =
+            if equal { "every word equals the CPU's".to_owned() } else { format!("{differing} DIFFER from the CPU's") };
+        console::print(&format!("\n{lanes} lanes, all computed by what is under test itself: {found}.\n"))?;
         if equal {
             Ok(Exit::Ok)
         } else {
@@ -126,15 +123,23 @@ impl Verify {
         };
         let collection = source.load(&MiningOptions::default(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
-        Ok(plan_study(&collection.scenarios, profile, &options)?.plan)
+        let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
+        if plan.unit_count() == 0 {
+            let problem = format!("no scenario to simulate ({})", source::counts(&collection.scenarios));
+            let help = "use more recordings or scenarios that pass the paper's filters";
+            return Err(Error::input(Place::item(source.describe()), problem, help));
+        }
+        Ok(plan)
     }
 
     /// One lane on the three backends.
     fn one_lane(&self, text: &str, profile: &Profile, tested: &dyn Backend, verbosity: Verbosity) -> Result<Exit> {
-        let plan = match text.split('-').next() {
-            Some("random") => self.random(profile)?,
-            Some("threshold") => self.thresholds(profile)?,
-            _ => self.study(profile, verbosity)?,
+        // The sets' own keys name their seed; a user's scenario may begin as it likes.
+        let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
+        let plan = match () {
+            () if own("random-") => self.random(profile)?,
+            () if own("threshold-") => self.thresholds(profile)?,
+            () => self.study(profile, verbosity)?,
         };
         let key = plan.parse_key(text).ok_or_else(|| {
             Error::usage(

@@ -16,8 +16,7 @@ pub struct GpuBackend {
     card: AdapterCard,
     exact: bool,
     options: GpuOptions,
-    /// `None` once dropped: the thread ends when nobody can ask it any more.
-    commands: Option<Sender<Command>>,
+    commands: Sender<Command>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -36,7 +35,6 @@ impl GpuBackend {
         let adapter = adapters.take(index)?;
         let card = adapters.cards()[index].clone();
         let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
-        let commands = Some(commands);
         Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
     }
 
@@ -53,7 +51,8 @@ impl GpuBackend {
 
 impl Drop for GpuBackend {
     fn drop(&mut self) {
-        self.commands = None;
+        // A session may outlive it, and holds a sender of its own: waiting for the last one would wait for ever.
+        let _ = self.commands.send(Command::End);
         if let Some(thread) = self.thread.take() {
             // A panic in it was told to whoever waited.
             let _ = thread.join();
@@ -69,7 +68,7 @@ impl Backend for GpuBackend {
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        let commands = self.commands.clone().ok_or_else(|| owner::gone(&self.card.name))?;
+        let commands = self.commands.clone();
         Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, self.options.first_lanes)?))
     }
 }

@@ -215,7 +215,9 @@ impl Device {
     /// Lanes per model that a job may hold at most: what fits into the buffers of results.
     pub fn most_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_RESULT_BYTES);
+        // The read-back buffer holds the counts and times as well.
+        let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
+        let most = limits.max_storage_buffer_binding_size.min(room).min(MOST_RESULT_BYTES);
         ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MOST_LANES)
     }
 
@@ -245,6 +247,8 @@ impl Device {
 
 /// Results of one job at most, bytes.
 const MOST_RESULT_BYTES: u64 = 256 << 20;
+/// Left for counts, times and rounding beside them.
+const SMALL_RESULT_BYTES: u64 = 4 << 20;
 /// Lanes per model of one job at most: their number and every index into their results stay far below 2³².
 const MOST_LANES: u64 = 1 << 27;
 

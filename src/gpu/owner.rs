@@ -4,6 +4,7 @@ use std::collections::{HashMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
@@ -32,9 +33,16 @@ pub(super) struct Request {
 }
 
 pub(super) enum Command {
-    Prepare { setup: Box<Setup>, reply: Sender<Result<Prepared>> },
+    Prepare {
+        setup: Box<Setup>,
+        reply: Sender<Result<Prepared>>,
+    },
     Run(Box<Request>),
-    Close { session: u64 },
+    Close {
+        session: u64,
+    },
+    /// The backend goes; sessions that it leaves behind hear that the device is gone.
+    End,
 }
 
 /// A session on the device.
@@ -83,7 +91,7 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "its driver failed and took its thread along", "use --backend cpu")
+    Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
 }
 
 struct Owner {
@@ -93,6 +101,8 @@ struct Owner {
     jobs: u64,
     free: Vec<Slot>,
     flying: VecDeque<(Slot, Flight, Sender<Result<Answer>>)>,
+    /// When the last job was done.
+    last_done: Option<Instant>,
     /// Why nothing more is tried.
     dead: Option<String>,
 }
@@ -101,7 +111,7 @@ impl Owner {
     fn new(device: Device) -> Owner {
         let free = (0..RING).map(|_| Slot::default()).collect();
         let (sessions, flying) = (HashMap::new(), VecDeque::new());
-        Owner { device, sessions, next_session: 0, jobs: 0, free, flying, dead: None }
+        Owner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
     }
 
     fn serve(&mut self, commands: &Receiver<Command>) {
@@ -114,14 +124,14 @@ impl Owner {
                 commands.try_recv()
             };
             match command {
-                Ok(command) => self.obey(command),
-                Err(TryRecvError::Empty) => self.finish_oldest(),
-                Err(TryRecvError::Disconnected) => {
+                Ok(Command::End) | Err(TryRecvError::Disconnected) => {
                     while !self.flying.is_empty() {
                         self.finish_oldest();
                     }
                     return;
                 }
+                Ok(command) => self.obey(command),
+                Err(TryRecvError::Empty) => self.finish_oldest(),
             }
         }
     }
@@ -144,6 +154,7 @@ impl Owner {
             Command::Close { session } => {
                 self.sessions.remove(&session);
             }
+            Command::End => (),
         }
     }
 
@@ -197,14 +208,19 @@ impl Owner {
 
     fn finish_oldest(&mut self) {
         let Some((mut slot, flight, reply)) = self.flying.pop_front() else { return };
-        let answer = self.alive().and_then(|()| slot.finish(&self.device, flight));
-        match &answer {
-            Ok(_) => self.free.push(slot),
+        let finished = self.alive().and_then(|()| slot.finish(&self.device, flight, self.last_done));
+        self.last_done = Some(Instant::now());
+        let answer = match finished {
+            Ok(answer) => {
+                self.free.push(slot);
+                answer
+            }
             Err(error) => {
                 self.free.push(Slot::default());
                 self.dead.get_or_insert_with(|| error.to_string());
+                Err(error)
             }
-        }
+        };
         let _ = reply.send(answer);
     }
 

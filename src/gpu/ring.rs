@@ -7,8 +7,8 @@ use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
-use crate::Result;
 use crate::sweep::Wanted;
+use crate::{Error, Result};
 
 /// Jobs under way at most.
 pub(super) const RING: usize = 3;
@@ -212,8 +212,10 @@ impl Slot {
         Ok(Flight { job, parts, submission, mapped, since })
     }
 
-    /// Waits for a job and reads its results.
-    pub fn finish(&mut self, device: &Device, flight: Flight) -> Result<Answer> {
+    /// Waits for a job and reads its results. `previous` is when the job before it was done.
+    ///
+    /// The outer error says that the device's state is unknown; the inner one that it did its job badly.
+    pub fn finish(&mut self, device: &Device, flight: Flight, previous: Option<Instant>) -> Result<Result<Answer>> {
         let wait = wgpu::PollType::Wait {
             submission_index: Some(flight.submission.clone()),
             timeout: Some(device.options.timeout),
@@ -223,7 +225,9 @@ impl Slot {
             error => device.failed(error.to_string()),
         })?;
         device.untroubled()?;
-        let wall_s = flight.since.elapsed().as_secs_f64();
+        // Not the time it waited behind the job before it.
+        let began = previous.map_or(flight.since, |done| done.max(flight.since));
+        let wall_s = began.elapsed().as_secs_f64();
         let mapped = flight.mapped.recv_timeout(device.options.timeout);
         mapped
             .map_err(|_| device.failed("its results did not come back"))?
@@ -235,7 +239,7 @@ impl Slot {
             read(device, &flight, &view, wall_s)
         };
         buffers.readback.unmap();
-        answer
+        Ok(answer)
     }
 
     fn grow(&mut self, device: &Device, parts: &Parts, models: usize) {
@@ -296,7 +300,9 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let (done, cells) = counts.split_at(models);
     if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
         let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
-        return Err(device.failed(format!("it computed {} of {lanes} lanes of {name} to their end", done[model])));
+        let problem = format!("it computed {} of {lanes} lanes of {name} to their end", done[model]);
+        let help = "use --backend cpu; where lanes have very many steps, a larger time step (--dt) may do as well";
+        return Err(Error::device(&device.name, problem, help));
     }
     let per_model = |part: &[u8], model: usize| {
         let length = part.len() / models;

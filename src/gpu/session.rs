@@ -145,10 +145,9 @@ impl<'p> GpuSession<'p> {
         }
         Ok(())
     }
-}
 
-impl Session for GpuSession<'_> {
-    fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+    /// Sends the jobs of an interval of units and collects what they give.
+    fn run_jobs(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
         let lanes = (plan.first_lane_of(units.end) - first_lane) as usize;
@@ -176,6 +175,17 @@ impl Session for GpuSession<'_> {
             self.collect(piece, &mut chunk, wanted)?;
         }
         Ok(chunk)
+    }
+}
+
+impl Session for GpuSession<'_> {
+    fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        let chunk = self.run_jobs(units, wanted);
+        if chunk.is_err() {
+            // Whether the job that failed has brought its cases to the device is not known.
+            self.window = None;
+        }
+        chunk
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {

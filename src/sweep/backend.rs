@@ -88,6 +88,23 @@ impl Chunk {
         if self.counts.is_empty() { self.verdicts.len() as u64 } else { self.counts.iter().map(|c| c.lanes).sum() }
     }
 
+    /// Checks that it is what was asked for; see [`Chunk::check`].
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where it is not.
+    pub fn check_asked(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
+        let complete = match wanted {
+            Wanted::Verdicts => self.counts.is_empty(),
+            Wanted::Outcomes => self.outcomes.len() == self.verdicts.len(),
+            Wanted::Counts => !self.counts.is_empty(),
+        };
+        if self.units == *units && complete {
+            self.check(plan)
+        } else {
+            Err(Error::Internal(format!("units {units:?} were asked for, {wanted:?}, and others came")))
+        }
+    }
+
     /// Checks that it holds exactly the lanes of its units in this plan.
     ///
     /// # Errors

@@ -32,12 +32,16 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     pub fn check(&self, chunk: &Chunk, device: &str) -> Result<u64> {
+        self.check_some(chunk, device, self.one_in)
+    }
+
+    fn check_some(&self, chunk: &Chunk, device: &str, one_in: u64) -> Result<u64> {
         if chunk.verdicts.is_empty() {
             return Ok(0);
         }
         let end = chunk.first_lane + chunk.verdicts.len() as u64;
         let mut checked = 0;
-        for lane in self.chosen(chunk.first_lane..end) {
+        for lane in self.chosen(chunk.first_lane..end, one_in) {
             let at = (lane - chunk.first_lane) as usize;
             let Some(key) = self.plan.key(lane) else { continue };
             let ours = self.runner.run(&key);
@@ -55,7 +59,7 @@ impl<'p> Recheck<'p> {
 
     /// The chosen units of an interval, for a sweep that gives no lanes back.
     pub fn units(&self, units: Range<u64>) -> impl Iterator<Item = u64> {
-        self.chosen(units)
+        self.chosen(units, self.one_in)
     }
 
     /// Computes every lane of a chunk again; see [`Recheck::check`].
@@ -63,12 +67,12 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     pub fn check_all(&self, chunk: &Chunk, device: &str) -> Result<u64> {
-        Recheck { plan: self.plan, runner: LaneRunner::new(self.plan), seed: self.seed, one_in: 1 }.check(chunk, device)
+        self.check_some(chunk, device, 1)
     }
 
     /// The chosen lanes of an interval, ascending.
-    fn chosen(&self, lanes: Range<u64>) -> impl Iterator<Item = u64> {
-        let (seed, one_in) = (self.seed, self.one_in);
+    fn chosen(&self, lanes: Range<u64>, one_in: u64) -> impl Iterator<Item = u64> {
+        let seed = self.seed;
         (lanes.start / one_in..lanes.end.div_ceil(one_in))
             .map(move |stratum| stratum * one_in + mixed(seed, stratum) % one_in)
             .filter(move |lane| lanes.contains(lane))

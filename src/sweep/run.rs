@@ -41,6 +41,17 @@ pub struct SweepSummary {
     pub device_s: Option<f64>,
 }
 
+impl SweepSummary {
+    /// Two sweeps of the same run.
+    pub fn add(&mut self, other: &SweepSummary) {
+        self.lanes += other.lanes;
+        self.redone_chunks += other.redone_chunks;
+        self.redone_lanes += other.redone_lanes;
+        self.rechecked_lanes += other.rechecked_lanes;
+        self.device_s = self.device_s.zip(other.device_s).map(|(a, b)| a + b);
+    }
+}
+
 /// Runs an interval of units on a backend and gives every chunk, in order, to `each`. A chunk that the
 /// backend cannot compute is computed by the fallback, where there is one.
 ///
@@ -70,17 +81,14 @@ pub fn sweep(
         let lanes = session.as_ref().or(redo.as_ref()).map_or(1 << 17, |s| s.chunk_lanes(wanted));
         let range = from..next_cut(plan, from, units.end, lanes);
         from = range.end;
-        let computed = session.as_mut().map(|s| s.run(range.clone(), wanted).and_then(|c| c.check(plan).map(|()| c)));
+        let computed = session.as_mut().map(|s| chunk_and_samples(plan, s.as_mut(), range.clone(), wanted, recheck));
         let chunk = match (computed, fallback) {
-            (Some(Ok(chunk)), _) => {
+            (Some(Ok((chunk, samples))), _) => {
                 if let Some(recheck) = recheck {
-                    summary.rechecked_lanes += recheck.check(&chunk, &backend.describe())?;
-                    // Counts hold no lanes: some units are asked for again, lane by lane.
-                    if let (Wanted::Counts, Some(session)) = (wanted, session.as_mut()) {
-                        for unit in recheck.units(range.clone()) {
-                            let lanes = session.run(unit..unit + 1, Wanted::Verdicts)?;
-                            summary.rechecked_lanes += recheck.check_all(&lanes, &backend.describe())?;
-                        }
+                    let device = backend.describe();
+                    summary.rechecked_lanes += recheck.check(&chunk, &device)?;
+                    for sample in &samples {
+                        summary.rechecked_lanes += recheck.check_all(sample, &device)?;
                     }
                 }
                 chunk
@@ -98,8 +106,8 @@ pub fn sweep(
                 let Some(session) = redo.as_mut() else {
                     return Err(Error::Internal("the fallback has no session".to_owned()));
                 };
-                let chunk = session.run(range, wanted)?;
-                chunk.check(plan)?;
+                let chunk = session.run(range.clone(), wanted)?;
+                chunk.check_asked(plan, &range, wanted)?;
                 summary.redone_chunks += 1;
                 summary.redone_lanes += chunk.lanes();
                 chunk
@@ -112,6 +120,22 @@ pub fn sweep(
     }
     summary.device_s = session.as_ref().and_then(|s| s.device_seconds());
     Ok(summary)
+}
+
+/// A chunk, and lanes to check where it holds none: counts hold no lanes, so some units are asked for again, lane
+/// by lane.
+fn chunk_and_samples(
+    plan: &LanePlan,
+    session: &mut dyn Session,
+    units: Range<u64>,
+    wanted: Wanted,
+    recheck: Option<&Recheck>,
+) -> Result<(Chunk, Vec<Chunk>)> {
+    let chunk = session.run(units.clone(), wanted)?;
+    chunk.check_asked(plan, &units, wanted)?;
+    let Some(recheck) = recheck.filter(|_| wanted == Wanted::Counts) else { return Ok((chunk, Vec::new())) };
+    let samples = recheck.units(units).map(|unit| session.run(unit..unit + 1, Wanted::Verdicts));
+    Ok((chunk, samples.collect::<Result<_>>()?))
 }
 
 /// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.
