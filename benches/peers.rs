@@ -76,6 +76,8 @@ fn measure(scenarios: &[Scenario], profile: &Profile, model: ModelId, folder: &P
     let verdicts: Vec<u8> = outcomes.iter().map(|o| o.verdicts.0).collect();
     std::fs::write(folder.join(format!("verdicts_{}.u8", model.name())), verdicts).unwrap();
     write_words(folder, &format!("end_step_{}.u32", model.name()), outcomes.iter().map(|o| o.end_step.to_le_bytes()));
+    let keys: Vec<String> = (0..plan.lane_count()).map(|lane| plan.key_text(&plan.key(lane).unwrap())).collect();
+    std::fs::write(folder.join(format!("keys_{}.txt", model.name())), keys.join("\n")).unwrap();
     Measured { model, lanes: outcomes.len(), cases, width, seconds, lane_steps_per_s: rate }
 }
 
@@ -148,7 +150,10 @@ fn write_manifest(folder: &Path, profile: &Profile, ours: &[Measured]) {
 }
 
 fn run_peers(python: &Path, folder: &Path) {
-    let status = Command::new(python).arg(benches().join("peers/run.py")).arg(folder).status();
+    let mut command = Command::new(python);
+    // No compiled copies of the sources beside them.
+    command.env("PYTHONDONTWRITEBYTECODE", "1").arg(benches().join("peers/run.py")).arg(folder);
+    let status = command.status();
     match status {
         Ok(status) if status.success() => {}
         Ok(status) => {

@@ -6,8 +6,12 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
-from lanes import BTN, CAPPED, COLLISION, DELAY_STEPS, STEP_CAP, TTC, Constants, Lanes, Result
+from lanes import BTN, CAPPED, COLLISION, DELAY_STEPS, STEP_CAP, TTC, Constants, Floats, Lanes, Result
+
+# A number of a lane.
+F = np.float32
 
 # Compile-time constants of the functions below. Literals would be binary64 and make a step binary64.
 C = Constants().rounded()
@@ -18,7 +22,7 @@ compiled = numba.njit(error_model="numpy", parallel=False)
 
 
 @inlined
-def fuzzy(distance, safe, dangerous):
+def fuzzy(distance: F, safe: F, dangerous: F) -> F:
     """0 beyond the safe distance, 1 below the unsafe one, linear between."""
     if distance >= safe:
         return C.zero
@@ -28,7 +32,7 @@ def fuzzy(distance, safe, dangerous):
 
 
 @inlined
-def proactive(speed, leader, gap):
+def proactive(speed: F, leader: F, gap: F) -> F:
     """PFS: the leader's possible braking."""
     reaction = speed * C.tau
     lead_stop = leader * leader * C.half_inverse_lead
@@ -38,7 +42,7 @@ def proactive(speed, leader, gap):
 
 
 @inlined
-def critical(speed, leader, gap, acceleration):
+def critical(speed: F, leader: F, gap: F, acceleration: F) -> F:
     """CFS: the present closing."""
     if speed <= leader:
         return C.zero
@@ -55,7 +59,7 @@ def critical(speed, leader, gap, acceleration):
 
 
 @inlined
-def reg157(speed, before, leader, gap, deceleration):
+def reg157(speed: F, before: F, leader: F, gap: F, deceleration: F) -> tuple[bool, F]:
     """Is this step unsafe, and how hard would the driver brake?"""
     dv = speed - leader
     unsafe = dv != C.zero and abs(gap) <= abs(dv) * (dv * C.reg157_half_inverse + C.reg157_constant)
@@ -63,7 +67,7 @@ def reg157(speed, before, leader, gap, deceleration):
 
 
 @inlined
-def fsm(speed, before, leader, gap, deceleration):
+def fsm(speed: F, before: F, leader: F, gap: F, deceleration: F) -> tuple[bool, F]:
     """Is this step unsafe, and how hard would the driver brake?"""
     pfs = proactive(speed, leader, gap)
     cfs = critical(speed, leader, gap, (speed - before) * C.inverse_dt)
@@ -72,11 +76,11 @@ def fsm(speed, before, leader, gap, deceleration):
     return pfs > C.zero or cfs > C.zero, min(ramp, demand)
 
 
-def make_sweep(check, delay_steps: int):
+def make_sweep(check: Callable[..., tuple[bool, F]], delay_steps: int) -> Callable[..., None]:
     """The sweep of one model: a driver's check is a constant of the compiled function."""
 
     @inlined
-    def simulate(speed, gap, leaders, horizon):
+    def simulate(speed: F, gap: F, leaders: Floats, horizon: int) -> tuple[int, int]:
         """One lane: verdict bits and last step."""
         verdicts = 0
         before = speed
@@ -117,7 +121,16 @@ def make_sweep(check, delay_steps: int):
         return verdicts, step
 
     @compiled
-    def sweep(case, speed, gap, horizon, leader_speed, verdicts, end_step):
+    def sweep(
+        case: NDArray[np.int32],
+        speed: Floats,
+        gap: Floats,
+        horizon: NDArray[np.int32],
+        leader_speed: Floats,
+        verdicts: NDArray[np.uint8],
+        end_step: NDArray[np.uint32],
+    ) -> None:
+        """All lanes; the last two arrays take the results."""
         for lane in range(len(case)):
             leaders = leader_speed[case[lane]]
             verdicts[lane], end_step[lane] = simulate(speed[lane], gap[lane], leaders, horizon[lane])

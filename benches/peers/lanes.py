@@ -80,6 +80,8 @@ class Ours:
     verdicts: NDArray[np.uint8]
     end_step: NDArray[np.uint32]
     lane_steps_per_s: float
+    # Name of each lane.
+    keys: list[str]
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,7 @@ def read(folder: Path) -> tuple[Lanes, dict[str, Ours]]:
             verdicts=np.fromfile(folder / f"verdicts_{model['name']}.u8", np.uint8),
             end_step=np.fromfile(folder / f"end_step_{model['name']}.u32", "<u4"),
             lane_steps_per_s=model["lane_steps_per_s"],
+            keys=(folder / f"keys_{model['name']}.txt").read_text().splitlines(),
         )
         for model in manifest["models"]
     }

@@ -34,6 +34,7 @@ class Reg157(Driver):
         super().__init__(DELAY_STEPS["Reg157"])
 
     def next_speed(self, speed: float, before: float, leader: float, gap: float) -> float:
+        """One step of the ego."""
         dv = speed - leader
         if dv != 0.0 and abs(gap) <= abs(dv) * (dv * C.reg157_half_inverse + C.reg157_constant):
             return self.brake(C.reg157_deceleration, speed)
@@ -47,6 +48,7 @@ class Fsm(Driver):
         super().__init__(DELAY_STEPS["FSM"])
 
     def next_speed(self, speed: float, before: float, leader: float, gap: float) -> float:
+        """One step of the ego."""
         pfs = proactive(speed, leader, gap)
         cfs = critical(speed, leader, gap, (speed - before) * C.inverse_dt)
         if pfs <= 0.0 and cfs <= 0.0:
@@ -121,14 +123,13 @@ def simulate(driver: Reg157 | Fsm, speed: float, gap: float, leaders: list[float
 def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
     """Series and numbers as Python's own lists and floats."""
     series = lanes.leader_speed.tolist()
-    numbers = list(zip(lanes.case.tolist(), lanes.ego_speed.tolist(), lanes.gap.tolist(), lanes.horizon.tolist()))
+    columns = (lanes.case, lanes.ego_speed, lanes.gap, lanes.horizon)
+    numbers = list(zip(*(column.tolist() for column in columns), strict=True))
     new_driver = {"Reg157": Reg157, "FSM": Fsm}[model]
 
     def work() -> Result:
-        ends = [
-            simulate(new_driver(), speed, gap, series[case], horizon) for case, speed, gap, horizon in numbers
-        ]
-        verdicts, steps = zip(*ends)
+        ends = [simulate(new_driver(), speed, gap, series[case], horizon) for case, speed, gap, horizon in numbers]
+        verdicts, steps = zip(*ends, strict=True)
         return Result(np.array(verdicts, np.uint8), np.array(steps, np.uint32))
 
     return work

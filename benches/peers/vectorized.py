@@ -1,4 +1,4 @@
-"""NumPy: all lanes of a block advance together, step by step; lanes that ended are taken out now and then."""
+"""NumPy: all lanes advance together, step by step; lanes that ended are taken out now and then."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lanes import BTN, CAPPED, COLLISION, DELAY_STEPS, STEP_CAP, TTC, Constants, Floats, Lanes, Result
 
 C = Constants().rounded()
-# Lanes that advance together: the arrays of a block stay in the second-level cache.
-BLOCK = 4096
-# Steps between two looks at how many lanes have ended.
+# Steps between two looks at how many lanes have ended. Blocks of lanes that fit a cache were slower: every block
+# has its own last lanes, for which a step costs as much as for thousands.
 COMPACT_EVERY = 16
 
 
@@ -99,18 +98,18 @@ def judge(closing: Floats, gap: Floats) -> NDArray[np.uint8]:
     return ttc * np.uint8(TTC) | btn * np.uint8(BTN)
 
 
-def run_block(lanes: Lanes, model: str, leaders: Floats, block: slice, result: Result) -> None:
-    """Runs the lanes of a block to their ends. `leaders` is steps × cases."""
+def sweep(lanes: Lanes, model: str, leaders: Floats) -> Result:
+    """Runs all lanes to their ends. `leaders` is steps × cases."""
     check = CHECKS[model]
-    case, speed = lanes.case[block], lanes.ego_speed[block]
-    count = len(case)
+    count = len(lanes)
+    result = Result(np.zeros(count, np.uint8), np.zeros(count, np.uint32))
     s = State(
-        lane=np.arange(block.start, block.start + count),
-        case=case,
-        horizon=lanes.horizon[block],
-        speed=speed,
-        before=speed,
-        gap=lanes.gap[block],
+        lane=np.arange(count),
+        case=lanes.case,
+        horizon=lanes.horizon,
+        speed=lanes.ego_speed,
+        before=lanes.ego_speed,
+        gap=lanes.gap,
         deceleration=np.zeros(count, np.float32),
         delay=np.full(count, DELAY_STEPS[model], np.int32),
         verdicts=np.zeros(count, np.uint8),
@@ -140,11 +139,12 @@ def run_block(lanes: Lanes, model: str, leaders: Floats, block: slice, result: R
         if step % COMPACT_EVERY == COMPACT_EVERY - 1:
             left = np.count_nonzero(s.running)
             if left == 0:
-                return
+                break
             if left < 0.9 * len(s.running):
                 s.compact()
         leader = leaders[min(step + 1, last)][s.case]
         s.gap = s.gap + (leader - s.speed) * C.dt
+    return result
 
 
 def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
@@ -152,10 +152,7 @@ def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
     leaders = np.ascontiguousarray(lanes.leader_speed.T)
 
     def work() -> Result:
-        result = Result(np.zeros(len(lanes), np.uint8), np.zeros(len(lanes), np.uint32))
         with np.errstate(divide="ignore", invalid="ignore"):
-            for first in range(0, len(lanes), BLOCK):
-                run_block(lanes, model, leaders, slice(first, first + BLOCK), result)
-        return result
+            return sweep(lanes, model, leaders)
 
     return work
