@@ -9,6 +9,7 @@ mod cpu;
 mod drivers;
 mod frame;
 mod lane_case;
+mod lane_step;
 mod outcome;
 mod partial;
 mod plan;
