@@ -5,6 +5,7 @@
 //! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
 
 mod backend;
+mod batch;
 mod cpu;
 mod drivers;
 mod frame;
@@ -16,6 +17,7 @@ mod plan;
 mod recheck;
 mod run;
 mod runner;
+mod simd;
 mod study;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
@@ -30,4 +32,5 @@ pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use run::{SweepOptions, SweepSummary, chunks, sweep};
 pub use runner::LaneRunner;
+pub use simd::Instructions;
 pub use study::{StudyOptions, StudyPlan, plan_study};
