@@ -53,7 +53,7 @@ fn forms() -> Vec<Profile> {
                 profile.criteria.btn = btn;
                 profile.criteria.gate = gate;
                 profile.criteria.btn_contact = btn_contact;
-                profile.models.cchdm.abort_on_large_ttc = aborts;
+                profile.cchdm.abort_on_large_ttc = aborts;
                 profiles.push(profile);
             }
         }
