@@ -60,7 +60,9 @@ impl Rules {
         let form = if self.is_ratio { BtnForm::DistanceRatio } else { BtnForm::EquivalentDelay };
         let gate = if self.sees_overlap { LateralGate::Overlap } else { LateralGate::EgoWidth };
         let abort_above_ttc = if self.aborts { frame.abort_above_ttc } else { 0.0 };
-        (Frame { abort_above_ttc, ..*frame }, Criteria { gate, btn: criteria.btn.known_as(form), ..*criteria })
+        // A batch takes lanes after their first step: from then on every gap moves.
+        let frame = Frame { abort_above_ttc, start_shift: true, ..*frame };
+        (frame, Criteria { gate, btn: criteria.btn.known_as(form), ..*criteria })
     }
 }
 
@@ -246,13 +248,13 @@ pub(super) struct Batch {
     places: PlacesOfLanes,
 }
 
-/// Steps of all lanes of a batch from row `row` of the burst on, until one ends or the burst is over. Gives the
-/// next row.
+/// Steps of all lanes of a batch from row `row` of the burst to `until`, or until one ends. Gives the next row.
 #[inline(always)]
 pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     batch: &mut Batch,
     row: usize,
+    until: usize,
 ) -> usize {
     let rules = Rules::from_bits(RULES);
     let (frame, criteria) = rules.applied(simulation.frame, simulation.criteria);
@@ -261,8 +263,9 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     let constants = batch.constants;
     let places = &batch.places;
     let mut state = batch.state;
-    let mut row = row.min(BURST);
-    while row < BURST {
+    let mut row = row;
+    let until = until.min(BURST);
+    while row < until {
         let mut ended = 0;
         for k in 0..LANES {
             let moved = advance(simulation, rules.is_pair, &constants.at(k), &state.at(k), &places.at(row, k));
@@ -279,9 +282,10 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
 }
 
 /// A lane that waits for a slot.
-pub(super) struct Waiting {
+#[derive(Clone, Copy)]
+pub(super) struct Waiting<'c> {
     /// Its case.
-    pub case: LaneCase<f32>,
+    pub case: &'c LaneCase<f32>,
     /// Its headway.
     pub start: Start<f32>,
     /// Where its outcome belongs.
@@ -289,8 +293,8 @@ pub(super) struct Waiting {
 }
 
 /// A lane in a slot, beside the arrays.
-struct Slot {
-    waiting: Waiting,
+struct Slot<'c> {
+    waiting: Waiting<'c>,
     /// From this step on the other vehicles keep their speeds and lateral positions.
     steady_from: u32,
     /// The rows hold what it will see for ever.
@@ -299,17 +303,18 @@ struct Slot {
 
 /// Runs a stream of lanes of one model; `next` gives the lanes, `steps` is a [`burst`], `each` takes the outcomes,
 /// in the order in which lanes end.
-pub(super) fn run_stream<M: DriverModel<f32>>(
+pub(super) fn run_stream<'c, M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     tables: &Tables<f32>,
-    steps: impl Fn(&mut Batch, usize) -> usize,
-    mut next: impl FnMut() -> Option<Waiting>,
+    steps: impl Fn(&mut Batch, usize, usize) -> usize,
+    mut next: impl FnMut() -> Option<Waiting<'c>>,
     mut each: impl FnMut(usize, Outcome<f32>),
 ) {
+    let step_cap = simulation.frame.step_cap;
     let mut batch = Batch { constants: ConstantsOfLanes::IDLE, state: StateOfLanes::IDLE, places: PlacesOfLanes::IDLE };
     let mut slots: [Option<Slot>; LANES] = [const { None }; LANES];
     for (k, slot) in slots.iter_mut().enumerate() {
-        *slot = next().map(|waiting| begin(simulation, &mut batch, k, waiting));
+        *slot = admit(simulation, tables, &mut batch, k, &mut next, &mut each);
     }
     let mut row = BURST;
     while slots.iter().any(Option::is_some) {
@@ -319,43 +324,62 @@ pub(super) fn run_stream<M: DriverModel<f32>>(
                 look_ahead(&mut batch, k, slot, tables, row);
             }
         }
-        row = steps(&mut batch, row);
+        // No lane steps beyond the cap, so no step asks for it.
+        let oldest = batch.state.index.iter().fold(0, |a, &b| a.max(b));
+        row = steps(&mut batch, row, row + step_cap.saturating_sub(oldest) as usize);
         for (k, slot) in slots.iter_mut().enumerate() {
             let Some(lane) = slot else {
                 batch.state.index[k] = 0;
                 continue;
             };
-            if batch.state.ended[k] == 0 {
+            if batch.state.ended[k] == 0 && batch.state.index[k] < step_cap {
                 continue;
             }
-            let case = &lane.waiting.case;
-            let (constants, state) = (batch.constants.at(k), batch.state.at(k));
             let places = batch.places.at(row - 1, k);
-            each(lane.waiting.at, conclude(simulation, case.pair != 0, &constants, &state, &places));
-            *slot = next().map(|waiting| begin(simulation, &mut batch, k, waiting));
-            if slot.is_none() {
-                batch.constants.present_until[0][k] = 0;
-                batch.constants.present_until[1][k] = 0;
-                batch.constants.horizon[k] = u32::MAX;
-                batch.state.index[k] = 0;
-            }
+            let (constants, state) = (batch.constants.at(k), batch.state.at(k));
+            let is_pair = lane.waiting.case.pair != 0;
+            each(lane.waiting.at, conclude(simulation, is_pair, &constants, &state, &places));
+            *slot = admit(simulation, tables, &mut batch, k, &mut next, &mut each);
             look_ahead(&mut batch, k, slot, tables, row);
         }
     }
 }
 
-/// Puts a lane into a slot.
-fn begin<M: DriverModel<f32>>(simulation: &Simulation<f32, M>, batch: &mut Batch, k: usize, waiting: Waiting) -> Slot {
-    let case = &waiting.case;
-    let mut constants = LaneConstants::new(simulation, case);
-    if case.pair == 0 {
-        // Among pairs it runs with a second vehicle that is never present.
-        constants.others[1].present_until = 0;
+/// Puts the next lane that survives its first step into a slot; an empty slot idles.
+#[inline(never)]
+fn admit<'c, M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    tables: &Tables<f32>,
+    batch: &mut Batch,
+    k: usize,
+    next: &mut impl FnMut() -> Option<Waiting<'c>>,
+    each: &mut impl FnMut(usize, Outcome<f32>),
+) -> Option<Slot<'c>> {
+    while let Some(waiting) = next() {
+        let case = waiting.case;
+        let is_pair = case.pair != 0;
+        let mut constants = LaneConstants::new(simulation, case);
+        if !is_pair {
+            // Among pairs it runs with a second vehicle that is never present.
+            constants.others[1].present_until = 0;
+        }
+        let places = case.others.map(|other| Place::of(&other.motion, tables, 0));
+        let start = LaneState::new(simulation, case, waiting.start);
+        let moved = advance(simulation, is_pair, &constants, &start, &places);
+        if moved.ended || moved.state.index >= simulation.frame.step_cap {
+            each(waiting.at, conclude(simulation, is_pair, &constants, &moved.state, &places));
+            continue;
+        }
+        batch.constants.set(k, &constants);
+        batch.state.set(k, &moved.state, false);
+        let steady_from = case.others.iter().map(|other| steady_from(&other.motion)).max().unwrap_or(0);
+        return Some(Slot { waiting, steady_from, is_steady: false });
     }
-    batch.constants.set(k, &constants);
-    batch.state.set(k, &LaneState::new(simulation, case, waiting.start), false);
-    let steady_from = case.others.iter().map(|other| steady_from(&other.motion)).max().unwrap_or(0);
-    Slot { waiting, steady_from, is_steady: false }
+    batch.constants.present_until[0][k] = 0;
+    batch.constants.present_until[1][k] = 0;
+    batch.constants.horizon[k] = u32::MAX;
+    batch.state.index[k] = 0;
+    None
 }
 
 /// First step from which on a motion changes no more.
@@ -367,6 +391,7 @@ fn steady_from(motion: &Motion<f32>) -> u32 {
 }
 
 /// Decodes what the lane of a slot sees from `row` to the end of the burst.
+#[inline(never)]
 fn look_ahead(batch: &mut Batch, k: usize, slot: &mut Option<Slot>, tables: &Tables<f32>, row: usize) {
     let Some(lane) = slot else { return };
     if lane.is_steady {

@@ -70,13 +70,13 @@ macro_rules! declare_constants {
         impl Constants<f32> {
             /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. `is_pair` where any has a
             /// second vehicle. Gives `false`, and takes no lane, where lanes run one by one instead.
-            pub(super) fn run_stream(
+            pub(super) fn run_stream<'c>(
                 &self,
                 id: ModelId,
                 instructions: Instructions,
                 is_pair: bool,
                 tables: &Tables<f32>,
-                next: impl FnMut() -> Option<Waiting>,
+                next: impl FnMut() -> Option<Waiting<'c>>,
                 each: impl FnMut(usize, Outcome<f32>),
             ) -> bool {
                 let (criteria, model_index) = (&self.criteria, id.index());
@@ -87,7 +87,8 @@ macro_rules! declare_constants {
                         let model = &self.$file;
                         let Some(burst) = burst_for(instructions, rules) else { return false };
                         let simulation = Simulation { frame, criteria, model, model_index };
-                        run_stream(&simulation, tables, |batch, row| burst.run(&simulation, batch, row), next, each);
+                        let steps = |batch: &mut _, row, until| burst.run(&simulation, batch, row, until);
+                        run_stream(&simulation, tables, steps, next, each);
                     })+
                 }
                 true

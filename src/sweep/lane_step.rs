@@ -143,11 +143,12 @@ pub struct Moved<R> {
     pub seen: [Seen<R>; 2],
     /// The result of the check that counts.
     pub hazard: Hazard<R>,
-    /// It was the lane's last step: [`conclude`] says why.
+    /// It was the lane's last step, even if the time cap is far: [`conclude`] says why.
     pub ended: bool,
 }
 
-/// One step; `places` are the other vehicles at `state.index`. `is_pair` says whether the second one is used.
+/// One step; `places` are the other vehicles at `state.index`. `is_pair` says whether the second one is used. The
+/// lane is over where this says so, or where the next index reaches the step cap.
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
@@ -185,7 +186,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     }
     let over = index >= lane.horizon;
     let at_rest = v_ego <= R::ZERO;
-    let ended = touched || aborted || (over && (at_rest || settled)) || index + 1 >= frame.step_cap;
+    let ended = touched || aborted || (over && (at_rest || settled));
 
     // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
     let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);

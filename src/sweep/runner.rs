@@ -75,7 +75,7 @@ impl LaneRunner<'_, f32> {
         let is_pair = cases.iter().any(|case| case.pair != 0);
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let waiting = |lane: usize| {
-                let case = *cases.get(lane / self.starts.len())?;
+                let case = cases.get(lane / self.starts.len())?;
                 let start = self.starts[lane % self.starts.len()];
                 Some(Waiting { case, start, at: lane * models + at_model })
             };
@@ -84,7 +84,7 @@ impl LaneRunner<'_, f32> {
             let constants = &self.constants[block];
             if !constants.run_stream(model, instructions, is_pair, &self.tables, next, &mut each) {
                 for Waiting { case, start, at } in (0..).map_while(waiting) {
-                    each(at, self.run_case(block, &case, start, model));
+                    each(at, self.run_case(block, case, start, model));
                 }
             }
         }

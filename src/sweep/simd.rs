@@ -91,16 +91,16 @@ impl std::fmt::Display for Instructions {
 ///
 /// Only [`burst_for`] makes one, and only for instructions that the machine has.
 pub(super) struct Burst<M> {
-    run: unsafe fn(&Simulation<f32, M>, &mut Batch, usize) -> usize,
+    run: unsafe fn(&Simulation<f32, M>, &mut Batch, usize, usize) -> usize,
 }
 
 impl<M> Burst<M> {
     /// Runs it.
     #[inline]
-    pub(super) fn run(&self, simulation: &Simulation<f32, M>, batch: &mut Batch, row: usize) -> usize {
+    pub(super) fn run(&self, simulation: &Simulation<f32, M>, batch: &mut Batch, row: usize, until: usize) -> usize {
         // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
         // asked the machine for them.
-        unsafe { (self.run)(simulation, batch, row) }
+        unsafe { (self.run)(simulation, batch, row, until) }
     }
 }
 
@@ -151,8 +151,9 @@ fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     batch: &mut Batch,
     row: usize,
+    until: usize,
 ) -> usize {
-    burst::<M, RULES>(simulation, batch, row)
+    burst::<M, RULES>(simulation, batch, row, until)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -161,8 +162,9 @@ fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     batch: &mut Batch,
     row: usize,
+    until: usize,
 ) -> usize {
-    burst::<M, RULES>(simulation, batch, row)
+    burst::<M, RULES>(simulation, batch, row, until)
 }
 
 #[cfg(target_arch = "aarch64")]
@@ -170,6 +172,7 @@ fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     batch: &mut Batch,
     row: usize,
+    until: usize,
 ) -> usize {
-    burst::<M, RULES>(simulation, batch, row)
+    burst::<M, RULES>(simulation, batch, row, until)
 }
