@@ -16,7 +16,7 @@ use super::outcome::Outcome;
 /// Lanes of a batch: one AVX-512 register of binary32.
 pub(super) const LANES: usize = 16;
 /// Steps whose motions are decoded ahead.
-const BURST: usize = 16;
+const BURST: usize = 32;
 
 type Floats = [f32; LANES];
 type Words = [u32; LANES];
@@ -320,8 +320,10 @@ pub(super) fn run_stream<'c, M: DriverModel<f32>>(
     while slots.iter().any(Option::is_some) {
         if row == BURST {
             row = 0;
-            for (k, slot) in slots.iter_mut().enumerate() {
-                look_ahead(&mut batch, k, slot, tables, row);
+            for (k, lane) in slots.iter_mut().enumerate() {
+                if let Some(lane) = lane.as_mut().filter(|lane| !lane.is_steady) {
+                    look_ahead(&mut batch, k, lane, tables, row);
+                }
             }
         }
         // No lane steps beyond the cap, so no step asks for it.
@@ -340,7 +342,9 @@ pub(super) fn run_stream<'c, M: DriverModel<f32>>(
             let is_pair = lane.waiting.case.pair != 0;
             each(lane.waiting.at, conclude(simulation, is_pair, &constants, &state, &places));
             *slot = admit(simulation, tables, &mut batch, k, &mut next, &mut each);
-            look_ahead(&mut batch, k, slot, tables, row);
+            if let Some(lane) = slot {
+                look_ahead(&mut batch, k, lane, tables, row);
+            }
         }
     }
 }
@@ -392,11 +396,7 @@ fn steady_from(motion: &Motion<f32>) -> u32 {
 
 /// Decodes what the lane of a slot sees from `row` to the end of the burst.
 #[inline(never)]
-fn look_ahead(batch: &mut Batch, k: usize, slot: &mut Option<Slot>, tables: &Tables<f32>, row: usize) {
-    let Some(lane) = slot else { return };
-    if lane.is_steady {
-        return;
-    }
+fn look_ahead(batch: &mut Batch, k: usize, lane: &mut Slot, tables: &Tables<f32>, row: usize) {
     let index = batch.state.index[k];
     let vehicles = if lane.waiting.case.pair != 0 { 2 } else { 1 };
     for (vehicle, other) in lane.waiting.case.others.iter().enumerate().take(vehicles) {
