@@ -6,6 +6,7 @@
 
 mod backend;
 mod batch;
+mod batch_arrays;
 mod cpu;
 mod drivers;
 mod frame;
