@@ -58,8 +58,10 @@ pub struct BrakeThreat<R> {
 /// (exact form), so that a step never divides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrakeThreatMaximum<R> {
-    numerator: R,
-    denominator: R,
+    /// Numerator of the quotient.
+    pub numerator: R,
+    /// Denominator of the quotient; 0 where no braking helps.
+    pub denominator: R,
     /// The predicate was true at some step.
     pub failed: bool,
 }
@@ -115,6 +117,17 @@ impl<R: Real> BrakeThreat<R> {
             short_ramp: R::from_f64(8.0 / (9.0 * jerk)),
             two_jerk: R::from_f64(2.0 * jerk),
         }
+    }
+
+    /// Its form.
+    pub fn form(&self) -> BtnForm {
+        self.form
+    }
+
+    /// The same with its form written as a constant, so that a compiler leaves the others out.
+    #[inline(always)]
+    pub(crate) fn known_as(self, form: BtnForm) -> Self {
+        BrakeThreat { form, ..self }
     }
 
     /// The constants by the names that the shaders give them; the form counts from 0.

@@ -12,8 +12,10 @@ pub struct TimeToCollision<R> {
 /// Smallest TTC so far, kept as a quotient so that a step never divides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TtcMinimum<R> {
-    gap: R,
-    closing: R,
+    /// Gap of the quotient, m, ≥ 0.
+    pub gap: R,
+    /// Closing speed of the quotient, m/s; 0 where nothing was seen.
+    pub closing: R,
     /// The predicate was true at some step.
     pub failed: bool,
 }

@@ -1,5 +1,5 @@
-//! The CPU backend: every unit is a task of the rayon pool, every lane a scalar loop. f32 computes the lane
-//! arithmetic that all backends share; f64 is the reference.
+//! The CPU backend: parts of the units are tasks of the rayon pool. f32 computes the lane arithmetic that all
+//! backends share, in batches on the widest instructions of the machine; f64 is the reference, lane by lane.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -10,49 +10,131 @@ use super::backend::{Backend, CellCounts, Chunk, Session, Wanted};
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
 use super::runner::LaneRunner;
+use super::simd::Instructions;
 use crate::Result;
 use crate::scalar::Real;
 
-/// Rayon over units, scalar lanes, in the arithmetic `R`.
-#[derive(Debug, Default)]
+/// Lanes per model from which on a task keeps its batches full nearly all the time.
+const FULL_TASK: u64 = 2048;
+
+/// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
+#[derive(Debug)]
 pub struct CpuBackend<R> {
+    instructions: Instructions,
     arithmetic: PhantomData<R>,
 }
 
 impl CpuBackend<f32> {
-    /// The lane arithmetic: binary32.
+    /// The lane arithmetic: binary32, on the best instructions of the machine.
     pub fn lane_arithmetic() -> Self {
-        CpuBackend { arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::best(), arithmetic: PhantomData }
+    }
+
+    /// The lane arithmetic lane by lane: what every other backend is compared with.
+    pub fn scalar() -> Self {
+        CpuBackend { instructions: Instructions::Scalar, arithmetic: PhantomData }
+    }
+
+    /// The lane arithmetic on chosen instructions.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) where this machine does not have them.
+    pub fn with_instructions(instructions: Instructions) -> Result<Self> {
+        Ok(CpuBackend { instructions: instructions.checked()?, arithmetic: PhantomData })
     }
 }
 
 impl CpuBackend<f64> {
-    /// The reference: binary64, same source.
+    /// The reference: binary64, same source, lane by lane.
     pub fn reference() -> Self {
-        CpuBackend { arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::Scalar, arithmetic: PhantomData }
     }
 }
 
-impl<R: Real> Backend for CpuBackend<R> {
-    fn describe(&self) -> String {
+impl<R: Real> CpuBackend<R> {
+    fn description(&self) -> String {
         let bits = 8 * std::mem::size_of::<R>();
         let threads = rayon::current_num_threads();
-        format!("CPU, {threads} thread{}, scalar binary{bits}", if threads == 1 { "" } else { "s" })
+        let s = if threads == 1 { "" } else { "s" };
+        format!("CPU, {threads} thread{s}, {} binary{bits}", self.instructions)
+    }
+}
+
+impl Backend for CpuBackend<f32> {
+    fn describe(&self) -> String {
+        self.description()
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        Ok(Box::new(CpuSession::<R> { plan, runner: LaneRunner::new(plan) }))
+        let (runner, instructions) = (LaneRunner::<f32>::new(plan), self.instructions);
+        if instructions == Instructions::Scalar {
+            return Ok(Box::new(lane_by_lane(plan, runner)));
+        }
+        let least_lanes = FULL_TASK * plan.models.len() as u64;
+        let run = move |block: usize, units, each: &mut dyn FnMut(usize, Outcome<f32>)| {
+            runner.run_units(instructions, block, units, each);
+        };
+        Ok(Box::new(CpuSession { plan, run, least_lanes, outcome: PhantomData }))
     }
 }
 
-struct CpuSession<'p, R> {
-    plan: &'p LanePlan,
-    runner: LaneRunner<'p, R>,
+impl Backend for CpuBackend<f64> {
+    fn describe(&self) -> String {
+        self.description()
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        Ok(Box::new(lane_by_lane(plan, LaneRunner::<f64>::new(plan))))
+    }
 }
 
-impl<R: Real> Session for CpuSession<'_, R> {
+/// A session that runs scalar lanes.
+fn lane_by_lane<'p, R: Real>(
+    plan: &'p LanePlan,
+    runner: LaneRunner<'p, R>,
+) -> CpuSession<'p, impl RunUnits<R> + 'p, R> {
+    let run = move |block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)| {
+        let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
+        for (k, unit) in units.enumerate() {
+            runner.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
+        }
+    };
+    CpuSession { plan, run, least_lanes: 1, outcome: PhantomData }
+}
+
+/// Runs the lanes of some units of a block and gives each with its position, counted from the first unit on.
+trait RunUnits<R>: Fn(usize, Range<u64>, &mut dyn FnMut(usize, Outcome<R>)) + Sync {}
+
+impl<R, F: Fn(usize, Range<u64>, &mut dyn FnMut(usize, Outcome<R>)) + Sync> RunUnits<R> for F {}
+
+struct CpuSession<'p, F, R> {
+    plan: &'p LanePlan,
+    run: F,
+    /// Lanes that a task should have.
+    least_lanes: u64,
+    outcome: PhantomData<fn(R)>,
+}
+
+impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
+    /// Units per task: enough lanes, but some tasks for every thread where there are more.
+    fn task_units(&self, block: usize, units: u64) -> u64 {
+        let per_unit = self.plan.lanes_per_unit(&self.plan.blocks[block]).max(1);
+        let least = self.least_lanes.div_ceil(per_unit);
+        let fair = units.div_ceil(rayon::current_num_threads() as u64);
+        least.min(fair).max(1)
+    }
+
+    /// Units of a task, counted within the block.
+    fn task(inside: &Range<u64>, task_units: u64, k: usize) -> Range<u64> {
+        let from = inside.start + k as u64 * task_units;
+        from..inside.end.min(from + task_units)
+    }
+}
+
+impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
+        let run = &self.run;
         let first_lane = plan.first_lane_of(units.start);
         let mut verdicts = Vec::new();
         let mut outcomes = Vec::new();
@@ -60,43 +142,46 @@ impl<R: Real> Session for CpuSession<'_, R> {
         for (block, inside) in plan.segments(units.clone()) {
             let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
             let count = (inside.end - inside.start) as usize;
+            let task_units = self.task_units(block, count as u64);
+            let task = |k: usize| Self::task(&inside, task_units, k);
+            let task_lanes = task_units as usize * per_unit;
+            let from = verdicts.len();
+            if wanted != Wanted::Counts {
+                verdicts.resize(from + count * per_unit, Verdicts::default());
+            }
             match wanted {
                 Wanted::Verdicts => {
-                    let from = verdicts.len();
-                    verdicts.resize(from + count * per_unit, Verdicts::default());
-                    verdicts[from..].par_chunks_mut(per_unit).enumerate().for_each(|(k, lanes)| {
-                        self.runner
-                            .run_unit(block, inside.start + k as u64, |at, outcome| lanes[at] = outcome.verdicts);
+                    verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
+                        run(block, task(k), &mut |at, outcome| lanes[at] = outcome.verdicts);
                     });
                 }
                 Wanted::Outcomes => {
-                    let per_units: Vec<Vec<Outcome<f64>>> = (0..count)
-                        .into_par_iter()
-                        .map(|k| {
-                            let mut lanes = Vec::with_capacity(per_unit);
-                            self.runner.run_unit(block, inside.start + k as u64, |_, o| lanes.push(o.widen()));
-                            lanes
-                        })
-                        .collect();
-                    for lanes in per_units {
-                        verdicts.extend(lanes.iter().map(|o| o.verdicts));
-                        outcomes.extend(lanes);
-                    }
+                    outcomes.resize(from + count * per_unit, Outcome::NONE);
+                    let tasks =
+                        outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
+                    tasks.enumerate().for_each(|(k, (lanes, verdicts))| {
+                        run(block, task(k), &mut |at, outcome| {
+                            lanes[at] = outcome.widen();
+                            verdicts[at] = outcome.verdicts;
+                        });
+                    });
                 }
                 Wanted::Counts => {
                     counts.resize(plan.cell_count(), CellCounts::EMPTY);
                     let cells = plan.blocks[block].variants.len() * plan.models.len();
                     let empty = || vec![CellCounts::EMPTY; cells];
                     let lanes_per_variant = plan.headways.len() * plan.models.len();
-                    let of_units = (0..count).into_par_iter().fold(empty, |mut cells, k| {
-                        self.runner.run_unit(block, inside.start + k as u64, |at, outcome| {
-                            let cell = at / lanes_per_variant * plan.models.len() + at % plan.models.len();
+                    let tasks = count.div_ceil(task_units as usize);
+                    let of_tasks = (0..tasks).into_par_iter().fold(empty, |mut cells, k| {
+                        run(block, task(k), &mut |at, outcome| {
+                            let inside = at % per_unit;
+                            let cell = inside / lanes_per_variant * plan.models.len() + inside % plan.models.len();
                             cells[cell].count(&outcome);
                         });
                         cells
                     });
                     // Whole numbers and smallest values: the order of the sum does not matter.
-                    let sum = of_units.reduce(empty, |mut a, b| {
+                    let sum = of_tasks.reduce(empty, |mut a, b| {
                         a.iter_mut().zip(&b).for_each(|(a, b)| a.add(b));
                         a
                     });

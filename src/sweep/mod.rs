@@ -5,16 +5,20 @@
 //! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
 
 mod backend;
+mod batch;
+mod batch_arrays;
 mod cpu;
 mod drivers;
 mod frame;
 mod lane_case;
+mod lane_step;
 mod outcome;
 mod partial;
 mod plan;
 mod recheck;
 mod run;
 mod runner;
+mod simd;
 mod study;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
@@ -29,4 +33,5 @@ pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use run::{SweepOptions, SweepSummary, chunks, sweep};
 pub use runner::LaneRunner;
+pub use simd::Instructions;
 pub use study::{StudyOptions, StudyPlan, plan_study};

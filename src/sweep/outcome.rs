@@ -71,6 +71,24 @@ pub struct Outcome<R> {
     pub min_gap: R,
 }
 
+impl Outcome<f64> {
+    /// Fills the place of a lane that is to come.
+    pub(super) const NONE: Self = Outcome {
+        verdicts: Verdicts(0),
+        contact: Contact::None,
+        contact_with: 0,
+        end: EndReason::Cap,
+        reaction_step: NO_STEP,
+        contact_step: NO_STEP,
+        end_step: 0,
+        impact_speed: 0.0,
+        impact_closing_speed: 0.0,
+        min_ttc: 0.0,
+        max_btn: 0.0,
+        min_gap: 0.0,
+    };
+}
+
 impl<R: Real> Outcome<R> {
     /// The same in f64, exactly.
     pub fn widen(&self) -> Outcome<f64> {

@@ -1,10 +1,14 @@
 //! Single lanes on the CPU: what the CPU backend is made of, and what any other backend is checked with.
 
+use std::ops::Range;
+
+use super::batch::Waiting;
 use super::drivers::Constants;
 use super::frame::{Silent, Start};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::plan::{LaneKey, LanePlan};
+use super::simd::Instructions;
 use crate::driver::ModelId;
 use crate::scalar::Real;
 use crate::scenario::Tables;
@@ -51,5 +55,38 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
     fn run_case(&self, block: usize, case: &LaneCase<R>, start: Start<R>, model: ModelId) -> Outcome<R> {
         self.constants[block].run(model, case, &self.tables, start, &mut Silent)
+    }
+}
+
+impl LaneRunner<'_, f32> {
+    /// All lanes of some units of a block, in batches: position counted from the first unit on, outcome. In no
+    /// particular order.
+    pub fn run_units(
+        &self,
+        instructions: Instructions,
+        block: usize,
+        units: Range<u64>,
+        mut each: impl FnMut(usize, Outcome<f32>),
+    ) {
+        let (variants, models) = (self.plan.blocks[block].variants.len(), self.plan.models.len());
+        let keys = units.clone().flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
+        let cases: Vec<LaneCase<f32>> =
+            keys.map(|(unit, variant)| self.plan.case(block, unit, variant).cast()).collect();
+        let is_pair = cases.iter().any(|case| case.pair != 0);
+        for (at_model, &model) in self.plan.models.iter().enumerate() {
+            let waiting = |lane: usize| {
+                let case = cases.get(lane / self.starts.len())?;
+                let start = self.starts[lane % self.starts.len()];
+                Some(Waiting { case, start, at: lane * models + at_model })
+            };
+            let mut lanes = 0..;
+            let next = || waiting(lanes.next()?);
+            let constants = &self.constants[block];
+            if !constants.run_stream(model, instructions, is_pair, &self.tables, next, &mut each) {
+                for Waiting { case, start, at } in (0..).map_while(waiting) {
+                    each(at, self.run_case(block, case, start, model));
+                }
+            }
+        }
     }
 }

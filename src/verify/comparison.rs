@@ -130,7 +130,7 @@ impl Comparison {
 /// # Errors
 /// Of the backend under test.
 pub fn compare(set: &str, plan: &LanePlan, tested: &dyn Backend, done: impl Fn(u64)) -> Result<Comparison> {
-    let (cpu, reference) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
+    let (cpu, reference) = (CpuBackend::scalar(), CpuBackend::reference());
     let mut sessions = [tested.prepare(plan)?, cpu.prepare(plan)?, reference.prepare(plan)?];
     let mut comparison = Comparison {
         set: set.to_owned(),

@@ -1,0 +1,206 @@
+//! One core on every instruction set: lane-steps per second of every category and model, the operations of a
+//! lane-step, the roof of the machine, and memory at 10^5, 10^6 and 10^7 lanes.
+//!
+//! `cargo bench --bench simd` prints one CSV row per part and repetition to stdout (kept under `benches/runs` with
+//! the machine's facts) and a summary to stderr. Synthetic data of the paper's size, ten headways, the verdicts of
+//! all lanes, one thread. The roof is what independent additions, multiplications, or both in turn reach on values
+//! in registers; the best of them counts.
+
+#![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
+
+mod common;
+
+use std::time::Instant;
+
+use common::{lane_steps, paper_size_scenarios};
+use lanesweep::driver::ModelId;
+use lanesweep::profile::Profile;
+use lanesweep::scalar::Counting;
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::sweep::{
+    CpuBackend, Headway, Instructions, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
+};
+
+const REPETITIONS: usize = 7;
+
+fn main() {
+    // `cargo test --benches` calls without `--bench`: nothing to time then.
+    if !std::env::args().any(|arg| arg == "--bench") {
+        return;
+    }
+    println!("part,category,model,instructions,repetition,amount,unit,seconds");
+    let scenarios = paper_size_scenarios();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    one.install(|| speeds(&scenarios));
+    threads(&scenarios);
+    memory(&scenarios);
+}
+
+/// Every category and model on every instruction set.
+fn speeds(scenarios: &[Scenario]) {
+    let sets = Instructions::available();
+    let roofs: Vec<f64> = sets.iter().map(|&set| measured_roof(set)).collect();
+    for category in Category::ALL {
+        for model in ModelId::ALL {
+            let plan = plan(scenarios, vec![category], vec![model], Headway::paper());
+            let operations = operations(&plan, category, model);
+            let steps = lane_steps(&plan, &CpuBackend::lane_arithmetic());
+            eprint!("{:>7} {:>6} {operations:6.1} operations/step", category.key(), model.name());
+            for (&set, roof) in sets.iter().zip(&roofs) {
+                let backend = CpuBackend::with_instructions(set).unwrap();
+                let best = (0..REPETITIONS).map(|repetition| {
+                    let seconds = time(|| run(&plan, &backend));
+                    let key = category.key();
+                    println!("sweep,{key},{},{set},{repetition},{steps},lane-steps,{seconds}", model.name());
+                    seconds
+                });
+                let rate = steps as f64 / best.fold(f64::INFINITY, f64::min);
+                let share = 100.0 * rate * operations / roof;
+                let share = if roof.is_finite() { format!(" ({share:4.1} %)") } else { String::new() };
+                eprint!(" | {set} {:6.1} M/s{share}", rate / 1e6);
+            }
+            eprintln!();
+        }
+    }
+}
+
+/// The whole study on one and on two threads.
+fn threads(scenarios: &[Scenario]) {
+    let plan = plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
+    let backend = CpuBackend::lane_arithmetic();
+    let steps = lane_steps(&plan, &backend);
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let best = (0..REPETITIONS).map(|repetition| {
+            let seconds = pool.install(|| time(|| run(&plan, &backend)));
+            println!("study on {threads} threads,,,{},{repetition},{steps},lane-steps,{seconds}", Instructions::best());
+            seconds
+        });
+        let best = best.fold(f64::INFINITY, f64::min);
+        let lanes = plan.lane_count();
+        eprintln!("{threads} threads: {lanes} lanes in {best:.3} s, {:.1} M lane-steps/s", steps as f64 / best / 1e6);
+    }
+}
+
+/// Memory while 10^5, 10^6 and 10^7 lanes run: more headways of the same cases.
+fn memory(scenarios: &[Scenario]) {
+    for headways in [25, 250, 2500_u32] {
+        let starts = (1..=headways).map(|k| Headway::ThwS(2.0 * f64::from(k) / f64::from(headways))).collect();
+        let cut_ins: Vec<Scenario> =
+            scenarios.iter().filter(|s| s.category == Category::CutIn).take(100).cloned().collect();
+        let plan = plan(&cut_ins, vec![Category::CutIn], ModelId::ALL.to_vec(), starts);
+        let seconds = time(|| run(&plan, &CpuBackend::lane_arithmetic()));
+        let (lanes, peak) = (plan.lane_count(), peak_memory_bytes().unwrap_or(0));
+        println!("peak memory at {lanes} lanes,cut_in,,{},0,{peak},bytes,{seconds}", Instructions::best());
+        eprintln!("{lanes} lanes: peak memory {:.1} MB so far, {seconds:.2} s", peak as f64 / 1e6);
+    }
+}
+
+fn plan(scenarios: &[Scenario], categories: Vec<Category>, models: Vec<ModelId>, headways: Vec<Headway>) -> LanePlan {
+    let options = StudyOptions { categories, models, headways, ..StudyOptions::default() };
+    plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap().plan
+}
+
+fn run(plan: &LanePlan, backend: &CpuBackend<f32>) {
+    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |_| Ok(())).unwrap();
+}
+
+fn time<T>(work: impl FnOnce() -> T) -> f64 {
+    let start = Instant::now();
+    std::hint::black_box(work());
+    start.elapsed().as_secs_f64()
+}
+
+/// Operations of a lane-step, over lanes spread through the plan.
+fn operations(plan: &LanePlan, category: Category, model: ModelId) -> f64 {
+    let runner = LaneRunner::<Counting>::new(plan);
+    let stride = (plan.lane_count() / 400).max(1);
+    let (steps, count) = Counting::measure(|| {
+        let lanes = (0..plan.lane_count()).step_by(stride as usize);
+        lanes.map(|lane| u64::from(runner.run(&plan.key(lane).unwrap()).end_step) + 1).sum::<u64>()
+    });
+    let per_step = count.total() as f64 / steps as f64;
+    println!("operations,{},{},,0,{per_step},per lane-step,", category.key(), model.name());
+    per_step
+}
+
+/// Operations per second that the machine reaches at best; infinite for scalar
+/// lanes, which have none of their own.
+fn measured_roof(set: Instructions) -> f64 {
+    if set == Instructions::Scalar {
+        return f64::INFINITY;
+    }
+    let mut best: f64 = 0.0;
+    for (kind, name) in ["additions", "multiplications", "both in turn"].into_iter().enumerate() {
+        let rates = (0..REPETITIONS).map(|repetition| {
+            let start = Instant::now();
+            let count = roof::operations(set, kind);
+            let seconds = start.elapsed().as_secs_f64();
+            println!("roof {name},,,{set},{repetition},{count},operations,{seconds}");
+            count as f64 / seconds
+        });
+        let rate = rates.fold(0.0, f64::max);
+        eprintln!("roof of {set}, {name}: {:.1} G operations/s", rate / 1e9);
+        best = best.max(rate);
+    }
+    best
+}
+
+/// Independent chains of operations in registers.
+mod roof {
+    use lanesweep::sweep::Instructions;
+
+    const ROUNDS: u64 = 4_000_000;
+
+    /// Runs 0 additions, 1 multiplications, 2 both in turn; gives their number, 0 where there is no loop for it.
+    pub fn operations(set: Instructions, kind: usize) -> u64 {
+        if !set.is_available() {
+            return 0;
+        }
+        match set {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the machine was asked for the instructions.
+            Instructions::Avx512 => unsafe { avx512(kind) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the machine was asked for the instructions.
+            Instructions::Avx2 => unsafe { avx2(kind) },
+            #[cfg(target_arch = "aarch64")]
+            // SAFETY: every AArch64 machine has them.
+            Instructions::Neon => unsafe { neon(kind) },
+            _ => 0,
+        }
+    }
+
+    macro_rules! chains {
+        ($name:ident, $features:literal, $arch:ident, $set:ident, $add:ident, $multiply:ident, $lanes:literal, $chains:literal) => {
+            #[target_feature(enable = $features)]
+            fn $name(kind: usize) -> u64 {
+                use std::arch::$arch::{$add, $multiply, $set};
+                let (term, factor) = ($set(1.5), $set(0.999_999_9));
+                let mut values = [$set(1.0); $chains];
+                for _ in 0..ROUNDS {
+                    for (at, value) in values.iter_mut().enumerate() {
+                        let adds = kind == 0 || (kind == 2 && at % 2 == 0);
+                        *value = if adds { $add(*value, term) } else { $multiply(*value, factor) };
+                    }
+                }
+                std::hint::black_box(values);
+                ROUNDS * $lanes * $chains
+            }
+        };
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    chains!(avx512, "avx512f", x86_64, _mm512_set1_ps, _mm512_add_ps, _mm512_mul_ps, 16, 16);
+    #[cfg(target_arch = "x86_64")]
+    chains!(avx2, "avx2", x86_64, _mm256_set1_ps, _mm256_add_ps, _mm256_mul_ps, 8, 12);
+    #[cfg(target_arch = "aarch64")]
+    chains!(neon, "neon", aarch64, vdupq_n_f32, vaddq_f32, vmulq_f32, 4, 16);
+}
+
+/// Linux: the process's highest resident memory.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}

@@ -1,0 +1,198 @@
+//! The arrays of a batch: what [`super::lane_step`] calls one lane, for [`LANES`] lanes side by side.
+
+use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::driver::DriverState;
+use crate::scenario::{Motion, Tables};
+
+use super::lane_step::{LaneConstants, LaneState, OtherConstants, Place, Record};
+
+/// Lanes of a batch: one AVX-512 register of binary32.
+pub(super) const LANES: usize = 16;
+/// Steps whose motions are decoded ahead.
+pub(super) const BURST: usize = 32;
+
+type Floats = [f32; LANES];
+type Words = [u32; LANES];
+
+/// [`LaneConstants`] as arrays.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct ConstantsOfLanes {
+    half_lengths: [Floats; 2],
+    half_widths: [Floats; 2],
+    present_from: [Words; 2],
+    pub(super) present_until: [Words; 2],
+    attend_from: [Words; 2],
+    judged: [Words; 2],
+    ego_width: Floats,
+    pub(super) horizon: Words,
+}
+
+impl ConstantsOfLanes {
+    /// No vehicle is ever present, and nothing is ever over.
+    pub(super) const IDLE: Self = ConstantsOfLanes {
+        half_lengths: [[0.0; LANES]; 2],
+        half_widths: [[0.0; LANES]; 2],
+        present_from: [[0; LANES]; 2],
+        present_until: [[0; LANES]; 2],
+        attend_from: [[u32::MAX; LANES]; 2],
+        judged: [[0; LANES]; 2],
+        ego_width: [0.0; LANES],
+        horizon: [u32::MAX; LANES],
+    };
+
+    #[inline(always)]
+    /// Of one lane.
+    pub(super) fn at(&self, k: usize) -> LaneConstants<f32> {
+        let other = |vehicle: usize| OtherConstants {
+            half_lengths: self.half_lengths[vehicle][k],
+            half_widths: self.half_widths[vehicle][k],
+            present_from: self.present_from[vehicle][k],
+            present_until: self.present_until[vehicle][k],
+            attend_from: self.attend_from[vehicle][k],
+            judged: self.judged[vehicle][k],
+        };
+        LaneConstants { others: [other(0), other(1)], ego_width: self.ego_width[k], horizon: self.horizon[k] }
+    }
+
+    pub(super) fn set(&mut self, k: usize, lane: &LaneConstants<f32>) {
+        for (vehicle, other) in lane.others.iter().enumerate() {
+            self.half_lengths[vehicle][k] = other.half_lengths;
+            self.half_widths[vehicle][k] = other.half_widths;
+            self.present_from[vehicle][k] = other.present_from;
+            self.present_until[vehicle][k] = other.present_until;
+            self.attend_from[vehicle][k] = other.attend_from;
+            self.judged[vehicle][k] = other.judged;
+        }
+        self.ego_width[k] = lane.ego_width;
+        self.horizon[k] = lane.horizon;
+    }
+}
+
+/// [`LaneState`] as arrays.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct StateOfLanes {
+    pub(super) index: Words,
+    v_ego: Floats,
+    v_before: Floats,
+    gaps: [Floats; 2],
+    deceleration: Floats,
+    delay_steps: Words,
+    reaction_step: Words,
+    ttc_gap: Floats,
+    ttc_closing: Floats,
+    ttc_failed: Words,
+    btn_numerator: Floats,
+    btn_denominator: Floats,
+    btn_failed: Words,
+    min_gap: Floats,
+    /// 1 where the last step was the lane's last.
+    pub(super) ended: Words,
+}
+
+impl StateOfLanes {
+    pub(super) const IDLE: Self = StateOfLanes {
+        index: [0; LANES],
+        v_ego: [0.0; LANES],
+        v_before: [0.0; LANES],
+        gaps: [[0.0; LANES]; 2],
+        deceleration: [0.0; LANES],
+        delay_steps: [0; LANES],
+        reaction_step: [0; LANES],
+        ttc_gap: [0.0; LANES],
+        ttc_closing: [0.0; LANES],
+        ttc_failed: [0; LANES],
+        btn_numerator: [0.0; LANES],
+        btn_denominator: [0.0; LANES],
+        btn_failed: [0; LANES],
+        min_gap: [0.0; LANES],
+        ended: [0; LANES],
+    };
+
+    #[inline(always)]
+    pub(super) fn at(&self, k: usize) -> LaneState<f32> {
+        LaneState {
+            index: self.index[k],
+            v_ego: self.v_ego[k],
+            v_before: self.v_before[k],
+            gaps: [self.gaps[0][k], self.gaps[1][k]],
+            driver: DriverState { deceleration: self.deceleration[k], delay_steps: self.delay_steps[k] },
+            reaction_step: self.reaction_step[k],
+            record: Record {
+                ttc: TtcMinimum { gap: self.ttc_gap[k], closing: self.ttc_closing[k], failed: self.ttc_failed[k] != 0 },
+                btn: BrakeThreatMaximum {
+                    numerator: self.btn_numerator[k],
+                    denominator: self.btn_denominator[k],
+                    failed: self.btn_failed[k] != 0,
+                },
+                min_gap: self.min_gap[k],
+            },
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, k: usize, lane: &LaneState<f32>, ended: bool) {
+        self.index[k] = lane.index;
+        self.v_ego[k] = lane.v_ego;
+        self.v_before[k] = lane.v_before;
+        self.gaps[0][k] = lane.gaps[0];
+        self.gaps[1][k] = lane.gaps[1];
+        self.deceleration[k] = lane.driver.deceleration;
+        self.delay_steps[k] = lane.driver.delay_steps;
+        self.reaction_step[k] = lane.reaction_step;
+        self.ttc_gap[k] = lane.record.ttc.gap;
+        self.ttc_closing[k] = lane.record.ttc.closing;
+        self.ttc_failed[k] = u32::from(lane.record.ttc.failed);
+        self.btn_numerator[k] = lane.record.btn.numerator;
+        self.btn_denominator[k] = lane.record.btn.denominator;
+        self.btn_failed[k] = u32::from(lane.record.btn.failed);
+        self.min_gap[k] = lane.record.min_gap;
+        self.ended[k] = u32::from(ended);
+    }
+}
+
+/// The other vehicles of all lanes over the steps of a burst.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct PlacesOfLanes {
+    speed: [[Floats; BURST]; 2],
+    position: [[Floats; BURST]; 2],
+    towards: [[Floats; BURST]; 2],
+}
+
+impl PlacesOfLanes {
+    pub(super) const IDLE: Self = PlacesOfLanes {
+        speed: [[[0.0; LANES]; BURST]; 2],
+        position: [[[0.0; LANES]; BURST]; 2],
+        towards: [[[0.0; LANES]; BURST]; 2],
+    };
+
+    #[inline(always)]
+    pub(super) fn at(&self, row: usize, k: usize) -> [Place<f32>; 2] {
+        let place = |vehicle: usize| Place {
+            speed: self.speed[vehicle][row][k],
+            position: self.position[vehicle][row][k],
+            towards: self.towards[vehicle][row][k],
+        };
+        [place(0), place(1)]
+    }
+
+    /// Decodes a motion from a step on, into the rows from `row` on.
+    pub(super) fn fill(
+        &mut self,
+        vehicle: usize,
+        k: usize,
+        row: usize,
+        motion: &Motion<f32>,
+        tables: &Tables<f32>,
+        step: u32,
+    ) {
+        for ahead in row..BURST {
+            let place = Place::of(motion, tables, step + (ahead - row) as u32);
+            self.speed[vehicle][ahead][k] = place.speed;
+            self.position[vehicle][ahead][k] = place.position;
+            self.towards[vehicle][ahead][k] = place.towards;
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! One step of a lane as a pure function, written once for the scalar lane and for batches of lanes. The latched
+//! step stands here, once for all models.
+//!
+//! Order inside a step: the gap moves to i, the state at i gives the criteria and the contact, then the check,
+//! then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32 keeps millimetres.
+//!
+//! No loop, no early return and no effect: so a compiler can run the step for many lanes at once.
+
+use crate::criterion::{BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact};
+use crate::driver::{DriverModel, DriverState, Hazard, View};
+use crate::scalar::Real;
+use crate::scenario::{Motion, Tables};
+
+use super::frame::{Frame, Seen, Simulation, Start};
+use super::lane_case::{LaneCase, LaneOther};
+use super::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+
+/// What a lane's steps need to know of another vehicle, constant within the lane.
+#[derive(Debug, Clone, Copy)]
+pub struct OtherConstants<R> {
+    /// (L_e + L_o)/2, m.
+    pub half_lengths: R,
+    /// (W_e + W_o)/2, m.
+    pub half_widths: R,
+    /// First step at which it exists for the ego.
+    pub present_from: u32,
+    /// First step at which it does no longer.
+    pub present_until: u32,
+    /// First step at which the lane's driver may react to it.
+    pub attend_from: u32,
+    /// 1 where the criteria judge it.
+    pub judged: u32,
+}
+
+/// What a lane's steps need to know, constant within the lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneConstants<R> {
+    /// Principal vehicle, then the one ahead of it.
+    pub others: [OtherConstants<R>; 2],
+    /// Width of the ego, m.
+    pub ego_width: R,
+    /// First step that may end a lane in which nothing happens any more.
+    pub horizon: u32,
+}
+
+impl<R: Real> LaneConstants<R> {
+    /// Of a case under a model.
+    #[inline(always)]
+    pub fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
+        let of = |other: &LaneOther<R>| OtherConstants {
+            half_lengths: other.half_lengths,
+            half_widths: other.half_widths,
+            present_from: other.present_from,
+            present_until: if other.used != 0 { other.present_until } else { 0 },
+            attend_from: other.attend_from[simulation.model_index],
+            judged: other.judged,
+        };
+        LaneConstants {
+            others: [of(&case.others[0]), of(&case.others[1])],
+            ego_width: case.ego_width,
+            // No step has this index: the step cap is below it.
+            horizon: if simulation.frame.end_when_settled { case.horizon } else { u32::MAX },
+        }
+    }
+}
+
+/// Where another vehicle is at one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<R> {
+    /// Speed, m/s.
+    pub speed: R,
+    /// Lateral position, m.
+    pub position: R,
+    /// Lateral speed towards the ego, m/s.
+    pub towards: R,
+}
+
+impl<R: Real> Place<R> {
+    /// Decodes a motion at a step.
+    #[inline(always)]
+    pub fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
+        let lateral = motion.lateral(tables, step);
+        Place { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
+    }
+}
+
+/// What the steps of a lane have gathered so far.
+#[derive(Debug, Clone, Copy)]
+pub struct Record<R> {
+    /// Smallest time to collision.
+    pub ttc: TtcMinimum<R>,
+    /// Largest Brake Threat Number.
+    pub btn: BrakeThreatMaximum<R>,
+    /// Smallest gap to a vehicle that TTC and BTN look at, m.
+    pub min_gap: R,
+}
+
+/// A lane between two steps.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneState<R> {
+    /// The step to come.
+    pub index: u32,
+    /// Speed of the ego at the step to come, m/s.
+    pub v_ego: R,
+    /// Speed of the ego one step before, m/s.
+    pub v_before: R,
+    /// Gaps at the last step, m; the step to come moves them first.
+    pub gaps: [R; 2],
+    /// The driver's latched state.
+    pub driver: DriverState<R>,
+    /// First unsafe step, or [`NO_STEP`].
+    pub reaction_step: u32,
+    /// What the steps have gathered.
+    pub record: Record<R>,
+}
+
+impl<R: Real> LaneState<R> {
+    /// Before the first step.
+    #[inline(always)]
+    pub fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
+        let gap_start = match start {
+            Start::Headway(thw) => thw * case.ego_speed,
+            Start::Gap(gap) => gap,
+        };
+        LaneState {
+            index: 0,
+            v_ego: case.ego_speed,
+            v_before: case.ego_speed,
+            gaps: [gap_start + case.others[0].gap_offset, gap_start + case.others[1].gap_offset],
+            driver: simulation.model.initial(),
+            reaction_step: NO_STEP,
+            record: Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: R::INFINITY },
+        }
+    }
+}
+
+/// What one step did.
+#[derive(Debug, Clone, Copy)]
+pub struct Moved<R> {
+    /// The lane after it.
+    pub state: LaneState<R>,
+    /// The other vehicles as the ego saw them; the second is the first where there is none.
+    pub seen: [Seen<R>; 2],
+    /// The result of the check that counts.
+    pub hazard: Hazard<R>,
+    /// It was the lane's last step, even if the time cap is far: [`conclude`] says why.
+    pub ended: bool,
+}
+
+/// One step; `places` are the other vehicles at `state.index`. `is_pair` says whether the second one is used. The
+/// lane is over where this says so, or where the next index reaches the step cap.
+#[inline(always)]
+pub fn advance<R: Real, M: DriverModel<R>>(
+    simulation: &Simulation<R, M>,
+    is_pair: bool,
+    lane: &LaneConstants<R>,
+    state: &LaneState<R>,
+    places: &[Place<R>; 2],
+) -> Moved<R> {
+    let &Simulation { frame, criteria, model, .. } = simulation;
+    let &LaneState { index, v_ego, .. } = state;
+    let ego = Ego { v: v_ego, a: (v_ego - state.v_before) * frame.inverse_dt, width: lane.ego_width };
+    let mut gaps = state.gaps;
+    gaps[0] = moved_gap(frame, state, gaps[0], &places[0]);
+    let first = see(criteria, &ego, &lane.others[0], &places[0], gaps[0], index);
+    let mut record = judge(criteria, &state.record, &first);
+    let mut hazard = check(model, &first, &lane.others[0], index);
+    let mut touched = touches(&first, &lane.others[0]) != Contact::None;
+    let mut settled = is_settled(&first);
+    let mut aborted = aborts(frame, &first);
+    let mut second = first;
+    if is_pair {
+        gaps[1] = moved_gap(frame, state, gaps[1], &places[1]);
+        second = see(criteria, &ego, &lane.others[1], &places[1], gaps[1], index);
+        record = judge(criteria, &record, &second);
+        let other_hazard = check(model, &second, &lane.others[1], index);
+        // The nearest unsafe vehicle drives the reaction.
+        let nearer = other_hazard.is_unsafe && (!hazard.is_unsafe || gaps[1] < gaps[0]);
+        hazard = Hazard {
+            is_unsafe: hazard.is_unsafe || other_hazard.is_unsafe,
+            demand: if nearer { other_hazard.demand } else { hazard.demand },
+        };
+        touched = touched || touches(&second, &lane.others[1]) != Contact::None;
+        settled = settled && is_settled(&second);
+        aborted = aborted || aborts(frame, &second);
+    }
+    let over = index >= lane.horizon;
+    let at_rest = v_ego <= R::ZERO;
+    let ended = touched || aborted || (over && (at_rest || settled));
+
+    // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
+    let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
+    let is_first = hazard.is_unsafe && state.reaction_step == NO_STEP;
+    let state = LaneState {
+        index: index + 1,
+        v_ego: if hazard.is_unsafe { v_reacting } else { v_ego },
+        v_before: v_ego,
+        gaps,
+        driver: DriverState {
+            deceleration: if hazard.is_unsafe { reacting.deceleration } else { state.driver.deceleration },
+            delay_steps: if hazard.is_unsafe { reacting.delay_steps } else { state.driver.delay_steps },
+        },
+        reaction_step: if is_first { index } else { state.reaction_step },
+        record,
+    };
+    Moved { state, seen: [first, second], hazard, ended }
+}
+
+/// The outcome of a lane whose last step has just been made, at these places.
+#[inline(always)]
+pub fn conclude<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    is_pair: bool,
+    lane: &LaneConstants<R>,
+    state: &LaneState<R>,
+    places: &[Place<R>; 2],
+) -> Outcome<R> {
+    let &Simulation { frame, criteria, .. } = simulation;
+    let index = state.index - 1;
+    let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
+    let first = see(criteria, &ego, &lane.others[0], &places[0], state.gaps[0], index);
+    let second = if is_pair { see(criteria, &ego, &lane.others[1], &places[1], state.gaps[1], index) } else { first };
+    let first_touch = touches(&first, &lane.others[0]);
+    let by_second = is_pair && first_touch == Contact::None;
+    let contact = if by_second { touches(&second, &lane.others[1]) } else { first_touch };
+    let closing = if by_second { second.view.closing() } else { first.view.closing() };
+    let collided = contact != Contact::None;
+    let aborted = aborts(frame, &first) || (is_pair && aborts(frame, &second));
+    let over = index >= lane.horizon;
+    let settled = is_settled(&first) && is_settled(&second);
+    let end = if collided {
+        EndReason::Contact
+    } else if aborted {
+        EndReason::Aborted
+    } else if over && ego.v <= R::ZERO {
+        EndReason::Standstill
+    } else if over && settled {
+        EndReason::Settled
+    } else {
+        EndReason::Cap
+    };
+    let record = &state.record;
+    let btn = if collided && criteria.btn_contact == BtnContact::Any { record.btn.fail() } else { record.btn };
+    let bit = |criterion: Criterion, failed: bool| u8::from(failed) << criterion.index();
+    let capped = if end == EndReason::Cap { Verdicts::CAPPED } else { 0 };
+    Outcome {
+        verdicts: Verdicts(
+            bit(Criterion::Collision, collided)
+                | bit(Criterion::Ttc, record.ttc.failed)
+                | bit(Criterion::Btn, btn.failed)
+                | capped,
+        ),
+        contact,
+        contact_with: u8::from(collided && by_second),
+        end,
+        reaction_step: state.reaction_step,
+        contact_step: if collided { index } else { NO_STEP },
+        end_step: index,
+        impact_speed: if collided { ego.v } else { R::ZERO },
+        impact_closing_speed: if collided { closing } else { R::ZERO },
+        min_ttc: record.ttc.value(),
+        max_btn: R::from_f64(criteria.btn.value(&btn)),
+        min_gap: record.min_gap,
+    }
+}
+
+/// The ego at one step.
+struct Ego<R> {
+    v: R,
+    a: R,
+    width: R,
+}
+
+/// The gap at the step to come. Step 0 is the start itself, unless index 0 is one step after it.
+#[inline(always)]
+fn moved_gap<R: Real>(frame: &Frame<R>, state: &LaneState<R>, gap: R, place: &Place<R>) -> R {
+    let moves = frame.start_shift || state.index > 0;
+    if moves { gap + (place.speed - state.v_ego) * frame.dt } else { gap }
+}
+
+#[inline(always)]
+fn see<R: Real>(
+    criteria: &Criteria<R>,
+    ego: &Ego<R>,
+    other: &OtherConstants<R>,
+    place: &Place<R>,
+    gap: R,
+    index: u32,
+) -> Seen<R> {
+    let view = View {
+        v_ego: ego.v,
+        a_ego: ego.a,
+        v_other: place.speed,
+        gap,
+        lateral_gap: place.position.abs() - other.half_widths,
+        lateral_towards: place.towards,
+        half_lengths: other.half_lengths,
+    };
+    let present = index >= other.present_from && index < other.present_until;
+    let judged = present
+        && other.judged != 0
+        && criteria.sees(gap, other.half_lengths, view.lateral_gap, place.position, ego.width);
+    Seen { view, lateral: place.position, present, judged }
+}
+
+#[inline(always)]
+fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
+    let (gap, closing) = (seen.view.gap, seen.view.closing());
+    Record {
+        ttc: criteria.ttc.update(record.ttc, seen.judged, gap, closing),
+        btn: criteria.btn.update(record.btn, seen.judged, gap, closing),
+        min_gap: if seen.judged { gap.smaller(record.min_gap) } else { record.min_gap },
+    }
+}
+
+#[inline(always)]
+fn check<R: Real, M: DriverModel<R>>(model: &M, seen: &Seen<R>, other: &OtherConstants<R>, index: u32) -> Hazard<R> {
+    let hazard = model.check(&seen.view);
+    let attentive = seen.present && index >= other.attend_from;
+    Hazard { is_unsafe: hazard.is_unsafe && attentive, demand: hazard.demand }
+}
+
+#[inline(always)]
+fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
+    if seen.present && other.judged != 0 {
+        contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
+    } else {
+        Contact::None
+    }
+}
+
+/// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
+#[inline(always)]
+fn is_settled<R: Real>(seen: &Seen<R>) -> bool {
+    let in_lane = seen.judged || (seen.present && seen.view.lateral_gap < R::ZERO);
+    seen.view.is_behind() || !in_lane || seen.view.closing() <= R::ZERO
+}
+
+#[inline(always)]
+fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> bool {
+    let overlap = seen.present && seen.view.lateral_gap < R::ZERO && !seen.view.is_behind();
+    let far = seen.view.gap.abs() > frame.abort_above_ttc * seen.view.closing().abs();
+    frame.abort_above_ttc > R::ZERO && overlap && far
+}
