@@ -99,6 +99,8 @@ pub struct Criteria<R> {
     pub ttc: TimeToCollision<R>,
     /// Brake Threat Number.
     pub btn: BrakeThreat<R>,
+    /// Smallest and largest values are gathered beside the verdicts, which do not need them.
+    pub keeps_values: bool,
 }
 
 impl CriteriaProfile {
@@ -109,6 +111,7 @@ impl CriteriaProfile {
             btn_contact: self.btn_contact,
             ttc: TimeToCollision { threshold: R::from_f64(self.ttc_threshold_s) },
             btn: BrakeThreat::new(self.btn, self.btn_threshold, self.max_deceleration_mps2, self.jerk_mps3),
+            keeps_values: true,
         }
     }
 }

@@ -100,12 +100,14 @@ impl DriverProfile for FsmProfile {
 /// 0 beyond the safe distance, 1 below the unsafe one, linear between.
 #[inline(always)]
 fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
+    // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
+    let between = (distance - safe).exact_div(dangerous - safe);
     if distance >= safe {
         R::ZERO
     } else if distance <= dangerous {
         R::ONE
     } else {
-        (distance - safe).exact_div(dangerous - safe)
+        between
     }
 }
 

@@ -21,30 +21,42 @@ pub(super) struct Rules {
     is_ratio: bool,
     sees_overlap: bool,
     aborts: bool,
+    /// Only verdicts are wanted: smallest and largest values are not gathered.
+    is_verdict_only: bool,
 }
 
 impl Rules {
     /// Number of sets.
-    pub(super) const SETS: u32 = 16;
+    pub(super) const SETS: u32 = 20;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
-    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, is_pair: bool) -> Option<Rules> {
+    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, is_pair: bool, values: bool) -> Option<Rules> {
         let is_ratio = match criteria.btn.form() {
             BtnForm::EquivalentDelay => false,
             BtnForm::DistanceRatio => true,
             BtnForm::Exact => return None,
         };
         let sees_overlap = criteria.gate == LateralGate::Overlap;
-        Some(Rules { is_pair, is_ratio, sees_overlap, aborts: frame.abort_above_ttc > 0.0 })
+        let aborts = frame.abort_above_ttc > 0.0;
+        // Seldom used rules have no loop of their own for verdicts alone.
+        Some(Rules { is_pair, is_ratio, sees_overlap, aborts, is_verdict_only: !values && !is_ratio && !aborts })
     }
 
     /// As a number below [`Rules::SETS`].
     pub(super) const fn bits(self) -> u32 {
-        self.is_pair as u32 | (self.is_ratio as u32) << 1 | (self.sees_overlap as u32) << 2 | (self.aborts as u32) << 3
+        let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
+        self.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
     }
 
     const fn from_bits(bits: u32) -> Rules {
-        Rules { is_pair: bits & 1 != 0, is_ratio: bits & 2 != 0, sees_overlap: bits & 4 != 0, aborts: bits & 8 != 0 }
+        let seldom = bits >> 2;
+        Rules {
+            is_pair: bits & 1 != 0,
+            sees_overlap: bits & 2 != 0,
+            is_ratio: seldom & 1 != 0,
+            aborts: seldom & 2 != 0,
+            is_verdict_only: seldom & 4 != 0,
+        }
     }
 
     /// The constants with everything that these rules decide written as constants.
@@ -55,7 +67,8 @@ impl Rules {
         let abort_above_ttc = if self.aborts { frame.abort_above_ttc } else { 0.0 };
         // A batch takes lanes after their first step: from then on every gap moves.
         let frame = Frame { abort_above_ttc, start_shift: true, ..*frame };
-        (frame, Criteria { gate, btn: criteria.btn.known_as(form), ..*criteria })
+        let keeps_values = !self.is_verdict_only;
+        (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })
     }
 }
 

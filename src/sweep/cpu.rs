@@ -71,8 +71,8 @@ impl Backend for CpuBackend<f32> {
             return Ok(Box::new(lane_by_lane(plan, runner)));
         }
         let least_lanes = FULL_TASK * plan.models.len() as u64;
-        let run = move |block: usize, units, each: &mut dyn FnMut(usize, Outcome<f32>)| {
-            runner.run_units(instructions, block, units, each);
+        let run = move |block: usize, units, values: bool, each: &mut dyn FnMut(usize, Outcome<f32>)| {
+            runner.run_units(instructions, block, units, values, each);
         };
         Ok(Box::new(CpuSession { plan, run, least_lanes, outcome: PhantomData }))
     }
@@ -93,7 +93,7 @@ fn lane_by_lane<'p, R: Real>(
     plan: &'p LanePlan,
     runner: LaneRunner<'p, R>,
 ) -> CpuSession<'p, impl RunUnits<R> + 'p, R> {
-    let run = move |block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)| {
+    let run = move |block: usize, units: Range<u64>, _values: bool, each: &mut dyn FnMut(usize, Outcome<R>)| {
         let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
         for (k, unit) in units.enumerate() {
             runner.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
@@ -103,9 +103,10 @@ fn lane_by_lane<'p, R: Real>(
 }
 
 /// Runs the lanes of some units of a block and gives each with its position, counted from the first unit on.
-trait RunUnits<R>: Fn(usize, Range<u64>, &mut dyn FnMut(usize, Outcome<R>)) + Sync {}
+/// Where values are not wanted, only an outcome's verdicts mean something.
+trait RunUnits<R>: Fn(usize, Range<u64>, bool, &mut dyn FnMut(usize, Outcome<R>)) + Sync {}
 
-impl<R, F: Fn(usize, Range<u64>, &mut dyn FnMut(usize, Outcome<R>)) + Sync> RunUnits<R> for F {}
+impl<R, F: Fn(usize, Range<u64>, bool, &mut dyn FnMut(usize, Outcome<R>)) + Sync> RunUnits<R> for F {}
 
 struct CpuSession<'p, F, R> {
     plan: &'p LanePlan,
@@ -152,7 +153,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             match wanted {
                 Wanted::Verdicts => {
                     verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
-                        run(block, task(k), &mut |at, outcome| lanes[at] = outcome.verdicts);
+                        run(block, task(k), false, &mut |at, outcome| lanes[at] = outcome.verdicts);
                     });
                 }
                 Wanted::Outcomes => {
@@ -160,7 +161,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                     let tasks =
                         outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
                     tasks.enumerate().for_each(|(k, (lanes, verdicts))| {
-                        run(block, task(k), &mut |at, outcome| {
+                        run(block, task(k), true, &mut |at, outcome| {
                             lanes[at] = outcome.widen();
                             verdicts[at] = outcome.verdicts;
                         });
@@ -173,7 +174,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                     let lanes_per_variant = plan.headways.len() * plan.models.len();
                     let tasks = count.div_ceil(task_units as usize);
                     let of_tasks = (0..tasks).into_par_iter().fold(empty, |mut cells, k| {
-                        run(block, task(k), &mut |at, outcome| {
+                        run(block, task(k), true, &mut |at, outcome| {
                             let inside = at % per_unit;
                             let cell = inside / lanes_per_variant * plan.models.len() + inside % plan.models.len();
                             cells[cell].count(&outcome);

@@ -76,12 +76,13 @@ macro_rules! declare_constants {
                 instructions: Instructions,
                 is_pair: bool,
                 tables: &Tables<f32>,
+                values: bool,
                 next: impl FnMut() -> Option<Waiting<'c>>,
                 each: impl FnMut(usize, Outcome<f32>),
             ) -> bool {
                 let (criteria, model_index) = (&self.criteria, id.index());
                 let frame = &self.frames[model_index];
-                let Some(rules) = Rules::of(frame, criteria, is_pair) else { return false };
+                let Some(rules) = Rules::of(frame, criteria, is_pair, values) else { return false };
                 match id {
                     $(ModelId::$model => {
                         let model = &self.$file;

@@ -306,10 +306,16 @@ fn see<R: Real>(
 #[inline(always)]
 fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
     let (gap, closing) = (seen.view.gap, seen.view.closing());
-    Record {
-        ttc: criteria.ttc.update(record.ttc, seen.judged, gap, closing),
-        btn: criteria.btn.update(record.btn, seen.judged, gap, closing),
-        min_gap: if seen.judged { gap.smaller(record.min_gap) } else { record.min_gap },
+    let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing);
+    let btn = criteria.btn.update(record.btn, seen.judged, gap, closing);
+    if criteria.keeps_values {
+        let min_gap = if seen.judged { gap.smaller(record.min_gap) } else { record.min_gap };
+        Record { ttc, btn, min_gap }
+    } else {
+        // A compiler leaves the rest of the updates out.
+        let ttc = TtcMinimum { failed: ttc.failed, ..record.ttc };
+        let btn = BrakeThreatMaximum { failed: btn.failed, ..record.btn };
+        Record { ttc, btn, min_gap: record.min_gap }
     }
 }
 

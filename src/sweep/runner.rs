@@ -60,12 +60,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
 impl LaneRunner<'_, f32> {
     /// All lanes of some units of a block, in batches: position counted from the first unit on, outcome. In no
-    /// particular order.
+    /// particular order. Without `values` only the outcomes' verdicts mean something.
     pub fn run_units(
         &self,
         instructions: Instructions,
         block: usize,
         units: Range<u64>,
+        values: bool,
         mut each: impl FnMut(usize, Outcome<f32>),
     ) {
         let (variants, models) = (self.plan.blocks[block].variants.len(), self.plan.models.len());
@@ -82,7 +83,7 @@ impl LaneRunner<'_, f32> {
             let mut lanes = 0..;
             let next = || waiting(lanes.next()?);
             let constants = &self.constants[block];
-            if !constants.run_stream(model, instructions, is_pair, &self.tables, next, &mut each) {
+            if !constants.run_stream(model, instructions, is_pair, &self.tables, values, next, &mut each) {
                 for Waiting { case, start, at } in (0..).map_while(waiting) {
                     each(at, self.run_case(block, case, start, model));
                 }

@@ -126,6 +126,10 @@ macro_rules! for_rules {
             13 => $burst::<$model, 13>,
             14 => $burst::<$model, 14>,
             15 => $burst::<$model, 15>,
+            16 => $burst::<$model, 16>,
+            17 => $burst::<$model, 17>,
+            18 => $burst::<$model, 18>,
+            19 => $burst::<$model, 19>,
             Rules::SETS.. => return None,
         }
     };
