@@ -11,7 +11,7 @@ use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 use super::batch_arrays::{BURST, ConstantsOfLanes, LANES, PlacesOfLanes, StateOfLanes};
 use super::frame::{Frame, Simulation, Start};
 use super::lane_case::LaneCase;
-use super::lane_step::{LaneConstants, LaneState, Place, advance, conclude};
+use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance, conclude};
 use super::outcome::Outcome;
 
 /// What all lanes of a batch share and a loop need not ask: each set has its own loop.
@@ -199,7 +199,7 @@ fn admit<'c, M: DriverModel<f32>>(
             // Among pairs it runs with a second vehicle that is never present.
             constants.others[1].present_until = 0;
         }
-        let places = case.others.map(|other| Place::of(&other.motion, tables, 0));
+        let places = case.others.map(|other| Whereabouts::of(&other.motion, tables, 0));
         let start = LaneState::new(simulation, case, waiting.start);
         let moved = advance(simulation, is_pair, &constants, &start, &places);
         if moved.ended || moved.state.index >= simulation.frame.step_cap {

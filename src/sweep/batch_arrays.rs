@@ -4,7 +4,7 @@ use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::driver::DriverState;
 use crate::scenario::{Motion, Tables};
 
-use super::lane_step::{LaneConstants, LaneState, OtherConstants, Place, Record};
+use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record, Whereabouts};
 
 /// Lanes of a batch: one AVX-512 register of binary32.
 pub(super) const LANES: usize = 16;
@@ -169,8 +169,8 @@ impl PlacesOfLanes {
     };
 
     #[inline(always)]
-    pub(super) fn at(&self, row: usize, k: usize) -> [Place<f32>; 2] {
-        let place = |vehicle: usize| Place {
+    pub(super) fn at(&self, row: usize, k: usize) -> [Whereabouts<f32>; 2] {
+        let place = |vehicle: usize| Whereabouts {
             speed: self.speed[vehicle][row][k],
             position: self.position[vehicle][row][k],
             towards: self.towards[vehicle][row][k],
@@ -189,7 +189,7 @@ impl PlacesOfLanes {
         step: u32,
     ) {
         for ahead in row..BURST {
-            let place = Place::of(motion, tables, step + (ahead - row) as u32);
+            let place = Whereabouts::of(motion, tables, step + (ahead - row) as u32);
             self.speed[vehicle][ahead][k] = place.speed;
             self.position[vehicle][ahead][k] = place.position;
             self.towards[vehicle][ahead][k] = place.towards;

@@ -7,7 +7,7 @@ use crate::scalar::Real;
 use crate::scenario::Tables;
 
 use super::lane_case::LaneCase;
-use super::lane_step::{LaneConstants, LaneState, Place, advance, conclude};
+use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance, conclude};
 use super::outcome::Outcome;
 
 /// Constants of the frame at one time step.
@@ -134,8 +134,8 @@ pub fn run_lane<R: Real, M: DriverModel<R>>(
     let is_pair = case.pair != 0;
     let mut state = LaneState::new(simulation, case, start);
     loop {
-        let first = Place::of(&case.others[0].motion, tables, state.index);
-        let second = if is_pair { Place::of(&case.others[1].motion, tables, state.index) } else { first };
+        let first = Whereabouts::of(&case.others[0].motion, tables, state.index);
+        let second = if is_pair { Whereabouts::of(&case.others[1].motion, tables, state.index) } else { first };
         let places = [first, second];
         let index = state.index;
         let v_ego = state.v_ego;

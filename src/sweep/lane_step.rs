@@ -66,7 +66,7 @@ impl<R: Real> LaneConstants<R> {
 
 /// Where another vehicle is at one step.
 #[derive(Debug, Clone, Copy)]
-pub struct Place<R> {
+pub struct Whereabouts<R> {
     /// Speed, m/s.
     pub speed: R,
     /// Lateral position, m.
@@ -75,12 +75,12 @@ pub struct Place<R> {
     pub towards: R,
 }
 
-impl<R: Real> Place<R> {
+impl<R: Real> Whereabouts<R> {
     /// Decodes a motion at a step.
     #[inline(always)]
     pub fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
         let lateral = motion.lateral(tables, step);
-        Place { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
+        Whereabouts { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
     }
 }
 
@@ -155,7 +155,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     is_pair: bool,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Place<R>; 2],
+    places: &[Whereabouts<R>; 2],
 ) -> Moved<R> {
     let &Simulation { frame, criteria, model, .. } = simulation;
     let &LaneState { index, v_ego, .. } = state;
@@ -213,7 +213,7 @@ pub fn conclude<R: Real, M>(
     is_pair: bool,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Place<R>; 2],
+    places: &[Whereabouts<R>; 2],
 ) -> Outcome<R> {
     let &Simulation { frame, criteria, .. } = simulation;
     let index = state.index - 1;
@@ -273,7 +273,7 @@ struct Ego<R> {
 
 /// The gap at the step to come. Step 0 is the start itself, unless index 0 is one step after it.
 #[inline(always)]
-fn moved_gap<R: Real>(frame: &Frame<R>, state: &LaneState<R>, gap: R, place: &Place<R>) -> R {
+fn moved_gap<R: Real>(frame: &Frame<R>, state: &LaneState<R>, gap: R, place: &Whereabouts<R>) -> R {
     let moves = frame.start_shift || state.index > 0;
     if moves { gap + (place.speed - state.v_ego) * frame.dt } else { gap }
 }
@@ -283,7 +283,7 @@ fn see<R: Real>(
     criteria: &Criteria<R>,
     ego: &Ego<R>,
     other: &OtherConstants<R>,
-    place: &Place<R>,
+    place: &Whereabouts<R>,
     gap: R,
     index: u32,
 ) -> Seen<R> {
