@@ -13,6 +13,18 @@ use super::frame::{Frame, Simulation, Start};
 use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance, conclude};
 use super::outcome::Outcome;
+use super::simd::Instructions;
+
+/// What is known of a stream of lanes before it runs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stream {
+    /// Instructions that it is to run on.
+    pub instructions: Instructions,
+    /// Some case has a second vehicle.
+    pub is_pair: bool,
+    /// Continuous values are wanted, not verdicts alone.
+    pub values: bool,
+}
 
 /// What all lanes of a batch share and a loop need not ask: each set has its own loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +42,8 @@ impl Rules {
     pub(super) const SETS: u32 = 20;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
-    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, is_pair: bool, values: bool) -> Option<Rules> {
+    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, stream: Stream) -> Option<Rules> {
+        let Stream { is_pair, values, .. } = stream;
         let is_ratio = match criteria.btn.form() {
             BtnForm::EquivalentDelay => false,
             BtnForm::DistanceRatio => true,

@@ -6,11 +6,11 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::batch::{Rules, Waiting, run_stream};
+use super::batch::{Rules, Stream, Waiting, run_stream};
 use super::frame::{Frame, Observer, Simulation, Start, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
-use super::simd::{Instructions, burst_for};
+use super::simd::burst_for;
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
@@ -68,25 +68,23 @@ macro_rules! declare_constants {
         }
 
         impl Constants<f32> {
-            /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. `is_pair` where any has a
-            /// second vehicle. Gives `false`, and takes no lane, where lanes run one by one instead.
+            /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. Gives `false`, and takes no
+            /// lane, where lanes run one by one instead.
             pub(super) fn run_stream<'c>(
                 &self,
                 id: ModelId,
-                instructions: Instructions,
-                is_pair: bool,
+                stream: Stream,
                 tables: &Tables<f32>,
-                values: bool,
                 next: impl FnMut() -> Option<Waiting<'c>>,
                 each: impl FnMut(usize, Outcome<f32>),
             ) -> bool {
                 let (criteria, model_index) = (&self.criteria, id.index());
                 let frame = &self.frames[model_index];
-                let Some(rules) = Rules::of(frame, criteria, is_pair, values) else { return false };
+                let Some(rules) = Rules::of(frame, criteria, stream) else { return false };
                 match id {
                     $(ModelId::$model => {
                         let model = &self.$file;
-                        let Some(burst) = burst_for(instructions, rules) else { return false };
+                        let Some(burst) = burst_for(stream.instructions, rules) else { return false };
                         let simulation = Simulation { frame, criteria, model, model_index };
                         let steps = |batch: &mut _, row, until| burst.run(&simulation, batch, row, until);
                         run_stream(&simulation, tables, steps, next, each);

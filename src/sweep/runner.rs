@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::batch::Waiting;
+use super::batch::{Stream, Waiting};
 use super::drivers::Constants;
 use super::frame::{Silent, Start};
 use super::lane_case::LaneCase;
@@ -73,7 +73,7 @@ impl LaneRunner<'_, f32> {
         let keys = units.clone().flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
         let cases: Vec<LaneCase<f32>> =
             keys.map(|(unit, variant)| self.plan.case(block, unit, variant).cast()).collect();
-        let is_pair = cases.iter().any(|case| case.pair != 0);
+        let stream = Stream { instructions, is_pair: cases.iter().any(|case| case.pair != 0), values };
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let waiting = |lane: usize| {
                 let case = cases.get(lane / self.starts.len())?;
@@ -83,7 +83,7 @@ impl LaneRunner<'_, f32> {
             let mut lanes = 0..;
             let next = || waiting(lanes.next()?);
             let constants = &self.constants[block];
-            if !constants.run_stream(model, instructions, is_pair, &self.tables, values, next, &mut each) {
+            if !constants.run_stream(model, stream, &self.tables, next, &mut each) {
                 for Waiting { case, start, at } in (0..).map_while(waiting) {
                     each(at, self.run_case(block, case, start, model));
                 }
