@@ -10,10 +10,10 @@ use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::batch_arrays::{BURST, ConstantsOfLanes, LANES, PlacesOfLanes, StateOfLanes};
 use super::frame::{Frame, Simulation, Start};
+use super::instructions::Instructions;
 use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance, conclude};
 use super::outcome::Outcome;
-use super::simd::Instructions;
 
 /// What is known of a stream of lanes before it runs.
 #[derive(Debug, Clone, Copy)]

@@ -7,10 +7,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::backend::{Backend, CellCounts, Chunk, Session, Wanted};
+use super::instructions::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
 use super::runner::LaneRunner;
-use super::simd::Instructions;
 use crate::Result;
 use crate::scalar::Real;
 

@@ -7,7 +7,8 @@ use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
 use super::batch::{Rules, Stream, Waiting, run_stream};
-use super::frame::{Frame, Observer, Simulation, Start, run_lane};
+use super::frame::{Frame, Simulation, Start};
+use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::simd::burst_for;
@@ -92,11 +93,6 @@ macro_rules! declare_constants {
                 }
                 true
             }
-        }
-
-        /// First steps at which each driver model may react to the principal vehicle and to the one ahead.
-        pub(super) fn attend_from(profile: &Profile, principal: &driver::Attention) -> [[u32; 2]; driver::MODELS] {
-            [$(profile.$file.attend_from(principal)),+]
         }
     };
 }

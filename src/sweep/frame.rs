@@ -1,14 +1,9 @@
-//! The frame: one lane from start to end, step by step, with an observer.
+//! The frame around a lane's steps: time and end rules, the headway it starts from, and what all lanes of one
+//! model have in common.
 
 use crate::criterion::Criteria;
-use crate::driver::{DriverModel, Hazard, View};
 use crate::profile::FrameProfile;
 use crate::scalar::Real;
-use crate::scenario::Tables;
-
-use super::lane_case::LaneCase;
-use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance, conclude};
-use super::outcome::Outcome;
 
 /// Constants of the frame at one time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,52 +57,6 @@ pub enum Start<R> {
     Gap(R),
 }
 
-/// One other vehicle at one step.
-#[derive(Debug, Clone, Copy)]
-pub struct Seen<R> {
-    /// What the driver sees.
-    pub view: View<R>,
-    /// Lateral position, m.
-    pub lateral: R,
-    /// Present for the ego at this step.
-    pub present: bool,
-    /// TTC and BTN look at it.
-    pub judged: bool,
-}
-
-/// One step of a lane, for traces.
-#[derive(Debug, Clone, Copy)]
-pub struct Step<R> {
-    /// Index i.
-    pub index: u32,
-    /// Speed of the ego, m/s.
-    pub v_ego: R,
-    /// The other vehicles; the second only where the case has one.
-    pub seen: [Seen<R>; 2],
-    /// The result of the check that counts.
-    pub hazard: Hazard<R>,
-}
-
-/// Listens to the steps of a lane. Sweeps listen to nothing and pay nothing.
-pub trait Observer<R> {
-    /// Called once per evaluated step.
-    fn step(&mut self, step: &Step<R>);
-}
-
-/// Listens to nothing.
-pub struct Silent;
-
-impl<R> Observer<R> for Silent {
-    #[inline(always)]
-    fn step(&mut self, _: &Step<R>) {}
-}
-
-impl<R, F: FnMut(&Step<R>)> Observer<R> for F {
-    fn step(&mut self, step: &Step<R>) {
-        self(step);
-    }
-}
-
 /// What all lanes of one model have in common.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulation<'a, R, M> {
@@ -119,31 +68,4 @@ pub struct Simulation<'a, R, M> {
     pub model: &'a M,
     /// Its position in the registry: selects the attention windows.
     pub model_index: usize,
-}
-
-/// Runs one lane.
-#[inline(always)]
-pub fn run_lane<R: Real, M: DriverModel<R>>(
-    simulation: &Simulation<R, M>,
-    case: &LaneCase<R>,
-    tables: &Tables<R>,
-    start: Start<R>,
-    observer: &mut impl Observer<R>,
-) -> Outcome<R> {
-    let lane = LaneConstants::new(simulation, case);
-    let is_pair = case.pair != 0;
-    let mut state = LaneState::new(simulation, case, start);
-    loop {
-        let first = Whereabouts::of(&case.others[0].motion, tables, state.index);
-        let second = if is_pair { Whereabouts::of(&case.others[1].motion, tables, state.index) } else { first };
-        let places = [first, second];
-        let index = state.index;
-        let v_ego = state.v_ego;
-        let moved = advance(simulation, is_pair, &lane, &state, &places);
-        observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
-        state = moved.state;
-        if moved.ended || state.index >= simulation.frame.step_cap {
-            return conclude(simulation, is_pair, &lane, &state, &places);
-        }
-    }
 }

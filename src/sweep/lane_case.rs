@@ -2,12 +2,10 @@
 //! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
 
 pub use crate::driver::NEVER;
-use crate::driver::{Attention, MODELS};
+use crate::driver::{Attention, DriverProfile, MODELS};
 use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
-
-use super::drivers::attend_from;
 
 /// One other vehicle of a lane.
 #[repr(C)]
@@ -153,6 +151,17 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
         others[1].attend_from[model] = ahead;
     }
 }
+
+/// Makes [`attend_from`] from the registry of driver models.
+macro_rules! declare_attention {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// First steps at which each driver model may react to the principal vehicle and to the one ahead.
+        fn attend_from(profile: &Profile, principal: &Attention) -> [[u32; 2]; MODELS] {
+            [$(profile.$file.attend_from(principal)),+]
+        }
+    };
+}
+for_every_driver_model!(declare_attention);
 
 /// The JRC's cut-out: nothing before the exposure, then the vehicle ahead; a cutting-out vehicle that hits
 /// it freezes there and takes its place.

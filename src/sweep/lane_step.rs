@@ -11,7 +11,7 @@ use crate::driver::{DriverModel, DriverState, Hazard, View};
 use crate::scalar::Real;
 use crate::scenario::{Motion, Tables};
 
-use super::frame::{Frame, Seen, Simulation, Start};
+use super::frame::{Frame, Simulation, Start};
 use super::lane_case::{LaneCase, LaneOther};
 use super::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
@@ -82,6 +82,19 @@ impl<R: Real> Whereabouts<R> {
         let lateral = motion.lateral(tables, step);
         Whereabouts { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
     }
+}
+
+/// One other vehicle at one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<R> {
+    /// What the driver sees.
+    pub view: View<R>,
+    /// Lateral position, m.
+    pub lateral: R,
+    /// Present for the ego at this step.
+    pub present: bool,
+    /// TTC and BTN look at it.
+    pub judged: bool,
 }
 
 /// What the steps of a lane have gathered so far.

@@ -1,6 +1,6 @@
 //! The sweep: cases become lanes, lanes become outcomes.
 //!
-//! Here live the lane's record and its frame (the one time loop), the lane plan, the backends, outcomes
+//! Here live the lane's record, its step and the loops over it (one lane, batches of lanes), the lane plan, the backends, outcomes
 //! and partial results. Here lives no physics of a driver or a criterion, and nothing about scores. Cases
 //! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
 
@@ -10,6 +10,8 @@ mod batch_arrays;
 mod cpu;
 mod drivers;
 mod frame;
+mod instructions;
+mod lane;
 mod lane_case;
 mod lane_step;
 mod outcome;
@@ -24,8 +26,11 @@ mod study;
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
 pub use cpu::CpuBackend;
 pub use drivers::Constants;
-pub use frame::{Frame, Observer, Seen, Silent, Simulation, Start, Step, run_lane};
+pub use frame::{Frame, Simulation, Start};
+pub use instructions::Instructions;
+pub use lane::{Observer, Silent, Step, run_lane};
 pub use lane_case::{LaneCase, LaneOther};
+pub use lane_step::Seen;
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Confusion, Partial, UnitCounts, WORST_LANES, WorstLane};
 pub(crate) use plan::hex;
@@ -33,5 +38,4 @@ pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use run::{SweepOptions, SweepSummary, chunks, sweep};
 pub use runner::LaneRunner;
-pub use simd::Instructions;
 pub use study::{StudyOptions, StudyPlan, plan_study};

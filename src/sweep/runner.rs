@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use super::batch::{Stream, Waiting};
 use super::drivers::Constants;
-use super::frame::{Silent, Start};
+use super::frame::Start;
+use super::instructions::Instructions;
+use super::lane::Silent;
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::plan::{LaneKey, LanePlan};
-use super::simd::Instructions;
 use crate::driver::ModelId;
 use crate::scalar::Real;
 use crate::scenario::Tables;

@@ -6,6 +6,7 @@
 //! variant), so the key of a lane alone says how to make it again. Plans go to [`crate::sweep`].
 
 mod comparison;
+mod decision;
 mod draw;
 mod pool;
 mod random;
@@ -15,8 +16,9 @@ mod solve;
 mod thresholds;
 
 pub use comparison::{Comparison, DifferingLane, SelfCheck, Tally, WORDS, compare, self_check};
+pub use decision::Threshold;
 pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
-pub use thresholds::{SIDES, Threshold, ThresholdOptions, threshold_plan};
+pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
 
 use crate::scenario::Category;
 use crate::{Error, Place, Result};

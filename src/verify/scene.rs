@@ -1,10 +1,10 @@
 //! Scenes on a threshold: the numbers of a first step, solved in f32 so that both sides of one comparison are
 //! equal, and the lane records that begin with exactly these numbers.
 
+use super::decision::{HEADWAYS, Threshold};
 use super::draw::{Draw, Purpose};
 use super::series::{Across, Series, TINY, rounded};
 use super::solve::{hit, next_other, turn};
-use super::thresholds::{HEADWAYS, Threshold};
 use crate::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::driver::{DriverModel, MODELS, View};
 use crate::profile::Profile;
