@@ -91,3 +91,14 @@ fn a_variable_of_nvidia_is_judged_only_where_its_driver_is() {
         assert_eq!(visible_here().unwrap(), None);
     }
 }
+
+#[test]
+fn a_driver_that_misses_its_runtime_folder_does_not_look_like_a_failure_of_ours() {
+    let home = tempfile::tempdir().unwrap();
+    let mut command = devices(&home);
+    command.arg("--no-self-check").env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY").env_remove("NODEVICE_SELECT");
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.is_empty(), "{said}");
+}

@@ -6,6 +6,7 @@ mod case_flags;
 mod conformance;
 mod console;
 mod devices;
+mod environment;
 mod exit;
 mod mine;
 mod simulate;
@@ -104,6 +105,7 @@ const MOST_THREADS: usize = 4096;
 
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
+    environment::quiet_drivers();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

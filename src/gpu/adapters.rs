@@ -194,7 +194,8 @@ impl Adapters {
     /// OpenGL is asked only where no other interface answers: it shows the same devices again, without bus ids.
     ///
     /// Nothing is written to stdout. On stderr Mesa's device-select layer of Vulkan says twice that
-    /// `XDG_RUNTIME_DIR` is not set, where it is not and there is no display; `NODEVICE_SELECT=1` silences it.
+    /// `XDG_RUNTIME_DIR` is not set, where it is not and there is no display; `NODEVICE_SELECT=1`, which the program
+    /// sets for itself, silences it.
     pub fn enumerate() -> Adapters {
         let mut found = ask(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
         if found.is_empty() {
