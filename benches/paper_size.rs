@@ -9,11 +9,11 @@ mod common;
 use std::path::Path;
 use std::time::Instant;
 
-use common::{lane_steps, paper_size_scenarios};
+use common::{lane_steps, paper_size_scenarios, swept};
 use lanesweep::mining::{MiningOptions, mine_folder};
 use lanesweep::profile::Profile;
 use lanesweep::score::{ScoreOptions, score};
-use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, SweepOptions, Wanted, plan_study, sweep};
+use lanesweep::sweep::{CpuBackend, StudyOptions, plan_study};
 use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::trajectory::highd::{self, RecordingInfo};
 
@@ -34,11 +34,11 @@ fn main() {
     let narrow = CpuBackend::lane_arithmetic();
     let wide = CpuBackend::reference();
     let steps = lane_steps(&made, &narrow);
-    let partial = run(&made, &narrow);
+    let partial = swept(&made, &narrow);
     for repetition in 0..REPETITIONS {
         time("plan", repetition, made.lane_count(), "lanes", plan);
-        time("sweep f32", repetition, steps, "lane-steps", || run(&made, &narrow));
-        time("sweep f64", repetition, steps, "lane-steps", || run(&made, &wide));
+        time("sweep f32", repetition, steps, "lane-steps", || swept(&made, &narrow));
+        time("sweep f64", repetition, steps, "lane-steps", || swept(&made, &wide));
         time("score", repetition, 1000, "draws", || score(&made, &partial, &ScoreOptions::default()).unwrap());
     }
     let folder = tempfile::tempdir().unwrap();
@@ -61,16 +61,6 @@ fn time<T>(part: &str, repetition: usize, amount: u64, unit: &str, work: impl Fn
     println!("{part},{repetition},{seconds},{amount},{unit}");
     eprintln!("{part:>14} {seconds:8.3} s  {:9.2} M {unit}/s", amount as f64 / seconds / 1e6);
     result
-}
-
-fn run(plan: &LanePlan, backend: &dyn Backend) -> Partial {
-    let mut parts = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })
-    .unwrap();
-    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
 }
 
 /// Recordings of ever new seeds until there is a gigabyte of files.

@@ -9,14 +9,14 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 
-use common::paper_size_scenarios;
+use common::{paper_size_scenarios, swept};
 use lanesweep::driver::ModelId;
 use lanesweep::mining::{MiningOptions, mine, mine_folder, mine_generated};
 use lanesweep::parameterization::{ParameterizationOptions, Reduction};
 use lanesweep::profile::Profile;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::score::{ScoreOptions, score};
-use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, SweepOptions, Wanted, plan_study, sweep};
+use lanesweep::sweep::{CpuBackend, StudyOptions, plan_study};
 use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::trajectory::highd::{self, HighdFiles, RecordingInfo};
 
@@ -58,16 +58,6 @@ fn planning(criterion: &mut Criterion) {
     let options = StudyOptions::default();
     group.bench_function("plan", |b| b.iter(|| plan_study(black_box(&scenarios), &profile, &options).unwrap()));
     group.finish();
-}
-
-fn swept(plan: &LanePlan, backend: &dyn Backend) -> Partial {
-    let mut parts = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })
-    .unwrap();
-    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
 }
 
 /// Lanes of each category and model, and the scores of a study.

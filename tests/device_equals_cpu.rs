@@ -5,33 +5,15 @@
 mod common;
 
 use common::device::software_device;
-use lanesweep::criterion::{BtnContact, BtnForm, LateralGate};
+use common::lane_sets::{forms, random, small_study, thresholds};
 use lanesweep::gpu::{Checks, GpuBackend, GpuOptions};
-use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::profile::Profile;
-use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, StudyOptions, Wanted, plan_study, same_words};
-use lanesweep::trajectory::generator::GeneratorOptions;
-use lanesweep::verify::{
-    Comparison, RandomOptions, ThresholdOptions, compare, random_plan, self_check, threshold_plan,
-};
+use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, Wanted, same_words};
+use lanesweep::verify::{Comparison, compare, self_check};
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;
     Some(GpuBackend::open(&adapters, index, options).unwrap())
-}
-
-fn study_plan(recordings: usize) -> LanePlan {
-    let generator = GeneratorOptions { recordings, ..GeneratorOptions::default() };
-    let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
-    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan
-}
-
-fn random(profile: &Profile, lanes: u64) -> LanePlan {
-    random_plan(profile, &RandomOptions { lanes_per_model_and_category: lanes, ..Default::default() }).unwrap()
-}
-
-fn thresholds(profile: &Profile, units: u64) -> LanePlan {
-    threshold_plan(profile, &ThresholdOptions { units_per_threshold: units, ..Default::default() }).unwrap()
 }
 
 fn run(backend: &dyn Backend, plan: &LanePlan, wanted: Wanted) -> Chunk {
@@ -49,7 +31,7 @@ fn assert_equal(what: &str, comparison: &Comparison) {
 fn every_word_of_a_small_study_equals_the_cpus() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     assert!(gpu.is_exact());
-    let plan = study_plan(2);
+    let plan = small_study();
     let comparison = compare("study", &plan, &gpu, |_| ()).unwrap();
     assert_equal("study", &comparison);
     assert_eq!(comparison.lanes(), plan.lane_count());
@@ -68,24 +50,7 @@ fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
 #[test]
 fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
-    let paper = Profile::load("paper").unwrap();
-    let mut profiles = vec![paper.clone().with_dt(0.1).unwrap(), paper.clone().with_dt(0.01).unwrap()];
-    for btn in [BtnForm::EquivalentDelay, BtnForm::Exact, BtnForm::DistanceRatio] {
-        for (gate, btn_contact) in [(LateralGate::EgoWidth, BtnContact::Any), (LateralGate::Overlap, BtnContact::Gated)]
-        {
-            let mut profile = paper.clone();
-            profile.criteria.btn = btn;
-            profile.criteria.gate = gate;
-            profile.criteria.btn_contact = btn_contact;
-            profiles.push(profile);
-        }
-    }
-    let mut unsettled = paper.clone();
-    unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
-    unsettled.frame.start_shift = !paper.frame.start_shift;
-    unsettled.frame.time_cap_s = 8.0;
-    profiles.push(unsettled);
-    for profile in &profiles {
+    for profile in &forms() {
         let what = format!("{:?} {:?}", profile.criteria, profile.frame);
         for plan in [random(profile, 200), thresholds(profile, 1)] {
             let comparison = compare("form", &plan, &gpu, |_| ());

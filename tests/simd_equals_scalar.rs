@@ -1,36 +1,21 @@
 //! Lanes in batches give the same output words as lanes run one by one, bit for bit, on every instruction set of
 //! this machine, whatever the profile, the number of threads and the cut into calls.
 
-use lanesweep::criterion::{BtnContact, BtnForm, LateralGate};
+mod common;
+
+use common::lane_sets::{forms, random, small_study, thresholds};
 use lanesweep::driver::ModelId;
-use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::profile::Profile;
 use lanesweep::scenario::Category;
 use lanesweep::sweep::{
-    Backend, CpuBackend, Instructions, LanePlan, LaneRunner, Outcome, StudyOptions, Verdicts, Wanted, plan_study,
-    same_words,
+    Backend, CpuBackend, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
 };
-use lanesweep::trajectory::generator::GeneratorOptions;
-use lanesweep::verify::{Comparison, RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
+use lanesweep::verify::{Comparison, compare};
 
 /// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend<f32>> {
     let sets = Instructions::available().into_iter().filter(|set| *set != Instructions::Scalar);
     sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()
-}
-
-fn random(profile: &Profile, lanes: u64) -> LanePlan {
-    random_plan(profile, &RandomOptions { lanes_per_model_and_category: lanes, ..Default::default() }).unwrap()
-}
-
-fn thresholds(profile: &Profile, units: u64) -> LanePlan {
-    threshold_plan(profile, &ThresholdOptions { units_per_threshold: units, ..Default::default() }).unwrap()
-}
-
-fn small_study() -> LanePlan {
-    let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-    let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
-    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan
 }
 
 /// Outcomes, verdicts and counts of every instruction set against the scalar lanes.
@@ -40,33 +25,6 @@ fn assert_equal(what: &str, plan: &LanePlan) {
         let worst: Vec<String> = worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
         assert!(worst.is_empty() && *modes_differing == 0, "{what}, {}: {worst:#?}", backend.describe());
     }
-}
-
-/// Every form of every option that decides which loop a batch runs.
-fn forms() -> Vec<Profile> {
-    let paper = Profile::load("paper").unwrap();
-    let mut profiles = vec![paper.clone().with_dt(0.1).unwrap(), paper.clone().with_dt(0.01).unwrap()];
-    for btn in [BtnForm::EquivalentDelay, BtnForm::Exact, BtnForm::DistanceRatio] {
-        for gate in [LateralGate::EgoWidth, LateralGate::Overlap] {
-            for (btn_contact, aborts) in [(BtnContact::Any, false), (BtnContact::Gated, true)] {
-                let mut profile = paper.clone();
-                profile.criteria.btn = btn;
-                profile.criteria.gate = gate;
-                profile.criteria.btn_contact = btn_contact;
-                profile.cchdm.abort_on_large_ttc = aborts;
-                profiles.push(profile);
-            }
-        }
-    }
-    let mut unsettled = paper.clone();
-    unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
-    unsettled.frame.start_shift = !paper.frame.start_shift;
-    unsettled.frame.time_cap_s = 8.0;
-    profiles.push(unsettled);
-    let mut shortest = paper.clone();
-    shortest.frame.time_cap_s = 2.0 * paper.frame.dt_s;
-    profiles.push(shortest);
-    profiles
 }
 
 #[test]

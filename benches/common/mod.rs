@@ -1,8 +1,10 @@
 //! What benchmarks share: a study of the paper's size on synthetic data.
 
+#![allow(dead_code)] // every benchmark uses its own part
+
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{Backend, LanePlan, SweepOptions, Wanted, sweep};
+use lanesweep::sweep::{Backend, LanePlan, Partial, SweepOptions, Wanted, sweep};
 use lanesweep::trajectory::generator::GeneratorOptions;
 
 /// The paper's kept scenarios.
@@ -32,4 +34,15 @@ pub fn lane_steps(plan: &LanePlan, backend: &dyn Backend) -> u64 {
     })
     .unwrap();
     steps
+}
+
+/// The partial of a whole plan, from verdicts alone.
+pub fn swept(plan: &LanePlan, backend: &dyn Backend) -> Partial {
+    let mut parts = Vec::new();
+    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
+        parts.push(Partial::from_chunk(plan, &chunk)?);
+        Ok(())
+    })
+    .unwrap();
+    parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
 }

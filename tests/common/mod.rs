@@ -5,6 +5,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+pub mod device;
+pub mod lane_sets;
 pub mod small;
 
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
@@ -73,4 +75,3 @@ fn folder_with_tracks(folder: &std::path::Path) -> Option<PathBuf> {
     let below = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
     below.filter(|path| path.is_dir()).find_map(|path| folder_with_tracks(&path))
 }
-pub mod device;

@@ -1,0 +1,53 @@
+//! Lanes to compare backends with: profiles in which every option takes every form, and plans.
+#![allow(dead_code)] // every test binary uses its own part
+
+use lanesweep::criterion::{BtnContact, BtnForm, LateralGate};
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::profile::Profile;
+use lanesweep::sweep::{LanePlan, StudyOptions, plan_study};
+use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+
+/// Every form of every option that decides how a lane runs, and other time steps and caps.
+pub fn forms() -> Vec<Profile> {
+    let paper = Profile::load("paper").unwrap();
+    let mut profiles = vec![paper.clone().with_dt(0.1).unwrap(), paper.clone().with_dt(0.01).unwrap()];
+    for btn in [BtnForm::EquivalentDelay, BtnForm::Exact, BtnForm::DistanceRatio] {
+        for gate in [LateralGate::EgoWidth, LateralGate::Overlap] {
+            for (btn_contact, aborts) in [(BtnContact::Any, false), (BtnContact::Gated, true)] {
+                let mut profile = paper.clone();
+                profile.criteria.btn = btn;
+                profile.criteria.gate = gate;
+                profile.criteria.btn_contact = btn_contact;
+                profile.cchdm.abort_on_large_ttc = aborts;
+                profiles.push(profile);
+            }
+        }
+    }
+    let mut unsettled = paper.clone();
+    unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
+    unsettled.frame.start_shift = !paper.frame.start_shift;
+    unsettled.frame.time_cap_s = 8.0;
+    profiles.push(unsettled);
+    let mut shortest = paper.clone();
+    shortest.frame.time_cap_s = 2.0 * paper.frame.dt_s;
+    profiles.push(shortest);
+    profiles
+}
+
+/// Random lanes of each model and category.
+pub fn random(profile: &Profile, lanes: u64) -> LanePlan {
+    random_plan(profile, &RandomOptions { lanes_per_model_and_category: lanes, ..Default::default() }).unwrap()
+}
+
+/// Lanes on thresholds: so many units of each threshold and category.
+pub fn thresholds(profile: &Profile, units: u64) -> LanePlan {
+    threshold_plan(profile, &ThresholdOptions { units_per_threshold: units, ..Default::default() }).unwrap()
+}
+
+/// A study of two synthetic recordings.
+pub fn small_study() -> LanePlan {
+    let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
+    let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan
+}
