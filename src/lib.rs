@@ -9,6 +9,7 @@ mod atomic_file;
 pub mod cli;
 pub mod conformance;
 pub mod criterion;
+pub mod density;
 #[macro_use]
 pub mod driver;
 pub mod error;
@@ -16,6 +17,7 @@ pub mod gpu;
 pub mod mining;
 pub mod parameterization;
 pub mod profile;
+pub mod random;
 pub mod report;
 pub mod scalar;
 pub mod scenario;
