@@ -36,6 +36,8 @@ pub trait Real:
     fn from_step(step: u32) -> Self;
     /// Correctly rounded quotient: the only division of the lane arithmetic.
     fn exact_div(self, divisor: Self) -> Self;
+    /// Whole steps below a number in [0, 2²⁴): exact.
+    fn floor_to_step(self) -> u32;
 
     /// Magnitude.
     #[inline(always)]
@@ -78,6 +80,10 @@ macro_rules! real_float {
             #[inline(always)]
             fn exact_div(self, divisor: Self) -> Self {
                 self / divisor
+            }
+            #[inline(always)]
+            fn floor_to_step(self) -> u32 {
+                self as u32
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -204,6 +210,9 @@ impl Real for Counting {
     fn exact_div(self, divisor: Self) -> Self {
         count(Operation::Division);
         Counting(self.0 / divisor.0)
+    }
+    fn floor_to_step(self) -> u32 {
+        self.0 as u32
     }
 }
 

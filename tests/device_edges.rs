@@ -49,7 +49,7 @@ impl CaseSource for Borrowed {
 fn borrowed(from: LanePlan, models: &[ModelId], headways: &[Headway], parts: &[(usize, u64, u64, usize)]) -> LanePlan {
     let block = |&(at, first, units, variants): &(usize, u64, u64, usize)| Block {
         category: from.blocks[at].category,
-        units: (first..first + units).map(|u| from.blocks[at].units[u as usize].clone()).collect(),
+        units: (first..first + units).map(|u| from.blocks[at].units.name(u).into_owned()).collect(),
         variants: from.blocks[at].variants[..variants].to_vec(),
         first_unit: 0,
         first_lane: 0,

@@ -33,7 +33,7 @@ fn outcomes(plan: &LanePlan, units: Range<u64>) -> Vec<Outcome<f64>> {
 /// All (block, unit, variant) of a plan.
 fn cases(plan: &LanePlan) -> impl Iterator<Item = (usize, u64, usize)> + '_ {
     plan.blocks.iter().enumerate().flat_map(|(at, block)| {
-        (0..block.units.len() as u64).flat_map(move |unit| (0..block.variants.len()).map(move |v| (at, unit, v)))
+        (0..block.units.len()).flat_map(move |unit| (0..block.variants.len()).map(move |v| (at, unit, v)))
     })
 }
 
@@ -61,12 +61,12 @@ fn a_unit_is_the_same_whatever_the_size_and_the_categories_asked_for() {
     ] {
         assert!(few.unit_count() < many.unit_count());
         for (block, unit, variant) in cases(&few) {
-            assert_eq!(few.blocks[block].units[unit as usize], many.blocks[block].units[unit as usize]);
+            assert_eq!(few.blocks[block].units.name(unit), many.blocks[block].units.name(unit));
             assert_eq!(few.case(block, unit, variant), many.case(block, unit, variant));
         }
         let of_lvd = few.blocks.iter().position(|b| b.category == Category::Lvd).unwrap();
         for (_, unit, variant) in cases(&lvd) {
-            assert_eq!(lvd.blocks[0].units[unit as usize], few.blocks[of_lvd].units[unit as usize]);
+            assert_eq!(lvd.blocks[0].units.name(unit), few.blocks[of_lvd].units.name(unit));
             // Freezing pairs stand behind the series of all cut-outs; nothing before them moves.
             assert_eq!(lvd.case(0, unit, variant), few.case(of_lvd, unit, variant));
         }
@@ -79,7 +79,7 @@ fn another_seed_gives_other_lanes() {
         [(random("paper", 1, 400), random("paper", 2, 400)), (thresholds("paper", 1, 2), thresholds("paper", 2, 2))]
     {
         assert_ne!(one.hash(), other.hash());
-        assert_ne!(one.blocks[0].units[0], other.blocks[0].units[0]);
+        assert_ne!(one.blocks[0].units.name(0), other.blocks[0].units.name(0));
         let same = cases(&one).filter(|&(b, u, v)| one.case(b, u, v) == other.case(b, u, v)).count();
         assert_eq!(same, 0);
     }
@@ -95,7 +95,7 @@ fn no_two_random_cases_are_equal() {
 #[test]
 fn the_key_of_a_random_lane_says_how_to_make_it_again() {
     let plan = random("paper", 42, 400);
-    let key = &plan.blocks[1].units[9];
+    let key = plan.blocks[1].units.name(9);
     let unit = RandomUnit::parse(key).unwrap();
     assert_eq!(unit, RandomUnit { category: Category::CutOut, seed: 42, unit: 9 });
     assert_eq!(&unit.to_string(), key);
@@ -156,7 +156,7 @@ fn assert_sound(case: &LaneCase<f64>, speeds: usize, laterals: usize) {
 fn both_sets_hold_every_kind_of_motion_alone_and_in_pairs_in_each_category() {
     for plan in [random("paper", 157, 4000), random("jrc-2021", 157, 4000), thresholds("paper", 157, 12)] {
         for (at, block) in plan.blocks.iter().enumerate() {
-            let seen: HashSet<(u32, u32)> = (0..block.units.len() as u64)
+            let seen: HashSet<(u32, u32)> = (0..block.units.len())
                 .flat_map(|unit| (0..block.variants.len()).map(move |variant| (unit, variant)))
                 .map(|(unit, variant)| plan.case(at, unit, variant))
                 .map(|case| (case.others[0].motion.kind, case.pair))
@@ -319,7 +319,7 @@ const UNITS: u64 = 24;
 
 /// Units of a threshold in a block.
 fn units_of(plan: &LanePlan, block: usize, threshold: Threshold) -> impl Iterator<Item = u64> {
-    (0..plan.blocks[block].units.len() as u64).filter(move |&unit| Threshold::of_unit(unit) == threshold)
+    (0..plan.blocks[block].units.len()).filter(move |&unit| Threshold::of_unit(unit) == threshold)
 }
 
 #[test]

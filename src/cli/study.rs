@@ -284,7 +284,7 @@ fn category_records(
             found: of.found,
             kept: of.kept,
             variants: block.variants.clone(),
-            lanes: plan.lanes_per_unit(block) * block.units.len() as u64,
+            lanes: plan.lanes_per_unit(block) * block.units.len(),
             capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
             undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
             undefined_draws: cells().map(|c| u64::from(c.undefined_draws)).sum(),

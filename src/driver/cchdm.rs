@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Attention, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps, latched_braking,
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps, latched_braking,
 };
 use crate::scalar::Real;
 use crate::scenario::Category;
@@ -85,16 +85,16 @@ impl DriverProfile for CchdmProfile {
         ]
     }
 
-    fn attend_from(&self, principal: &Attention) -> [u32; 2] {
-        let from = match principal.category {
-            Category::Lvd => principal.after_deceleration(self.lead_deceleration_trigger_mps2),
-            Category::CutIn | Category::CutOut => principal.after_wandering(Perception {
-                wandering_m: self.wandering_m,
-                time_s: self.perception_time_s,
-                travel_m: self.perception_travel_m,
-            }),
+    fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
+        let perception = Perception {
+            wandering_m: self.wandering_m,
+            time_s: self.perception_time_s,
+            travel_m: self.perception_travel_m,
         };
-        [from; 2]
+        match category {
+            Category::Lvd => AttentionRule::after_deceleration(self.lead_deceleration_trigger_mps2, dt_s),
+            Category::CutIn | Category::CutOut => AttentionRule::after_wandering(perception, dt_s),
+        }
     }
 
     fn abort_above_ttc_s(&self) -> f64 {

@@ -1,6 +1,6 @@
 //! What every driver model's constants in a profile can do.
 
-use super::{Attention, DriverModel};
+use super::{AttentionRule, DriverModel};
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -44,10 +44,9 @@ pub trait DriverProfile {
     /// Constants with a range: key, value, range.
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)>;
 
-    /// First step at which the driver may react to the principal vehicle and to the one ahead of it, as far
-    /// as that depends on the principal vehicle's motion alone.
-    fn attend_from(&self, _principal: &Attention) -> [u32; 2] {
-        [0; 2]
+    /// What has to be seen of the principal vehicle before the driver may react; worked out in f64.
+    fn attention(&self, _dt_s: f64, _category: Category) -> AttentionRule<f64> {
+        AttentionRule::always()
     }
 
     /// A run is aborted at lateral overlap with |TTC| above this, s; 0 never aborts.

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Attention, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -67,8 +67,8 @@ impl DriverProfile for Reg157Profile {
         ]
     }
 
-    fn attend_from(&self, principal: &Attention) -> [u32; 2] {
-        [principal.after_visible_movement(self.visible_lateral_movement_s, self.lateral_gate_m), 0]
+    fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
+        AttentionRule::after_visible_movement(self.visible_lateral_movement_s, self.lateral_gate_m, dt_s, category)
     }
 }
 

@@ -84,7 +84,7 @@ impl<'p> GpuSession<'p> {
         let mut cases = None;
         if !inside {
             let room = self.prepared.most_cases / variants;
-            let end = (units.start + room).min(plan.blocks[block].units.len() as u64);
+            let end = (units.start + room).min(plan.blocks[block].units.len());
             let upload = cases_of(plan, block, units.start..end);
             let paired = plan.blocks[block].category == Category::CutOut || upload.iter().any(|c| c.pair != 0);
             self.window = Some((block, units.start..end, paired));

@@ -67,7 +67,7 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: 
         writeln!(
             out,
             "{},{},{},{thw},{},{},{},{},{},{},{},{},{},{impact},{},{}",
-            quoted(&block.units[key.unit as usize]),
+            quoted(&block.units.name(key.unit)),
             block.category.key(),
             block.variants[key.variant],
             plan.models[key.model].name(),

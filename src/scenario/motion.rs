@@ -51,12 +51,18 @@ pub enum Lateral {
 }
 
 /// Series that many lanes share.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Tables<R> {
     /// Speeds, m/s, one per step.
     pub speed: Vec<R>,
     /// Lateral position, m, and speed towards the ego, m/s, one pair per step.
     pub lateral: Vec<[R; 2]>,
+}
+
+impl<R> Default for Tables<R> {
+    fn default() -> Self {
+        Tables { speed: Vec::new(), lateral: Vec::new() }
+    }
 }
 
 impl Tables<f64> {
@@ -152,10 +158,10 @@ impl<R: Real> Motion<R> {
     }
 }
 
-impl Motion<f64> {
-    /// Encodes a described motion at time step `dt_s`; sampled series go to the end of `tables`.
-    pub fn encode(speed: &Speed, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) -> Self {
-        let mut motion = Motion {
+impl<R: Real> Motion<R> {
+    /// At rest in the middle of the ego's lane.
+    pub fn resting() -> Self {
+        Motion {
             kind: 0,
             speed_offset: 0,
             speed_len: 0,
@@ -163,15 +169,22 @@ impl Motion<f64> {
             lateral_len: 0,
             speed_until: 0,
             lateral_until: 0,
-            speed_initial: 0.0,
-            speed_per_step: 0.0,
-            speed_end: 0.0,
-            lateral_initial: 0.0,
-            lateral_per_step: 0.0,
-            lateral_end: 0.0,
-            lateral_towards: 0.0,
+            speed_initial: R::ZERO,
+            speed_per_step: R::ZERO,
+            speed_end: R::ZERO,
+            lateral_initial: R::ZERO,
+            lateral_per_step: R::ZERO,
+            lateral_end: R::ZERO,
+            lateral_towards: R::ZERO,
             reserved: [0; 2],
-        };
+        }
+    }
+}
+
+impl Motion<f64> {
+    /// Encodes a described motion at time step `dt_s`; sampled series go to the end of `tables`.
+    pub fn encode(speed: &Speed, lateral: &Lateral, dt_s: f64, tables: &mut Tables<f64>) -> Self {
+        let mut motion = Motion::resting();
         match speed {
             Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
                 motion.speed_initial = initial_mps.max(0.0);

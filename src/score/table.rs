@@ -100,7 +100,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
     let mut categories = Vec::new();
     for block in &plan.blocks {
         let first = block.first_unit as usize;
-        let units: &[UnitCounts] = &partial.units()[first..first + block.units.len()];
+        let units: &[UnitCounts] = &partial.units()[first..first + block.units.len() as usize];
         let width = block.variants.len() * plan.models.len() * criteria;
         let mut totals = vec![Confusion::default(); width];
         let mut capped = vec![0_u64; block.variants.len() * plan.models.len()];
@@ -124,8 +124,8 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
             .collect();
         categories.push(CategoryScores {
             category: block.category,
-            scenarios: block.units.len() as u64,
-            simulations: (block.units.len() * plan.headways.len()) as u64,
+            scenarios: block.units.len(),
+            simulations: block.units.len() * plan.headways.len() as u64,
             variants: block.variants.clone(),
             models: plan.models.clone(),
             cells,

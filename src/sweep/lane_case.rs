@@ -2,7 +2,7 @@
 //! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
 
 pub use crate::driver::NEVER;
-use crate::driver::{Attention, DriverProfile, MODELS};
+use crate::driver::{AttentionRule, DriverProfile, MODELS};
 use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
@@ -139,25 +139,23 @@ impl Series {
 
 /// Perception rules: when each model may react.
 fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
-    let attention = Attention {
-        category: case.category,
-        dt_s: profile.frame.dt_s,
-        lateral_m: &series.lateral_m,
-        speed_mps: &series.speed_mps,
-        half_widths_m: others[0].half_widths,
-    };
-    for (model, [principal, ahead]) in attend_from(profile, &attention).into_iter().enumerate() {
+    let half_widths = others[0].half_widths;
+    let steps = series.lateral_m.len() as u32;
+    let lateral = |step: u32| series.lateral_m[step as usize];
+    let speed = |step: u32| series.speed_mps[step as usize];
+    for (model, rule) in attention_rules(profile, case.category).into_iter().enumerate() {
+        let [principal, ahead] = rule.attend_from(steps, half_widths, lateral, speed);
         others[0].attend_from[model] = principal;
         others[1].attend_from[model] = ahead;
     }
 }
 
-/// Makes [`attend_from`] from the registry of driver models.
+/// Makes [`attention_rules`] from the registry of driver models.
 macro_rules! declare_attention {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
-        /// First steps at which each driver model may react to the principal vehicle and to the one ahead.
-        fn attend_from(profile: &Profile, principal: &Attention) -> [[u32; 2]; MODELS] {
-            [$(profile.$file.attend_from(principal)),+]
+        /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::driver::ModelId::ALL).
+        pub(super) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
+            [$(profile.$file.attention(profile.frame.dt_s, category)),+]
         }
     };
 }

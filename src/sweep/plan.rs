@@ -14,7 +14,9 @@ use crate::scenario::{Category, Tables};
 use crate::sweep::frame::Start;
 use crate::{Error, Place, Result};
 
+use super::generated::Generator;
 use super::lane_case::LaneCase;
+use super::units::Units;
 
 /// Headway of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -57,6 +59,11 @@ pub trait CaseSource: Send + Sync {
     fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64>;
     /// The series that motions point into.
     fn tables(&self) -> &Tables<f64>;
+    /// Makes the cases where the lanes run, where that is so: then unit `i` is sample `i` of the first variant, and
+    /// [`CaseSource::case`] and [`CaseSource::tables`] are not asked.
+    fn generator(&self) -> Option<&Generator> {
+        None
+    }
 }
 
 /// One category's part of the plan.
@@ -64,8 +71,8 @@ pub trait CaseSource: Send + Sync {
 pub struct Block {
     /// Kind of scenario.
     pub category: Category,
-    /// Keys of the units (scenarios), in order.
-    pub units: Vec<String>,
+    /// The units (scenarios or samples), in order.
+    pub units: Units,
     /// Names of the variants; the first is `S`.
     pub variants: Vec<String>,
     /// Number of units before this block.
@@ -116,12 +123,17 @@ impl LanePlan {
         if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
             return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
         }
-        let (mut unit, mut lane) = (0, 0);
+        let (mut unit, mut lane) = (0_u64, 0_u64);
         for block in &mut blocks {
             block.first_unit = unit;
             block.first_lane = lane;
-            unit += block.units.len() as u64;
-            lane += (block.units.len() * block.variants.len() * headways.len() * models.len()) as u64;
+            unit += block.units.len();
+            let per_unit = (block.variants.len() * headways.len() * models.len()) as u64;
+            let lanes = block.units.len().checked_mul(per_unit).and_then(|lanes| lane.checked_add(lanes));
+            lane = lanes.filter(|&lanes| lanes < 1 << 63).ok_or_else(|| {
+                let problem = format!("{} units of {per_unit} lanes are more than can be counted", block.units.len());
+                Error::usage(Place::default(), problem, "sweep fewer at once: 2^63 lanes at most")
+            })?;
         }
         let mut plan = LanePlan { profile, models, headways, blocks, source, hash: String::new() };
         plan.hash = plan.content_hash();
@@ -138,6 +150,11 @@ impl LanePlan {
         self.source.tables()
     }
 
+    /// What makes the cases where the lanes run, in place of [`LanePlan::case`] and [`LanePlan::tables`].
+    pub fn generator(&self) -> Option<&Generator> {
+        self.source.generator()
+    }
+
     /// SHA-256 over everything that decides the outcomes, in hexadecimal.
     pub fn hash(&self) -> &str {
         &self.hash
@@ -145,12 +162,12 @@ impl LanePlan {
 
     /// Number of units of all blocks.
     pub fn unit_count(&self) -> u64 {
-        self.blocks.last().map_or(0, |b| b.first_unit + b.units.len() as u64)
+        self.blocks.last().map_or(0, |b| b.first_unit + b.units.len())
     }
 
     /// Number of lanes of all blocks.
     pub fn lane_count(&self) -> u64 {
-        self.blocks.last().map_or(0, |b| b.first_lane + b.units.len() as u64 * self.lanes_per_unit(b))
+        self.blocks.last().map_or(0, |b| b.first_lane + b.units.len() * self.lanes_per_unit(b))
     }
 
     /// Lanes of one unit of a block.
@@ -172,14 +189,14 @@ impl LanePlan {
     /// Index of the first lane of a unit (counted over all blocks), or the number of lanes at the end.
     pub fn first_lane_of(&self, unit: u64) -> u64 {
         let found = self.blocks.iter().rev().find(|b| b.first_unit <= unit && !b.units.is_empty());
-        found.map_or(0, |b| b.first_lane + (unit - b.first_unit).min(b.units.len() as u64) * self.lanes_per_unit(b))
+        found.map_or(0, |b| b.first_lane + (unit - b.first_unit).min(b.units.len()) * self.lanes_per_unit(b))
     }
 
     /// Splits an interval of units (over all blocks) at the blocks' borders: (block, units within it).
     pub fn segments(&self, units: Range<u64>) -> Vec<(usize, Range<u64>)> {
         let mut segments = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
-            let end = block.first_unit + block.units.len() as u64;
+            let end = block.first_unit + block.units.len();
             let (from, to) = (units.start.max(block.first_unit), units.end.min(end));
             if from < to {
                 segments.push((index, from - block.first_unit..to - block.first_unit));
@@ -219,7 +236,7 @@ impl LanePlan {
         let block = &self.blocks[key.block];
         format!(
             "{}/{}/{}/{}",
-            block.units[key.unit as usize],
+            block.units.name(key.unit),
             block.variants[key.variant],
             self.headways[key.headway],
             self.models[key.model].name()
@@ -234,7 +251,7 @@ impl LanePlan {
         let model = self.models.iter().position(|m| *m == model)?;
         let headway = self.headways.iter().position(|h| h.to_string() == headway)?;
         self.blocks.iter().enumerate().find_map(|(at, block)| {
-            let unit = block.units.iter().position(|u| u == unit)? as u64;
+            let unit = block.units.find(unit)?;
             let variant = block.variants.iter().position(|v| v == variant)?;
             Some(LaneKey { block: at, unit, variant, headway, model })
         })
@@ -254,12 +271,16 @@ impl LanePlan {
         for block in &self.blocks {
             text(&format!("{block:?}"));
         }
+        if let Some(generator) = self.generator() {
+            text(&format!("{generator:?}"));
+            return hex(&digest.finalize());
+        }
         let tables = self.tables();
         for value in tables.speed.iter().chain(tables.lateral.iter().flatten()) {
             digest.update(value.to_bits().to_le_bytes());
         }
         for (at, block) in self.blocks.iter().enumerate() {
-            for unit in 0..block.units.len() as u64 {
+            for unit in 0..block.units.len() {
                 for variant in 0..block.variants.len() {
                     digest.update(format!("{:?}", self.case(at, unit, variant)).as_bytes());
                 }

@@ -1,5 +1,6 @@
 //! Single lanes on the CPU: what the CPU backend is made of, and what any other backend is checked with.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::batch::{Stream, Waiting};
@@ -28,7 +29,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     pub fn new(plan: &'p LanePlan) -> Self {
         LaneRunner {
             plan,
-            tables: plan.tables().cast(),
+            tables: if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() },
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
         }
@@ -36,26 +37,45 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
     /// One lane.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
-        let case = self.plan.case(key.block, key.unit, key.variant).cast();
-        self.run_case(key.block, &case, self.starts[key.headway], self.plan.models[key.model])
+        let (case, tables) = self.case(key.block, key.unit, key.variant);
+        self.run_case(key.block, &case, &tables, self.starts[key.headway], self.plan.models[key.model])
+    }
+
+    /// A case and the tables that it points into.
+    fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+        match self.plan.generator() {
+            Some(generator) => {
+                let mut tables = Tables::default();
+                let case = generator.case(unit, &mut tables);
+                (case, Cow::Owned(tables))
+            }
+            None => (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables)),
+        }
     }
 
     /// All lanes of one unit, in the plan's order: position within the unit, outcome.
     pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
-            let case = self.plan.case(block, unit, variant).cast();
+            let (case, tables) = self.case(block, unit, variant);
             for &start in &self.starts {
                 for &model in &self.plan.models {
-                    each(at, self.run_case(block, &case, start, model));
+                    each(at, self.run_case(block, &case, &tables, start, model));
                     at += 1;
                 }
             }
         }
     }
 
-    fn run_case(&self, block: usize, case: &LaneCase<R>, start: Start<R>, model: ModelId) -> Outcome<R> {
-        self.constants[block].run(model, case, &self.tables, start, &mut Silent)
+    fn run_case(
+        &self,
+        block: usize,
+        case: &LaneCase<R>,
+        tables: &Tables<R>,
+        start: Start<R>,
+        model: ModelId,
+    ) -> Outcome<R> {
+        self.constants[block].run(model, case, tables, start, &mut Silent)
     }
 }
 
@@ -71,9 +91,15 @@ impl LaneRunner<'_, f32> {
         mut each: impl FnMut(usize, Outcome<f32>),
     ) {
         let (variants, models) = (self.plan.blocks[block].variants.len(), self.plan.models.len());
-        let keys = units.clone().flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
-        let cases: Vec<LaneCase<f32>> =
-            keys.map(|(unit, variant)| self.plan.case(block, unit, variant).cast()).collect();
+        let mut made = Tables::default();
+        let (cases, tables): (Vec<LaneCase<f32>>, _) = match self.plan.generator() {
+            Some(generator) => (units.map(|unit| generator.case(unit, &mut made)).collect(), &made),
+            None => {
+                let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
+                let cases = keys.map(|(unit, variant)| self.plan.case(block, unit, variant).cast()).collect();
+                (cases, &self.tables)
+            }
+        };
         let stream = Stream { instructions, is_pair: cases.iter().any(|case| case.pair != 0), values };
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let waiting = |lane: usize| {
@@ -84,9 +110,9 @@ impl LaneRunner<'_, f32> {
             let mut lanes = 0..;
             let next = || waiting(lanes.next()?);
             let constants = &self.constants[block];
-            if !constants.run_stream(model, stream, &self.tables, next, &mut each) {
+            if !constants.run_stream(model, stream, tables, next, &mut each) {
                 for Waiting { case, start, at } in (0..).map_while(waiting) {
-                    each(at, self.run_case(block, case, start, model));
+                    each(at, self.run_case(block, case, tables, start, model));
                 }
             }
         }

@@ -1,0 +1,65 @@
+//! The units of a block: named scenarios, or samples that are told apart by their index alone.
+
+use std::borrow::Cow;
+
+/// Units of one block, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Units {
+    /// Scenarios by their keys.
+    Named(Vec<String>),
+    /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ of them keeps no names.
+    Numbered(u64),
+}
+
+impl Units {
+    /// How many.
+    pub fn len(&self) -> u64 {
+        match self {
+            Units::Named(names) => names.len() as u64,
+            Units::Numbered(count) => *count,
+        }
+    }
+
+    /// None at all?
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Name of a unit below [`Units::len`].
+    pub fn name(&self, unit: u64) -> Cow<'_, str> {
+        match self {
+            Units::Named(names) => Cow::Borrowed(&names[unit as usize]),
+            Units::Numbered(_) => Cow::Owned(format!("#{unit}")),
+        }
+    }
+
+    /// The unit that a name stands for.
+    pub fn find(&self, name: &str) -> Option<u64> {
+        match self {
+            Units::Named(names) => names.iter().position(|n| n == name).map(|at| at as u64),
+            Units::Numbered(count) => name.strip_prefix('#')?.parse().ok().filter(|unit| unit < count),
+        }
+    }
+}
+
+impl FromIterator<String> for Units {
+    fn from_iter<I: IntoIterator<Item = String>>(names: I) -> Self {
+        Units::Named(names.into_iter().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Units;
+
+    #[test]
+    fn names_lead_back_to_their_units() {
+        let named: Units = ["a".to_owned(), "b".to_owned()].into_iter().collect();
+        let numbered = Units::Numbered(10_000_000_000);
+        for (units, unit) in [(&named, 1), (&numbered, 9_999_999_999)] {
+            assert_eq!(units.find(&units.name(unit)), Some(unit));
+        }
+        assert_eq!(numbered.find("#10000000000"), None);
+        assert_eq!(named.find("#1"), None);
+    }
+}
