@@ -83,7 +83,7 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
             for paired in [false, true] {
                 let constants = shader::constants(&constants, model, paired);
                 let sizes = [Checks::Checked, Checks::Unchecked].map(|checks| {
-                    let words = exact_spirv(&source, &constants, checks);
+                    let words = exact_spirv(&source, shader::ENTRY, &constants, checks);
                     words.unwrap_or_else(|e| panic!("{model:?}, {place}, paired {paired}, {checks:?}: {e}")).len()
                 });
                 assert!(sizes[0] > sizes[1], "{model:?}, {place}: the checks add nothing");

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::adapters::AdapterCard;
-use super::shader::{self, ENTRY, WORKGROUP};
+use super::shader::{self, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::{Checks, exact_spirv};
 use crate::driver::ModelId;
 use crate::{Error, Result};
@@ -78,8 +78,11 @@ pub(super) struct Device {
     pub timestamps: bool,
     pub layout: wgpu::BindGroupLayout,
     pub options: GpuOptions,
+    /// Bindings of the generator.
+    pub generator_layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
     pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
+    generator: Option<wgpu::ComputePipeline>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -119,6 +122,10 @@ impl Device {
         device.set_device_lost_callback(move |reason, message| lost(format!("it was lost ({reason:?}): {message}")));
         let layout = device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lane"), entries: &entries() });
+        let generator_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("generator"),
+            entries: &generator_entries(),
+        });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("lane"),
             bind_group_layouts: &[Some(&layout)],
@@ -127,8 +134,20 @@ impl Device {
         let timestamps = card.timestamps;
         let name = card.name.clone();
         let pipelines = Vec::new();
-        let opened =
-            Device { name, device, queue, exact, timestamps, layout, options, pipeline_layout, pipelines, trouble };
+        let opened = Device {
+            name,
+            device,
+            queue,
+            exact,
+            timestamps,
+            layout,
+            generator_layout,
+            options,
+            pipeline_layout,
+            pipelines,
+            generator: None,
+            trouble,
+        };
         opened.untroubled()?;
         Ok(opened)
     }
@@ -141,14 +160,51 @@ impl Device {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| known == spec) {
             return Ok(pipeline.clone());
         }
-        let mut source = shader::assemble(spec.model);
+        let pipeline = self.compile(
+            spec.model.name(),
+            shader::assemble(spec.model),
+            ENTRY,
+            &spec.constants,
+            &self.pipeline_layout,
+        )?;
+        self.pipelines.push((spec.clone(), pipeline.clone()));
+        Ok(pipeline)
+    }
+
+    /// The pipeline of the generator; compiled once.
+    ///
+    /// # Errors
+    /// As [`Device::pipeline`].
+    pub fn generator(&mut self) -> Result<wgpu::ComputePipeline> {
+        if let Some(pipeline) = &self.generator {
+            return Ok(pipeline.clone());
+        }
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("generator"),
+            bind_group_layouts: &[Some(&self.generator_layout)],
+            immediate_size: 0,
+        });
+        let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, &[], &layout)?;
+        self.generator = Some(pipeline.clone());
+        Ok(pipeline)
+    }
+
+    fn compile(
+        &self,
+        label: &str,
+        mut source: String,
+        entry: &str,
+        values: &[(&'static str, f64)],
+        layout: &wgpu::PipelineLayout,
+    ) -> Result<wgpu::ComputePipeline> {
         if let Some((from, to)) = &self.options.planted {
             source = source.replace(from, to);
         }
-        let label = Some(spec.model.name());
+        let label = Some(label);
         let module = if self.exact {
-            let words = exact_spirv(&source, &spec.constants, self.options.checks)?;
-            let entry = wgpu::PassthroughShaderEntryPoint { name: ENTRY.into(), workgroup_size: (WORKGROUP, 1, 1) };
+            let words = exact_spirv(&source, entry, values, self.options.checks)?;
+            let entry =
+                wgpu::PassthroughShaderEntryPoint { name: entry.to_owned().into(), workgroup_size: (WORKGROUP, 1, 1) };
             // SAFETY: valid SPIR-V from naga, with the bindings of `entries` and decorations added.
             unsafe {
                 self.device.create_shader_module_passthrough(wgpu::ShaderModuleDescriptorPassthrough {
@@ -171,17 +227,16 @@ impl Device {
             }
         };
         // A passed-through module takes no constants: they are resolved in it.
-        let constants: &[(&str, f64)] = if self.exact { &[] } else { &spec.constants };
+        let constants: &[(&str, f64)] = if self.exact { &[] } else { values };
         let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
-            layout: Some(&self.pipeline_layout),
+            layout: Some(layout),
             module: &module,
-            entry_point: Some(ENTRY),
+            entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
             cache: None,
         });
         self.untroubled()?;
-        self.pipelines.push((spec.clone(), pipeline.clone()));
         Ok(pipeline)
     }
 
@@ -252,28 +307,26 @@ const SMALL_RESULT_BYTES: u64 = 4 << 20;
 /// Lanes per model of one job at most: their number and every index into their results stay far below 2³².
 const MOST_LANES: u64 = 1 << 27;
 
-/// The bindings of `shaders/lane.wgsl`, in their order.
-fn entries() -> [wgpu::BindGroupLayoutEntry; 8] {
-    let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-    let kinds = [
-        wgpu::BufferBindingType::Uniform,
-        storage(true),
-        storage(true),
-        storage(true),
-        storage(true),
-        storage(false),
-        storage(false),
-        storage(false),
-    ];
-    let mut binding = 0;
-    kinds.map(|ty| {
-        let entry = wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: binding == 0, min_binding_size: None },
-            count: None,
-        };
-        binding += 1;
-        entry
-    })
+/// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
+fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    buffer_entries(4, 3, true)
+}
+
+/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases and tables.
+fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    buffer_entries(5, 3, false)
+}
+
+/// A uniform buffer, inputs, results.
+fn buffer_entries(inputs: usize, results: usize, dynamic: bool) -> Vec<wgpu::BindGroupLayoutEntry> {
+    let kinds = std::iter::once(wgpu::BufferBindingType::Uniform)
+        .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: true }, inputs))
+        .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: false }, results));
+    let entry = |(binding, ty)| wgpu::BindGroupLayoutEntry {
+        binding: binding as u32,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: dynamic && binding == 0, min_binding_size: None },
+        count: None,
+    };
+    kinds.enumerate().map(entry).collect()
 }

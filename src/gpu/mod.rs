@@ -9,6 +9,7 @@ mod adapters;
 mod backend;
 mod choice;
 mod device;
+mod generator;
 mod owner;
 mod pacing;
 mod records;
@@ -22,6 +23,7 @@ pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind, pci_bu
 pub use backend::GpuBackend;
 pub use choice::{BackendChoice, DeviceName, choose};
 pub use device::{Fault, FaultKind, GpuOptions};
+pub use generator::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};
 pub use spirv::{Checks, exact_spirv};
 pub use visible::{visible, visible_here};

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
+use super::generator::{GeneratorSetup, generate};
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Inputs, Job, RING, Slot};
 use crate::sweep::LaneCase;
@@ -18,16 +19,26 @@ pub(super) struct Setup {
     pub starts: Vec<StartRecord>,
     pub speed: Vec<f32>,
     pub lateral: Vec<[f32; 2]>,
+    /// What makes the cases on the device, where the host does not.
+    pub generator: Option<GeneratorSetup>,
     /// Models of a job.
     pub models: u64,
     /// Compiled before the first job, so that a refusal is known at once.
     pub pipelines: Vec<PipelineSpec>,
 }
 
+/// The cases that a session holds from now on.
+pub(super) enum Cases {
+    /// From the host.
+    Given(Vec<LaneCase<f32>>),
+    /// Made on the device: first sample, number of samples.
+    Made(u64, u32),
+}
+
 /// A job and the cases it needs, where they are not there yet.
 pub(super) struct Request {
     pub session: u64,
-    pub cases: Option<Vec<LaneCase<f32>>>,
+    pub cases: Option<Cases>,
     pub job: Job,
     pub reply: Sender<Result<Answer>>,
 }
@@ -163,11 +174,14 @@ impl Owner {
         for spec in &setup.pipelines {
             self.device.pipeline(spec)?;
         }
+        let generator = setup.generator.as_ref().map(|g| g.upload(&mut self.device)).transpose()?;
+        let sample_bytes = setup.generator.as_ref().map_or(size_of::<LaneCase<f32>>() as u64, |g| g.sample_bytes());
         let inputs = Inputs {
             starts: self.device.upload("headways", &setup.starts)?,
             speed: self.device.upload("speeds", &setup.speed)?,
             lateral: self.device.upload("lateral motions", &setup.lateral)?,
             cases: self.device.upload::<LaneCase<f32>>("cases", &[])?,
+            generator,
         };
         let session = self.next_session;
         self.next_session += 1;
@@ -176,22 +190,27 @@ impl Owner {
         let record = size_of::<super::records::OutcomeRecord>() as f64;
         let most_lanes = [0.5, record + 0.5, 1e-3].map(|bytes| self.device.most_lanes(models, bytes));
         let limits = self.device.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_CASE_BYTES);
-        Ok(Prepared { session, most_lanes, most_cases: most / size_of::<LaneCase<f32>>() as u64 })
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = most.min(if setup.generator.is_some() { MOST_MADE_BYTES } else { MOST_CASE_BYTES });
+        Ok(Prepared { session, most_lanes, most_cases: (most / sample_bytes).max(1) })
     }
 
-    fn submit(&mut self, session: u64, cases: Option<Vec<LaneCase<f32>>>, job: Job) -> Result<(Slot, Flight)> {
+    fn submit(&mut self, session: u64, cases: Option<Cases>, job: Job) -> Result<(Slot, Flight)> {
         self.alive()?;
         self.strike()?;
         let device = &mut self.device;
         let inputs = self.sessions.get_mut(&session).ok_or_else(|| device.failed("the session is closed"))?;
-        if let Some(cases) = cases {
-            let bytes: &[u8] = bytemuck::cast_slice(&cases);
-            if inputs.cases.size() >= bytes.len() as u64 {
-                // Ordered after the jobs under way, which still read the old ones.
-                device.queue.write_buffer(&inputs.cases, 0, bytes);
-            } else {
-                inputs.cases = device.upload("cases", &cases)?;
+        match cases {
+            None => (),
+            Some(Cases::Made(first, count)) => generate(device, inputs, first, count)?,
+            Some(Cases::Given(cases)) => {
+                let bytes: &[u8] = bytemuck::cast_slice(&cases);
+                if inputs.cases.size() >= bytes.len() as u64 {
+                    // Ordered after the jobs under way, which still read the old ones.
+                    device.queue.write_buffer(&inputs.cases, 0, bytes);
+                } else {
+                    inputs.cases = device.upload("cases", &cases)?;
+                }
             }
         }
         let mut slot = self.free.pop().unwrap_or_default();
@@ -251,3 +270,5 @@ impl Owner {
 
 /// Cases on the device at once, bytes.
 const MOST_CASE_BYTES: u64 = 64 << 20;
+/// The same where the device makes them, with their tables.
+const MOST_MADE_BYTES: u64 = 512 << 20;

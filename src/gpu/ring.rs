@@ -6,6 +6,7 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
+use super::generator::GeneratorInputs;
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
 use crate::sweep::Wanted;
 use crate::{Error, Result};
@@ -66,6 +67,8 @@ pub(super) struct Inputs {
     pub speed: wgpu::Buffer,
     pub lateral: wgpu::Buffer,
     pub cases: wgpu::Buffer,
+    /// Makes cases and tables, where the host does not.
+    pub generator: Option<GeneratorInputs>,
 }
 
 /// The buffers of one job; they grow and stay.

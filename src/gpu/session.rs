@@ -6,7 +6,8 @@ use std::sync::mpsc::{self, Receiver, Sender};
 
 use rayon::prelude::*;
 
-use super::owner::{self, Command, Prepared, Request, Setup};
+use super::generator::GeneratorSetup;
+use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::pacing::Pacer;
 use super::records::{CELL_WORDS, StartRecord, from_ordered};
 use super::ring::{Answer, Job, RING};
@@ -44,7 +45,8 @@ impl<'p> GpuSession<'p> {
     pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, first_lanes: u64) -> Result<Self> {
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
-        let tables: Tables<f32> = plan.tables().cast();
+        let tables: Tables<f32> =
+            if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
         let mut pipelines = Vec::new();
         for (block, resolved) in plan.blocks.iter().zip(&constants) {
             pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));
@@ -56,6 +58,7 @@ impl<'p> GpuSession<'p> {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
             speed: tables.speed,
             lateral: tables.lateral,
+            generator: plan.generator().map(GeneratorSetup::new),
             models: plan.models.len() as u64,
             pipelines,
         });
@@ -85,10 +88,19 @@ impl<'p> GpuSession<'p> {
         if !inside {
             let room = self.prepared.most_cases / variants;
             let end = (units.start + room).min(plan.blocks[block].units.len());
-            let upload = cases_of(plan, block, units.start..end);
-            let paired = plan.blocks[block].category == Category::CutOut || upload.iter().any(|c| c.pair != 0);
+            // Not beyond what is asked for: a generator's samples have no natural end.
+            let end = if plan.generator().is_some() { end.min(units.end) } else { end };
+            let is_cut_out = plan.blocks[block].category == Category::CutOut;
+            let paired = if plan.generator().is_some() {
+                cases = Some(Cases::Made(units.start, (end - units.start) as u32));
+                is_cut_out
+            } else {
+                let upload = cases_of(plan, block, units.start..end);
+                let paired = is_cut_out || upload.iter().any(|c| c.pair != 0);
+                cases = Some(Cases::Given(upload));
+                paired
+            };
             self.window = Some((block, units.start..end, paired));
-            cases = Some(upload);
         }
         let Some((_, held, paired)) = &self.window else {
             return Err(Error::Internal("no cases are on the device".to_owned()));

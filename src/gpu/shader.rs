@@ -23,6 +23,25 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/reduction.wgsl", include_str!("../../shaders/shared/reduction.wgsl")),
 ];
 
+/// Entry point of the generator's pipeline.
+pub const GENERATE: &str = "generate";
+
+/// Fragments of the generator, in the order in which they are joined.
+pub const GENERATOR: [(&str, &str); 12] = [
+    ("shared/records.wgsl", include_str!("../../shaders/shared/records.wgsl")),
+    ("generate.wgsl", include_str!("../../shaders/generate.wgsl")),
+    ("shared/exact.wgsl", include_str!("../../shaders/shared/exact.wgsl")),
+    ("shared/motion.wgsl", include_str!("../../shaders/shared/motion.wgsl")),
+    ("shared/attention.wgsl", include_str!("../../shaders/shared/attention.wgsl")),
+    ("shared/philox.wgsl", include_str!("../../shaders/shared/philox.wgsl")),
+    ("shared/uniform.wgsl", include_str!("../../shaders/shared/uniform.wgsl")),
+    ("shared/normal.wgsl", include_str!("../../shaders/shared/normal.wgsl")),
+    ("shared/sobol.wgsl", include_str!("../../shaders/shared/sobol.wgsl")),
+    ("shared/recipe.wgsl", include_str!("../../shaders/shared/recipe.wgsl")),
+    ("shared/points.wgsl", include_str!("../../shaders/shared/points.wgsl")),
+    ("shared/decode.wgsl", include_str!("../../shaders/shared/decode.wgsl")),
+];
+
 /// Makes the list of the models' files from the registry.
 macro_rules! declare_shaders {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
@@ -44,6 +63,16 @@ pub fn assemble(model: ModelId) -> String {
     let (_, driver) = driver_shader(model);
     let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
     for text in SHARED.iter().map(|(_, text)| *text).chain([driver]) {
+        source.push_str(text);
+        source.push('\n');
+    }
+    source
+}
+
+/// The source of the generator's pipeline.
+pub fn assemble_generator() -> String {
+    let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
+    for (_, text) in GENERATOR {
         source.push_str(text);
         source.push('\n');
     }

@@ -5,7 +5,6 @@ use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use super::shader::ENTRY;
 use crate::{Error, Result};
 
 /// What a shader does about an index beyond its buffer or a loop without end.
@@ -30,19 +29,19 @@ mod op {
     pub const HEADER: usize = 5;
 }
 
-/// Compiles a pipeline's source with its constants.
+/// Compiles the entry point of a pipeline's source with its constants.
 ///
 /// # Errors
 /// [`Error::Internal`] where naga refuses the source: a defect of the shaders.
-pub fn exact_spirv(source: &str, constants: &[(&str, f64)], checks: Checks) -> Result<Vec<u32>> {
+pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)], checks: Checks) -> Result<Vec<u32>> {
     let defect = |stage: &str, what: String| Error::Internal(format!("a shader does not {stage}: {what}"));
     let module = naga::front::wgsl::parse_str(source).map_err(|e| defect("parse", e.emit_to_string(source)))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
         .validate(&module)
         .map_err(|e| defect("validate", e.emit_to_string(source)))?;
     let values = constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
-    let entry = Some((naga::ShaderStage::Compute, ENTRY));
-    let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, entry, &values)
+    let stage = Some((naga::ShaderStage::Compute, entry));
+    let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, stage, &values)
         .map_err(|e| defect("take its constants", e.to_string()))?;
     let checked = checks == Checks::Checked;
     let policy = if checked { BoundsCheckPolicy::Restrict } else { BoundsCheckPolicy::Unchecked };
@@ -60,7 +59,7 @@ pub fn exact_spirv(source: &str, constants: &[(&str, f64)], checks: Checks) -> R
         emit_int_div_checks: checked,
         ..spv::Options::default()
     };
-    let pipeline = spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: ENTRY.to_owned() };
+    let pipeline = spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: entry.to_owned() };
     let words = spv::write_vec(&module, &info, &options, Some(&pipeline))
         .map_err(|e| defect("become SPIR-V", e.to_string()))?;
     forbid_contraction(&words)
@@ -120,7 +119,7 @@ mod tests {
             for model in ModelId::ALL {
                 let resolved = Constants::resolve(&profile, Category::CutOut);
                 let constants = shader::constants(&resolved, model, true);
-                let words = exact_spirv(&shader::assemble(model), &constants, Checks::Checked).unwrap();
+                let words = exact_spirv(&shader::assemble(model), shader::ENTRY, &constants, Checks::Checked).unwrap();
                 let floats = count(&words, |opcode, _| op::FLOAT.contains(&opcode));
                 let decorated = count(&words, |opcode, w| opcode == op::DECORATE && w[2] == op::NO_CONTRACTION);
                 assert!(floats > 40, "{name} {model:?}: only {floats} float operations");

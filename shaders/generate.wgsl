@@ -1,0 +1,58 @@
+// The entry of the generator: one invocation makes the case of one sample, with its series, for all lanes of the
+// sample that run afterwards.
+
+struct Generation {
+    // First sample index of this dispatch.
+    index_low: u32,
+    index_high: u32,
+    // Samples of this dispatch.
+    count: u32,
+    // SOURCE_…
+    source: u32,
+    seed_low: u32,
+    seed_high: u32,
+    purpose: u32,
+    // Components of the mixture, or points given.
+    components: u32,
+    // 1 where components have weights.
+    weighted: u32,
+    // Places in `numbers`: the basis of a reduction begins at 0.
+    first_mean: u32,
+    first_factor: u32,
+    first_factor_of: u32,
+    // Entries of each sample in the tables.
+    speed_stride: u32,
+    lateral_stride: u32,
+}
+
+@group(0) @binding(0) var<uniform> generation: Generation;
+@group(0) @binding(1) var<storage, read> recipe: Recipe;
+@group(0) @binding(2) var<storage, read> numbers: array<u32>;
+@group(0) @binding(3) var<storage, read> alias_table: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read> sobol_table: array<u32>;
+@group(0) @binding(5) var<storage, read> normal_table: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read_write> cases: array<LaneCase>;
+@group(0) @binding(7) var<storage, read_write> speed_table: array<f32>;
+@group(0) @binding(8) var<storage, read_write> lateral_table: array<vec2<f32>>;
+
+const WORKGROUP: u32 = 64u;
+
+@compute @workgroup_size(WORKGROUP)
+fn generate(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) inside: u32,
+) {
+    let at = (group.y * groups.x + group.x) * WORKGROUP + inside;
+    if at >= generation.count {
+        return;
+    }
+    let low = generation.index_low + at;
+    let index = vec2<u32>(low, generation.index_high + select(0u, 1u, low < at));
+    let drawn = draw_point(index);
+    if drawn.tries > ATTEMPTS {
+        cases[at] = void_case();
+    } else {
+        cases[at] = decode_case(drawn.values, at * generation.speed_stride, at * generation.lateral_stride);
+    }
+}

@@ -1,0 +1,58 @@
+// When a driver may react to a vehicle, as far as that depends on the vehicle's own motion: twin of
+// src/driver/attention.rs.
+
+const NEVER: u32 = 0xffffffffu;
+
+const ATTENTION_ALWAYS: u32 = 0u;
+const ATTENTION_VISIBLE_MOVEMENT: u32 = 1u;
+const ATTENTION_WANDERING: u32 = 2u;
+const ATTENTION_DECELERATION: u32 = 3u;
+
+// Lateral movement per step from which on a vehicle moves, m.
+const MOVEMENT: f32 = 1e-9f;
+
+// What has to be seen of the principal vehicle before a driver may react.
+struct AttentionRule {
+    kind: u32,
+    delay_steps: u32,
+    with_ahead: u32,
+    threshold: f32,
+    travel: f32,
+}
+
+// First step at which the driver may react to the principal vehicle and to the one ahead of it.
+fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion) -> vec2<u32> {
+    if rule.kind == ATTENTION_ALWAYS || steps == 0u {
+        return vec2<u32>(0u, 0u);
+    }
+    let start = motion_lateral(motion, 0u).position;
+    if rule.kind == ATTENTION_VISIBLE_MOVEMENT && abs(start) - half_widths <= rule.threshold {
+        return vec2<u32>(0u, 0u);
+    }
+    var event = NEVER;
+    var early = NEVER;
+    var lateral_before = start;
+    var speed_before = motion_speed(motion, 0u);
+    for (var step = 0u; step < steps; step++) {
+        let position = motion_lateral(motion, step).position;
+        let v = motion_speed(motion, step);
+        var happens = speed_before - v > rule.threshold;
+        if rule.kind == ATTENTION_VISIBLE_MOVEMENT {
+            happens = abs(position - lateral_before) > MOVEMENT;
+        } else if rule.kind == ATTENTION_WANDERING {
+            happens = abs(position - start) > rule.threshold;
+        }
+        if happens && event == NEVER {
+            // Movement is seen at the step that it begins from.
+            let begins_before = (rule.kind == ATTENTION_VISIBLE_MOVEMENT) & (step > 0u);
+            event = select(step, step - 1u, begins_before) + rule.delay_steps;
+        }
+        if rule.kind == ATTENTION_WANDERING && early == NEVER && abs(position - start) > rule.travel {
+            early = step;
+        }
+        lateral_before = position;
+        speed_before = v;
+    }
+    let from_step = select(early, event, event < early);
+    return vec2<u32>(from_step, select(0u, from_step, rule.with_ahead != 0u));
+}

@@ -1,0 +1,312 @@
+// Point → validity and case: twin of src/sweep/generated/decode.rs. Series go to this sample's own part of the tables.
+
+// An event this close behind a step, in steps, counts as at the step.
+const STEP_TOLERANCE: f32 = 1e-4f;
+// No event is later, in steps.
+const MOST_STEPS: f32 = 1e6f;
+
+// sin(πx/2) on [0, 1] as x·p(x²).
+const SINE_0: f32 = 1.5707963267948966f;
+const SINE_1: f32 = -0.6459640975062463f;
+const SINE_2: f32 = 0.07969262624616705f;
+const SINE_3: f32 = -0.004681754135318688f;
+const SINE_4: f32 = 0.00016044118478735982f;
+const SINE_5: f32 = -3.598843235212085e-6f;
+
+// Is the point inside the valid region?
+fn is_valid(point: array<f32, MOST_PARAMETERS>) -> bool {
+    for (var j = 0u; j < recipe.dimensions; j++) {
+        if !((point[j] >= recipe.lower[j]) & (point[j] <= recipe.upper[j])) {
+            return false;
+        }
+    }
+    if recipe.path == PATH_REDUCED {
+        let duration = reduced_column(point, recipe.columns.duration);
+        let ego_speed = reduced_column(point, recipe.columns.ego_speed);
+        var gap = 0.0;
+        if recipe.columns.lead_gap != NO_SLOT {
+            gap = reduced_column(point, recipe.columns.lead_gap);
+        }
+        return (duration >= recipe.least_duration) & (duration <= recipe.longest_duration) & (ego_speed >= 0.0)
+            & (gap >= 0.0);
+    }
+    if recipe.decelerates != 0u {
+        let initial = quantity(point, TARGET_SPEED);
+        let end = quantity(point, FINAL_SPEED);
+        if end >= initial {
+            return false;
+        }
+        let duration = exact_div(initial - end, quantity(point, MEAN_DECELERATION));
+        return (duration >= recipe.least_duration) & (duration <= recipe.longest_duration);
+    }
+    return true;
+}
+
+// The case of a valid point; its series begin at these entries of the tables.
+fn decode_case(point: array<f32, MOST_PARAMETERS>, speed_at: u32, lateral_at: u32) -> LaneCase {
+    var principal: Motion;
+    var ahead: Motion;
+    var ego_speed = 0.0;
+    var lead_gap = 0.0;
+    var horizon = 0u;
+    if recipe.path == PATH_REDUCED {
+        let duration = reduced_column(point, recipe.columns.duration);
+        reduced_speed(point, recipe.columns.speed, duration, &principal, speed_at);
+        if recipe.columns.lateral != NO_SLOT {
+            reduced_lateral(point, duration, &principal, lateral_at);
+        }
+        if recipe.columns.lead_speed != NO_SLOT {
+            reduced_speed(point, recipe.columns.lead_speed, duration, &ahead, speed_at + principal.speed_len);
+        }
+        ego_speed = reduced_column(point, recipe.columns.ego_speed);
+        if recipe.columns.lead_gap != NO_SLOT {
+            lead_gap = reduced_column(point, recipe.columns.lead_gap);
+        }
+        horizon = steps_up(duration * recipe.inverse_dt);
+    } else {
+        let initial = quantity(point, TARGET_SPEED);
+        var duration = quantity(point, DURATION);
+        if recipe.decelerates != 0u {
+            let end = quantity(point, FINAL_SPEED);
+            let deceleration = quantity(point, MEAN_DECELERATION);
+            duration = exact_div(initial - end, deceleration);
+            if recipe.path == PATH_SINUSOID {
+                sinusoidal_speed(initial, end, duration, &principal, speed_at);
+            } else {
+                kinematic_speed(initial, -deceleration, duration, &principal);
+                principal.speed_end = end;
+            }
+        } else {
+            kinematic_speed(initial, quantity(point, TARGET_ACCELERATION), duration, &principal);
+        }
+        kinematic_speed(quantity(point, LEAD_SPEED), quantity(point, LEAD_ACCELERATION), duration, &ahead);
+        let change = kinematic_lateral(quantity(point, LATERAL_SPEED), &principal);
+        ego_speed = initial;
+        if recipe.slots[EGO_SPEED] != NO_SLOT {
+            ego_speed = quantity(point, EGO_SPEED);
+        }
+        lead_gap = quantity(point, LEAD_GAP);
+        horizon = steps_up(larger(duration, change) * recipe.inverse_dt);
+    }
+    let headway_gap = quantity(point, TIME_HEADWAY) * ego_speed;
+    var first = lane_other(principal, 0u, headway_gap, recipe.judged);
+    var second = first;
+    second.used = 0u;
+    second.present_until = 0u;
+    if recipe.pair != 0u {
+        second = lane_other(ahead, 1u, headway_gap + (recipe.principal_length + lead_gap), 1u);
+    }
+    let steps = steps_seen(first.motion);
+    for (var model = 0u; model < MODELS; model++) {
+        let begin = attend_from(recipe.attention[model], steps, first.half_widths, first.motion);
+        first.attend_from[model] = begin.x;
+        second.attend_from[model] = begin.y;
+    }
+    var lane: LaneCase;
+    lane.others[0] = first;
+    lane.others[1] = second;
+    lane.ego_speed = ego_speed;
+    lane.ego_width = recipe.ego_width;
+    lane.horizon = horizon;
+    lane.pair = recipe.pair;
+    return lane;
+}
+
+fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneOther {
+    var other: LaneOther;
+    other.motion = motion;
+    other.half_lengths = recipe.half_lengths[which];
+    other.half_widths = recipe.half_widths[which];
+    other.gap_offset = gap_offset;
+    other.present_until = NEVER;
+    other.used = 1u;
+    other.judged = judged;
+    return other;
+}
+
+// The value of a quantity; 0 where no parameter gives it.
+fn quantity(point: array<f32, MOST_PARAMETERS>, which: u32) -> f32 {
+    var values = point;
+    let slot = recipe.slots[which];
+    if slot == NO_SLOT {
+        return 0.0;
+    }
+    return values[slot];
+}
+
+// A column of the vector that belongs to coefficients.
+fn reduced_column(point: array<f32, MOST_PARAMETERS>, column: u32) -> f32 {
+    var coefficients = point;
+    var value = number(column);
+    for (var k = 0u; k < recipe.columns.coefficients; k++) {
+        value = value + coefficients[k] * number((k + 1u) * recipe.columns.width + column);
+    }
+    return value;
+}
+
+// Whole steps that cover a time, given in steps.
+fn steps_up(time: f32) -> u32 {
+    let late = larger(smaller(time, MOST_STEPS) - STEP_TOLERANCE, 0.0);
+    let below = u32(late);
+    return select(below, below + 1u, late > f32(below));
+}
+
+fn less_one(steps: u32) -> u32 {
+    return select(0u, steps - 1u, steps > 0u);
+}
+
+// Steps in which something happens, and a few more.
+fn steps_seen(motion: Motion) -> u32 {
+    var last = motion.speed_len;
+    last = select(last, motion.lateral_len, motion.lateral_len > last);
+    last = select(last, motion.speed_until, motion.speed_until > last);
+    last = select(last, motion.lateral_until, motion.lateral_until > last);
+    return select(recipe.step_cap, last + 2u, last + 2u < recipe.step_cap);
+}
+
+// Speed that changes by `acceleration` until `duration`, then holds.
+fn kinematic_speed(initial: f32, acceleration: f32, duration: f32, motion: ptr<function, Motion>) {
+    let until_step = less_one(steps_up(duration * recipe.inverse_dt));
+    (*motion).speed_initial = initial;
+    (*motion).speed_per_step = acceleration * recipe.dt;
+    (*motion).speed_until = select(until_step, recipe.step_cap, recipe.unlimited != 0u);
+    (*motion).speed_end = larger(initial + acceleration * duration, 0.0);
+}
+
+// Lateral motion at constant speed; gives the time of the lane change, s.
+fn kinematic_lateral(lateral_speed: f32, motion: ptr<function, Motion>) -> f32 {
+    let way = recipe.lane_change;
+    if recipe.lateral == LATERAL_GONE {
+        (*motion).lateral_initial = way;
+        (*motion).lateral_end = way;
+    }
+    if recipe.lateral == LATERAL_GONE || recipe.lateral == LATERAL_CENTRED {
+        return 0.0;
+    }
+    let change = exact_div(way, lateral_speed);
+    let enters = recipe.lateral == LATERAL_ENTERING;
+    let per_step = lateral_speed * recipe.dt;
+    (*motion).lateral_until = less_one(steps_up(change * recipe.inverse_dt));
+    (*motion).lateral_initial = select(0.0, way, enters);
+    (*motion).lateral_per_step = select(per_step, -per_step, enters);
+    (*motion).lateral_end = select(way, 0.0, enters);
+    (*motion).lateral_towards = select(-lateral_speed, lateral_speed, enters);
+    return change;
+}
+
+// Entries of a series of this duration.
+fn entries(duration: f32) -> u32 {
+    let steps = steps_up(duration * recipe.inverse_dt);
+    return select(recipe.step_cap, steps, steps < recipe.step_cap) + 1u;
+}
+
+// v0 − Δ·sin²(πt/2T) up to T, then v1 (paper, LVD ii).
+fn sinusoidal_speed(initial: f32, end: f32, duration: f32, motion: ptr<function, Motion>, speed_at: u32) {
+    let count = entries(duration);
+    let phase_per_step = exact_div(recipe.dt, duration);
+    (*motion).kind = (*motion).kind | SPEED_SAMPLED;
+    (*motion).speed_offset = speed_at;
+    (*motion).speed_len = count;
+    for (var step = 0u; step < count; step++) {
+        let phase = f32(step) * phase_per_step;
+        let sine = quarter_sine(smaller(phase, 1.0));
+        let speed = larger(initial - (initial - end) * (sine * sine), 0.0);
+        speed_table[speed_at + step] = select(end, speed, phase < 1.0);
+    }
+}
+
+// sin(πx/2) for x in [0, 1].
+fn quarter_sine(x: f32) -> f32 {
+    let square = x * x;
+    var sum = SINE_5;
+    sum = sum * square + SINE_4;
+    sum = sum * square + SINE_3;
+    sum = sum * square + SINE_2;
+    sum = sum * square + SINE_1;
+    sum = sum * square + SINE_0;
+    return x * sum;
+}
+
+// Place of a step between the instants of a reduced series.
+struct Between {
+    below: u32,
+    above: u32,
+    share: f32,
+}
+
+// Instants per step of a series of this duration.
+fn instants_per_step(duration: f32) -> f32 {
+    return exact_div(f32(recipe.columns.instants - 1u) * recipe.dt, duration);
+}
+
+fn between(step: u32, per_step: f32) -> Between {
+    let last = recipe.columns.instants - 1u;
+    let position = smaller(f32(step) * per_step, f32(last));
+    let below = u32(position);
+    return Between(below, select(last, below + 1u, below + 1u < last), position - f32(below));
+}
+
+// A speed series of the reduction: linear between its instants, never below 0.
+fn reduced_speed(
+    point: array<f32, MOST_PARAMETERS>,
+    first: u32,
+    duration: f32,
+    motion: ptr<function, Motion>,
+    speed_at: u32,
+) {
+    let count = entries(duration);
+    let per_step = instants_per_step(duration);
+    (*motion).kind = (*motion).kind | SPEED_SAMPLED;
+    (*motion).speed_offset = speed_at;
+    (*motion).speed_len = count;
+    // Neighbouring steps lie between the same instants.
+    var held = NO_SLOT;
+    var below = 0.0;
+    var above = 0.0;
+    for (var step = 0u; step < count; step++) {
+        let place = between(step, per_step);
+        if place.below != held {
+            held = place.below;
+            below = larger(reduced_column(point, first + place.below), 0.0);
+            above = larger(reduced_column(point, first + place.above), 0.0);
+        }
+        speed_table[speed_at + step] = below + (above - below) * place.share;
+    }
+}
+
+// The lateral series of the reduction with its speed towards the ego, w[i] = (|y[i−1]| − |y[i]|)/dt, w[0] = w[1],
+// 0 after T.
+fn reduced_lateral(
+    point: array<f32, MOST_PARAMETERS>,
+    duration: f32,
+    motion: ptr<function, Motion>,
+    lateral_at: u32,
+) {
+    let count = entries(duration);
+    let per_step = instants_per_step(duration);
+    (*motion).kind = (*motion).kind | LATERAL_SAMPLED;
+    (*motion).lateral_offset = lateral_at;
+    (*motion).lateral_len = count;
+    var held = NO_SLOT;
+    var below = 0.0;
+    var above = 0.0;
+    var before = 0.0;
+    for (var step = 0u; step < count; step++) {
+        let place = between(step, per_step);
+        if place.below != held {
+            held = place.below;
+            below = reduced_column(point, recipe.columns.lateral + place.below);
+            above = reduced_column(point, recipe.columns.lateral + place.above);
+        }
+        let position = below + (above - below) * place.share;
+        var towards = 0.0;
+        if (step > 0u) & (f32(step) * recipe.dt <= duration) {
+            towards = (abs(before) - abs(position)) * recipe.inverse_dt;
+        }
+        lateral_table[lateral_at + step] = vec2<f32>(position, towards);
+        if step == 1u {
+            lateral_table[lateral_at].y = towards;
+        }
+        before = position;
+    }
+}

@@ -1,0 +1,81 @@
+// Sample index → point: twin of src/sweep/generated/points.rs. Means and factors stand in `numbers`, as bits.
+
+const ATTEMPTS: u32 = 64u;
+// Blocks of four words per draw.
+const BLOCKS: u32 = 4u;
+
+const SOURCE_RANDOM: u32 = 0u;
+const SOURCE_SOBOL: u32 = 1u;
+const SOURCE_GIVEN: u32 = 2u;
+
+struct Drawn {
+    values: array<f32, MOST_PARAMETERS>,
+    tries: u32,
+}
+
+// The number at a place of the shared table.
+fn number(at: u32) -> f32 {
+    return bitcast<f32>(numbers[at]);
+}
+
+// The first valid draw of an index.
+fn draw_point(index: vec2<u32>) -> Drawn {
+    let attempts = select(1u, ATTEMPTS, generation.source == SOURCE_RANDOM);
+    var drawn: Drawn;
+    for (var attempt = 0u; attempt < attempts; attempt++) {
+        drawn.values = candidate(index, attempt);
+        drawn.tries = attempt + 1u;
+        if is_valid(drawn.values) {
+            return drawn;
+        }
+    }
+    drawn.tries = ATTEMPTS + 1u;
+    return drawn;
+}
+
+// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
+fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MOST_PARAMETERS> {
+    let d = recipe.dimensions;
+    var words: array<u32, 16>;
+    if generation.source == SOURCE_GIVEN {
+        var given: array<f32, MOST_PARAMETERS>;
+        let row = select(generation.components - 1u, index.x, index.x < generation.components);
+        for (var j = 0u; j < d; j++) {
+            given[j] = number(generation.first_mean + row * d + j);
+        }
+        return given;
+    }
+    if generation.source == SOURCE_RANDOM {
+        let seed = vec2<u32>(generation.seed_low, generation.seed_high);
+        for (var block = 0u; 4u * block < 2u + d; block++) {
+            let four = stream_words(seed, generation.purpose, index, attempt * BLOCKS + block);
+            words[4u * block] = four.x;
+            words[4u * block + 1u] = four.y;
+            words[4u * block + 2u] = four.z;
+            words[4u * block + 3u] = four.w;
+        }
+    } else {
+        for (var dimension = 0u; dimension < 2u + d; dimension++) {
+            words[dimension] = sobol_word(dimension, index.x);
+        }
+    }
+    var component = choose(words[0], generation.components);
+    if generation.weighted != 0u {
+        component = alias_pick(0u, generation.components, words[0], words[1]);
+    }
+    let factor = generation.first_factor + numbers[generation.first_factor_of + component] * d * d;
+    let mean = generation.first_mean + component * d;
+    var deviates: array<f32, MOST_PARAMETERS>;
+    for (var j = 0u; j < d; j++) {
+        deviates[j] = standard_normal(words[2u + j]);
+    }
+    var values: array<f32, MOST_PARAMETERS>;
+    for (var j = 0u; j < d; j++) {
+        var value = number(mean + j);
+        for (var k = 0u; k <= j; k++) {
+            value = value + number(factor + j * d + k) * deviates[k];
+        }
+        values[j] = value;
+    }
+    return values;
+}

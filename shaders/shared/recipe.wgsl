@@ -1,0 +1,85 @@
+// What a point's numbers mean: twin of src/sweep/generated/recipe.rs. A test compares sizes and offsets.
+
+const MOST_PARAMETERS: u32 = 14u;
+const QUANTITIES: u32 = 11u;
+const NO_SLOT: u32 = 0xffffffffu;
+
+const TARGET_SPEED: u32 = 0u;
+const LATERAL_SPEED: u32 = 1u;
+const EGO_SPEED: u32 = 2u;
+const TARGET_ACCELERATION: u32 = 3u;
+const LEAD_SPEED: u32 = 4u;
+const LEAD_ACCELERATION: u32 = 5u;
+const LEAD_GAP: u32 = 6u;
+const DURATION: u32 = 7u;
+const FINAL_SPEED: u32 = 8u;
+const MEAN_DECELERATION: u32 = 9u;
+const TIME_HEADWAY: u32 = 10u;
+
+const PATH_KINEMATIC: u32 = 0u;
+const PATH_SINUSOID: u32 = 1u;
+const PATH_REDUCED: u32 = 2u;
+
+const LATERAL_CENTRED: u32 = 0u;
+const LATERAL_ENTERING: u32 = 1u;
+const LATERAL_LEAVING: u32 = 2u;
+const LATERAL_GONE: u32 = 3u;
+
+// Columns of a reduction's vector.
+struct ReducedColumns {
+    width: u32,
+    instants: u32,
+    coefficients: u32,
+    lateral: u32,
+    speed: u32,
+    lead_speed: u32,
+    ego_speed: u32,
+    lead_gap: u32,
+    duration: u32,
+}
+
+struct Recipe {
+    path: u32,
+    lateral: u32,
+    dimensions: u32,
+    pair: u32,
+    decelerates: u32,
+    unlimited: u32,
+    judged: u32,
+    step_cap: u32,
+    slots: array<u32, QUANTITIES>,
+    columns: ReducedColumns,
+    lower: array<f32, MOST_PARAMETERS>,
+    upper: array<f32, MOST_PARAMETERS>,
+    // s
+    least_duration: f32,
+    // s
+    longest_duration: f32,
+    // s
+    dt: f32,
+    // 1/s
+    inverse_dt: f32,
+    // m
+    lane_change: f32,
+    // m
+    half_lengths: array<f32, 2>,
+    // m
+    half_widths: array<f32, 2>,
+    // m
+    principal_length: f32,
+    // m
+    ego_width: f32,
+    attention: array<AttentionRule, MODELS>,
+}
+
+// The case of a void sample: nobody is there, and the ego stands.
+fn void_case() -> LaneCase {
+    var nobody: LaneOther;
+    nobody.half_lengths = recipe.half_lengths[0];
+    nobody.half_widths = recipe.half_widths[0];
+    var lane: LaneCase;
+    lane.others[0] = nobody;
+    lane.others[1] = nobody;
+    lane.ego_width = recipe.ego_width;
+    return lane;
+}
