@@ -23,6 +23,17 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/reduction.wgsl", include_str!("../../shaders/shared/reduction.wgsl")),
 ];
 
+/// Fragments of sampling, twins of `src/random`, for a kernel that declares what they read:
+/// `normal_table: array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)),
+/// `sobol_table: array<u32>` ([`Sobol::table`](crate::random::Sobol::table)) and
+/// `alias_table: array<vec2<u32>>` ([`AliasTable::table`](crate::random::AliasTable::table)).
+pub const RANDOM: [(&str, &str); 4] = [
+    ("shared/philox.wgsl", include_str!("../../shaders/shared/philox.wgsl")),
+    ("shared/uniform.wgsl", include_str!("../../shaders/shared/uniform.wgsl")),
+    ("shared/normal.wgsl", include_str!("../../shaders/shared/normal.wgsl")),
+    ("shared/sobol.wgsl", include_str!("../../shaders/shared/sobol.wgsl")),
+];
+
 /// Makes the list of the models' files from the registry.
 macro_rules! declare_shaders {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
