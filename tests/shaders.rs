@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 
 use lanesweep::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::driver::{MODELS, ModelId};
-use lanesweep::gpu::shader::{self, SHARED, driver_shader};
+use lanesweep::gpu::shader::{self, RANDOM, SHARED, driver_shader};
 use lanesweep::gpu::{Checks, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::profile::Profile;
+use lanesweep::random::SOBOL_ROW;
 use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
 use lanesweep::sweep::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
 use wgsl::{Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments};
@@ -288,8 +289,45 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
 }
 
 #[test]
+fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_order() {
+    // What makes the tables, which only the host does; and methods that only look up a row and call what has a twin.
+    let no_twin = ["normal_table", "inverse_normal_tail", "segment", "new", "table", "word", "directions"];
+    let no_twin = [&no_twin[..], &["count", "columns"]].concat();
+    // Methods have the name of their type with them in WGSL.
+    let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
+    for (file, shader) in RANDOM {
+        let name = Path::new(file).file_name().unwrap();
+        let twin = in_crate("src/random").join(name).with_extension("rs");
+        let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+        let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
+        names.retain(|name| !no_twin.contains(&name.as_str()));
+        for name in &mut names {
+            if let Some((_, in_wgsl)) = renamed.iter().find(|(in_rust, _)| in_rust == name) {
+                *name = (*in_wgsl).to_owned();
+            }
+        }
+        assert_eq!(names, function_names(shader), "{file} and its twin");
+    }
+}
+
+#[test]
+fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
+    let tables = "@group(0) @binding(0) var<storage, read> normal_table: array<vec4<f32>>;
+        @group(0) @binding(1) var<storage, read> sobol_table: array<u32>;
+        @group(0) @binding(2) var<storage, read> alias_table: array<vec2<u32>>;\n";
+    let source = RANDOM.iter().fold(tables.to_owned(), |source, (_, text)| source + text);
+    let (module, info) = parse(&source);
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
+    let (loops, unbounded) = unbounded_loops(&module);
+    // philox4x32_10, sobol_point, both of owen_scramble.
+    assert_eq!((loops, unbounded), (4, vec![]));
+    assert_eq!(constant(&module, "SOBOL_ROW") as usize, SOBOL_ROW);
+}
+
+#[test]
 fn every_shader_file_is_part_of_a_pipeline() {
-    let parts = SHARED.into_iter().chain(ModelId::ALL.map(driver_shader));
+    let parts = SHARED.into_iter().chain(RANDOM).chain(ModelId::ALL.map(driver_shader));
     let known: BTreeSet<String> = parts.map(|(name, _)| name.to_owned()).collect();
     let mut found = BTreeSet::new();
     for folder in ["", "shared/"] {
@@ -303,7 +341,7 @@ fn every_shader_file_is_part_of_a_pipeline() {
 
 #[test]
 fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
-    for (name, text) in SHARED.into_iter().chain(ModelId::ALL.map(driver_shader)) {
+    for (name, text) in SHARED.into_iter().chain(RANDOM).chain(ModelId::ALL.map(driver_shader)) {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
         let code = without_comments(text);
         if name != "lane.wgsl" {

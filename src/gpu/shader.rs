@@ -23,20 +23,27 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/reduction.wgsl", include_str!("../../shaders/shared/reduction.wgsl")),
 ];
 
+/// Fragments of sampling, twins of `src/random`, for a kernel that declares what they read:
+/// `normal_table: array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)),
+/// `sobol_table: array<u32>` ([`Sobol::table`](crate::random::Sobol::table)) and
+/// `alias_table: array<vec2<u32>>` ([`AliasTable::table`](crate::random::AliasTable::table)).
+pub const RANDOM: [(&str, &str); 4] = [
+    ("shared/philox.wgsl", include_str!("../../shaders/shared/philox.wgsl")),
+    ("shared/uniform.wgsl", include_str!("../../shaders/shared/uniform.wgsl")),
+    ("shared/normal.wgsl", include_str!("../../shaders/shared/normal.wgsl")),
+    ("shared/sobol.wgsl", include_str!("../../shaders/shared/sobol.wgsl")),
+];
+
 /// Entry point of the generator's pipeline.
 pub const GENERATE: &str = "generate";
 
-/// Fragments of the generator, in the order in which they are joined.
-pub const GENERATOR: [(&str, &str); 12] = [
+/// Fragments of the generator beside [`RANDOM`], in the order in which they are joined.
+pub const GENERATOR: [(&str, &str); 8] = [
     ("shared/records.wgsl", include_str!("../../shaders/shared/records.wgsl")),
     ("generate.wgsl", include_str!("../../shaders/generate.wgsl")),
     ("shared/exact.wgsl", include_str!("../../shaders/shared/exact.wgsl")),
     ("shared/motion.wgsl", include_str!("../../shaders/shared/motion.wgsl")),
     ("shared/attention.wgsl", include_str!("../../shaders/shared/attention.wgsl")),
-    ("shared/philox.wgsl", include_str!("../../shaders/shared/philox.wgsl")),
-    ("shared/uniform.wgsl", include_str!("../../shaders/shared/uniform.wgsl")),
-    ("shared/normal.wgsl", include_str!("../../shaders/shared/normal.wgsl")),
-    ("shared/sobol.wgsl", include_str!("../../shaders/shared/sobol.wgsl")),
     ("shared/recipe.wgsl", include_str!("../../shaders/shared/recipe.wgsl")),
     ("shared/points.wgsl", include_str!("../../shaders/shared/points.wgsl")),
     ("shared/decode.wgsl", include_str!("../../shaders/shared/decode.wgsl")),
@@ -72,7 +79,7 @@ pub fn assemble(model: ModelId) -> String {
 /// The source of the generator's pipeline.
 pub fn assemble_generator() -> String {
     let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
-    for (_, text) in GENERATOR {
+    for (_, text) in GENERATOR.into_iter().chain(RANDOM) {
         source.push_str(text);
         source.push('\n');
     }

@@ -1,7 +1,7 @@
 //! Numbers at random that are pure functions of (seed, index): any part of a sample can be made anywhere, in any
 //! order, on the CPU and on a device, with the same bits.
 //!
-//! [`Stream`] (Philox) and [`Sobol`] turn an index into random words; [`standard_normal`], [`unit`], [`choose`] and
+//! [`Stream`] (Philox) and [`Sobol`] turn an index into random words; [`standard_normal`], [`unit_uniform`], [`choose`] and
 //! [`AliasTable`] turn a word into a deviate. Everything between index and deviate is 32-bit integer arithmetic and
 //! exact conversions, then f32 additions and multiplications in the written order. Tables are made on the host in f64,
 //! with operations that give the same bits on every machine, and go to devices as data.
@@ -17,4 +17,4 @@ mod uniform;
 pub use normal::{inverse_normal_tail, normal_table, standard_normal};
 pub use philox::{Stream, philox4x32_10};
 pub use sobol::{SOBOL_DIMENSIONS, SOBOL_POINTS, SOBOL_ROW, Sobol};
-pub use uniform::{AliasTable, choose, unit};
+pub use uniform::{AliasTable, choose, unit_uniform};

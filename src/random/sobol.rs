@@ -96,7 +96,8 @@ fn owen_scramble(word: u32, seed: [u32; 2]) -> u32 {
     for chunk in 0..DIGITS as u32 / LEVELS {
         // Two shifts: one by 32 is none.
         let above = (word >> 1) >> (31 - LEVELS * chunk);
-        let coins = mix(mix(above.wrapping_add(seed[0])) ^ seed[1].wrapping_add(chunk.wrapping_mul(0x9E37_79B9)));
+        let coins =
+            avalanche(avalanche(above.wrapping_add(seed[0])) ^ seed[1].wrapping_add(chunk.wrapping_mul(0x9E37_79B9)));
         let mut node = 1;
         for level in 0..LEVELS {
             let digit = (word >> (31 - LEVELS * chunk - level)) & 1;
@@ -109,7 +110,7 @@ fn owen_scramble(word: u32, seed: [u32; 2]) -> u32 {
 
 /// A permutation of the words in which every bit depends on every other: Wellons' `lowbias32`.
 #[inline]
-fn mix(word: u32) -> u32 {
+fn avalanche(word: u32) -> u32 {
     let mut x = word ^ (word >> 16);
     x = x.wrapping_mul(0x7FEB_352D);
     x ^= x >> 15;
@@ -255,8 +256,7 @@ mod tests {
             for level in 0..3 {
                 for above in 0..1_u32 << level {
                     // With 0 below the digits above, the coin shows as it is.
-                    let word = above << (31 - level) << 1_u32.min(level);
-                    let word = if level == 0 { 0 } else { word };
+                    let word = (u64::from(above) << (32 - level)) as u32;
                     cell |= ((scramble(word) >> (31 - level)) & 1) << place;
                     place += 1;
                 }

@@ -6,7 +6,7 @@ use crate::{Error, Place, Result};
 /// A uniform number in (0, 1): the middle of one of 2²³ equal parts, so that neither end is reached and the conversion
 /// is exact. The lowest nine bits do not count.
 #[inline]
-pub fn unit(word: u32) -> f32 {
+pub fn unit_uniform(word: u32) -> f32 {
     (2 * (word >> 9) + 1) as f32 * (1.0 / 16_777_216.0)
 }
 
@@ -117,12 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn unit_numbers_stay_inside_and_keep_order() {
-        assert_eq!(unit(0), 0.5_f32.powi(24));
-        assert_eq!(unit(u32::MAX), 1.0 - 0.5_f32.powi(24));
-        assert!((0..u32::MAX - 512).step_by(4099).all(|word| unit(word) < unit(word + 512)));
+    fn uniform_numbers_stay_inside_and_keep_order() {
+        assert_eq!(unit_uniform(0), 0.5_f32.powi(24));
+        assert_eq!(unit_uniform(u32::MAX), 1.0 - 0.5_f32.powi(24));
+        assert!((0..u32::MAX - 512).step_by(4099).all(|word| unit_uniform(word) < unit_uniform(word + 512)));
         assert!(
-            (0..=u32::MAX).step_by(4099).all(|w| (f64::from(unit(w)) - f64::from(w) / 2f64.powi(32)).abs() < 1.2e-7)
+            (0..=u32::MAX)
+                .step_by(4099)
+                .all(|w| (f64::from(unit_uniform(w)) - f64::from(w) / 2f64.powi(32)).abs() < 1.2e-7)
         );
     }
 

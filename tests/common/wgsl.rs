@@ -101,6 +101,8 @@ pub fn float_operations(module: &Module, info: &ModuleInfo) -> FloatOperations {
                     found.forbidden.push(format!("{name}: remainder of floats"));
                 }
                 Expression::Math { fun: MathFunction::Abs, .. } => {}
+                // Of integers, in which devices do not differ.
+                Expression::Math { fun: MathFunction::CountLeadingZeros, .. } => {}
                 Expression::Math { .. } | Expression::Derivative { .. } | Expression::Relational { .. } => {
                     found.forbidden.push(format!("{name}: {expression:?}"));
                 }
