@@ -84,17 +84,13 @@ impl Quantity {
     pub fn parameter(self, options: &ParameterizationOptions) -> Parameter {
         let (name, unit, lower, lower_excluded, upper) = match self {
             Quantity::TargetSpeed => ("v_target_mps", "m/s", Some(0.0), false, None),
-            Quantity::LateralSpeed => {
-                ("lateral_speed_mps", "m/s", Some(options.least_lateral_speed_mps), false, None)
-            }
+            Quantity::LateralSpeed => ("lateral_speed_mps", "m/s", Some(options.least_lateral_speed_mps), false, None),
             Quantity::EgoSpeed => ("v_ego_mps", "m/s", Some(0.0), false, None),
             Quantity::TargetAcceleration => ("acceleration_target_mps2", "m/s²", None, false, None),
             Quantity::LeadSpeed => ("v_lead_mps", "m/s", Some(0.0), false, None),
             Quantity::LeadAcceleration => ("acceleration_lead_mps2", "m/s²", None, false, None),
             Quantity::LeadGap => ("gap_lead_m", "m", Some(0.0), false, None),
-            Quantity::Duration => {
-                ("duration_s", "s", Some(LEAST_DURATION_S), false, Some(LONGEST_DURATION_S))
-            }
+            Quantity::Duration => ("duration_s", "s", Some(LEAST_DURATION_S), false, Some(LONGEST_DURATION_S)),
             Quantity::InitialSpeed => ("v0_mps", "m/s", Some(0.0), false, None),
             Quantity::FinalSpeed => ("v1_mps", "m/s", Some(0.0), false, None),
             Quantity::MeanDeceleration => ("mean_deceleration_mps2", "m/s²", Some(0.0), true, None),
