@@ -8,6 +8,7 @@
 mod bandwidth;
 mod constrained;
 mod exposure;
+mod exposure_file;
 mod json_rows;
 mod kde;
 mod mixture;
@@ -24,6 +25,7 @@ mod valid;
 pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd, silverman};
 pub use constrained::ConstrainedKde;
 pub use exposure::{Driven, Exposure, Rate, garwood};
+pub use exposure_file::ExposureFile;
 pub use kde::Kde;
 pub use mixture::Mixture;
 pub use model::{DataFacts, DensityModel, FitOptions, Fitted, Provenance};
