@@ -8,12 +8,14 @@ use super::console::Verbosity;
 use super::source::{self, Source};
 use super::{Exit, console};
 use crate::Result;
+use crate::density::{Driven, ExposureFile};
 use crate::scenario::{write_scenarios, write_scenarios_to};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
 /// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with
-/// its series; `study --scenarios FILE` reads it.
+/// its series; `study --scenarios FILE` reads it. How long and how far the recordings' vehicles drove is written
+/// beside it (FILE with the ending .exposure.json), so that `fit --scenarios FILE` can tell events per hour.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings -o scenarios.jsonl")]
 pub struct Mine {
@@ -37,7 +39,8 @@ impl Mine {
             source::refuse_recording(path, &self.dir, "--output")?;
         }
         let options = source::mining_options(self.mining.as_deref())?;
-        let mut collection = Source::Folder(self.dir.clone()).load(&options, verbosity)?;
+        let from = Source::Folder(self.dir.clone());
+        let mut collection = from.load(&options, verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
@@ -45,6 +48,11 @@ impl Mine {
         match &self.output {
             Some(path) => {
                 write_scenarios(path, &collection.scenarios)?;
+                if let Some(driven) = Driven::of(&collection) {
+                    let scenarios_sha256 = source::checksum(path)?;
+                    let (data, synthetic) = (from.describe(), from.is_synthetic());
+                    ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
+                }
                 tracing::info!("{} scenarios written to {}", collection.scenarios.len(), path.display());
             }
             None => {

@@ -8,6 +8,7 @@ mod console;
 mod devices;
 mod environment;
 mod exit;
+mod fit;
 mod mine;
 mod simulate;
 mod source;
@@ -72,6 +73,7 @@ impl Common {
 enum Verb {
     Study(study::Study),
     Mine(mine::Mine),
+    Fit(fit::Fit),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
@@ -147,6 +149,7 @@ fn run(cli: &Cli) -> Result<Exit> {
     match &cli.verb {
         Verb::Study(verb) => verb.run(cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(cli.common.verbosity()),
+        Verb::Fit(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use sha2::{Digest, Sha256};
+
 use super::console::{self, Verbosity};
 use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
 use crate::scenario::{Category, Scenario, read_scenarios};
@@ -80,6 +82,29 @@ pub fn counts(scenarios: &[Scenario]) -> String {
         format!("{} {} found, {} kept", category.label(), count.found, count.kept)
     };
     Category::ALL.map(part).join("; ")
+}
+
+/// The categories of a flag, in the order of every table; all where none is given.
+pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
+    if list.is_empty() {
+        return Ok(Category::ALL.to_vec());
+    }
+    let parse = |text: &String| {
+        Category::parse(text.trim()).ok_or_else(|| {
+            let problem = format!("there is no category `{text}`");
+            Error::usage(Place::item(flag), problem, "use cut-in, cut-out, lvd")
+        })
+    };
+    let mut list = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    list.sort();
+    list.dedup();
+    Ok(list)
+}
+
+/// SHA-256 of a file, in hexadecimal.
+pub fn checksum(path: &Path) -> Result<String> {
+    let content = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    Ok(crate::sweep::hex(&Sha256::digest(content)))
 }
 
 /// Mining options from a TOML file, or the paper's.

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
@@ -77,14 +76,14 @@ pub struct Study {
 /// The study file.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct StudyConfig {
-    mining: MiningOptions,
-    parameterization: ParameterizationOptions,
-    score: ScoreOptions,
+pub(super) struct StudyConfig {
+    pub mining: MiningOptions,
+    pub parameterization: ParameterizationOptions,
+    pub score: ScoreOptions,
 }
 
 impl StudyConfig {
-    fn read(path: Option<&Path>) -> Result<StudyConfig> {
+    pub fn read(path: Option<&Path>) -> Result<StudyConfig> {
         let config: StudyConfig = path.map_or(Ok(StudyConfig::default()), source::read_toml)?;
         config.mining.validate()?;
         config.parameterization.validate()?;
@@ -159,7 +158,7 @@ impl Study {
                 device_s: swept.device_s,
             },
             plan_sha256: planned.plan.hash().to_owned(),
-            scenario_file_sha256: self.scenarios.as_deref().map(checksum).transpose()?,
+            scenario_file_sha256: self.scenarios.as_deref().map(source::checksum).transpose()?,
             left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
             recordings: collection.recordings,
             categories,
@@ -189,19 +188,7 @@ impl Study {
     }
 
     fn categories(&self) -> Result<Vec<Category>> {
-        if self.categories.is_empty() {
-            return Ok(Category::ALL.to_vec());
-        }
-        let parse = |text: &String| {
-            Category::parse(text.trim()).ok_or_else(|| {
-                let problem = format!("there is no category `{text}`");
-                Error::usage(Place::item("--categories"), problem, "use cut-in, cut-out, lvd")
-            })
-        };
-        let mut list = self.categories.iter().map(parse).collect::<Result<Vec<_>>>()?;
-        list.sort();
-        list.dedup();
-        Ok(list)
+        source::categories(&self.categories, "--categories")
     }
 }
 
@@ -292,9 +279,4 @@ fn category_records(
         }
     };
     plan.blocks.iter().map(record).collect()
-}
-
-fn checksum(path: &Path) -> Result<String> {
-    let content = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-    Ok(crate::sweep::hex(&Sha256::digest(content)))
 }

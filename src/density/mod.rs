@@ -1,8 +1,39 @@
 //! Densities over scenario parameters.
 //!
-//! Here live the Gaussian mixture that every density and every proposal is, kernel density estimation and the
-//! density file. Here lives nothing about lanes.
+//! Here live the spaces that points of scenarios lie in, kernel density estimation and the Gaussian mixture that
+//! every density and every proposal is, the share of a density that is physically valid, exposure,
+//! representativeness, and the density file. Here lives nothing about lanes. Scenarios come from
+//! [`crate::mining`] or a scenario file; points go to cases through [`crate::parameterization`].
 
+mod bandwidth;
+mod constrained;
+mod exposure;
+mod exposure_file;
+mod json_rows;
+mod kde;
 mod mixture;
+mod model;
+mod model_file;
+mod normal;
+mod parameters;
+mod quantity;
+mod representativeness;
+mod scaling;
+mod transport;
+mod valid;
 
+pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd, silverman};
+pub use constrained::ConstrainedKde;
+pub use exposure::{Driven, Exposure, Rate, garwood};
+pub use exposure_file::ExposureFile;
+pub use kde::Kde;
 pub use mixture::Mixture;
+pub use model::{DataFacts, DensityModel, FitOptions, Fitted, Provenance};
+pub use model_file::{LARGEST_FILE_BYTES, read_density, write_density};
+pub use normal::{normal_cdf, normal_density, normal_quantile};
+pub use parameters::{Invalid, ParameterSpace};
+pub use quantity::{LONGEST_DURATION_S, Parameter, Quantity};
+pub use representativeness::{BETA, LARGEST_SET, REPETITIONS, Representativeness, metric};
+pub use scaling::{quantile, scale_of, standard_deviation};
+pub use transport::wasserstein;
+pub use valid::{VALID_SHARE_DRAWS, VALID_SHARE_PURPOSE, ValidShare};

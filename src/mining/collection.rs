@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::miner::{CategoryCount, Mined, mine};
 use super::options::MiningOptions;
 use crate::scenario::{Category, Scenario};
-use crate::trajectory::Recording;
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::highd::{self, FileChecksum};
+use crate::trajectory::{EgoView, Recording};
 use crate::{Error, Result};
 
 /// What one recording gave.
@@ -25,6 +25,10 @@ pub struct RecordingSummary {
     pub samples: u64,
     /// Ego-centric data sets.
     pub data_sets: u64,
+    /// Time that all egos together drive in their data sets, s.
+    pub driven_s: f64,
+    /// Way that they drive in them, m.
+    pub driven_m: f64,
     /// Samples per second.
     pub frame_rate_hz: f64,
     /// Its files with their content's SHA-256; empty for generated recordings.
@@ -81,7 +85,7 @@ pub fn mine_folder(dir: &Path, options: &MiningOptions, done: impl Fn() + Sync) 
         .map(|files| {
             let part = highd::read(files).map(|loaded| {
                 let mined = mine(&loaded.recording, options);
-                let summary = summary(&loaded.recording, &mined, loaded.checksum_sha256);
+                let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
                 Part { mined, summary, notes: loaded.notes }
             });
             done();
@@ -114,7 +118,7 @@ pub fn mine_generated(
         .map(|index| {
             let recording = generate_one(generator, index)?;
             let mined = mine(&recording, options);
-            let summary = summary(&recording, &mined, Vec::new());
+            let summary = summary(&recording, &mined, options, Vec::new());
             done();
             Ok(Part { mined, summary, notes: Vec::new() })
         })
@@ -126,13 +130,33 @@ pub fn mine_generated(
     Ok(collection)
 }
 
-fn summary(recording: &Recording, mined: &Mined, files: Vec<FileChecksum>) -> RecordingSummary {
+fn summary(
+    recording: &Recording,
+    mined: &Mined,
+    options: &MiningOptions,
+    files: Vec<FileChecksum>,
+) -> RecordingSummary {
+    let [driven_s, driven_m] = driven(recording, options);
     RecordingSummary {
         id: recording.id.clone(),
         vehicles: recording.tracks.len() as u64,
         samples: recording.tracks.iter().map(|t| t.len() as u64).sum(),
         data_sets: mined.data_sets,
+        driven_s,
+        driven_m,
         frame_rate_hz: recording.frame_rate_hz,
         files,
     }
+}
+
+/// Time and way of all ego data sets, from each ego's first sample to its last with tags: the exposure in which
+/// scenarios were looked for.
+fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (index, ego) in recording.tracks.iter().enumerate() {
+        let Some(view) = EgoView::of(recording, index, &options.ego_view) else { continue };
+        sum[0] += view.last_sample() as f64 / recording.frame_rate_hz;
+        sum[1] += ego.s_m[view.last_sample()] - ego.s_m[0];
+    }
+    sum
 }

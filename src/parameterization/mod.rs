@@ -13,13 +13,18 @@ mod options;
 mod recorded;
 mod reduction;
 mod series;
+mod sizes;
 mod svd;
 
+pub use cut_in::CutInParameters;
+pub use cut_out::CutOutParameters;
+pub use lvd::LvdParameters;
 pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };
 pub use recorded::recorded_case;
-pub use reduction::{ReducedScenario, Reduction};
+pub use reduction::{LEAST_DURATION_S, ReducedScenario, Reduction};
+pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
 use crate::scenario::{Case, Category, Scenario};
@@ -98,10 +103,11 @@ impl ParameterizationId {
         if self.kind != Kind::Kinematic || scenario.category != self.category {
             return Err(Error::Internal(format!("{} is no kinematic parameterization of {}", self.key, scenario.id)));
         }
+        let sizes = Sizes::of(scenario);
         match self.category {
-            Category::CutIn => cut_in::case(self.key, scenario, options),
-            Category::CutOut => cut_out::case(self.key, scenario, options),
-            Category::Lvd => lvd::case(self.key, scenario, dt_s, options),
+            Category::CutIn => CutInParameters::of(scenario, options).case(self.key, &sizes, options),
+            Category::CutOut => CutOutParameters::of(scenario, options)?.case(self.key, &sizes, options),
+            Category::Lvd => LvdParameters::of(scenario).case(self.key, &sizes, dt_s, options),
         }
     }
 }
@@ -116,4 +122,15 @@ pub(crate) fn vehicle_ahead(scenario: &Scenario) -> Result<(&crate::scenario::Ot
             "give `lead` with its series and `D`, or leave this scenario out (`kept: false`)",
         )),
     }
+}
+
+/// The size of the vehicle ahead, which the case of a cut-out cannot do without.
+fn lead_size(sizes: &Sizes) -> Result<VehicleSize> {
+    sizes.lead.ok_or_else(|| {
+        Error::input(
+            Place::item("sizes"),
+            "a cut-out needs the size of the vehicle ahead of the cutting-out one",
+            "give the length and width of `lead`",
+        )
+    })
 }

@@ -4,12 +4,12 @@
 use super::options::{ParameterizationOptions, SvdLateral};
 use super::series::{at, lateral_on_grid, speed_on_grid};
 use super::svd::{SvdBasis, fit_svd};
-use super::{Kind, ParameterizationId, vehicle_ahead};
+use super::{Kind, ParameterizationId, Sizes, lead_size, vehicle_ahead};
 use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario};
 use crate::{Error, Result};
 
 /// Shortest duration of a reconstruction, s.
-const LEAST_DURATION_S: f64 = 0.1;
+pub const LEAST_DURATION_S: f64 = 0.1;
 
 /// A decomposition of one category's scenarios.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,11 +54,77 @@ impl Reduction {
         Ok(Reduction { category, basis, options: options.clone() })
     }
 
+    /// A decomposition that was fitted before, as a density file holds it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where lengths do not fit the category and the number of instants, or a number is not
+    /// finite or a weight not above 0.
+    pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
+        let extras = match category {
+            Category::CutIn => 2,
+            Category::CutOut => 3,
+            Category::Lvd => 1,
+        };
+        let p = series_count(category) * options.svd_instants + extras;
+        let wrong = |problem: String| Err(Error::input(crate::Place::item("basis"), problem, "fit it again"));
+        let lengths = [basis.weights.len(), basis.mean.len()].into_iter().chain(basis.directions.iter().map(Vec::len));
+        if let Some(other) = lengths.into_iter().find(|&length| length != p) {
+            return wrong(format!("a row of {other} numbers, where {} has {p}", category.label()));
+        }
+        let mut numbers = basis.mean.iter().chain(basis.directions.iter().flatten()).chain(&basis.singular_values);
+        if numbers.any(|v| !v.is_finite()) || basis.weights.iter().any(|w| !(w.is_finite() && *w > 0.0)) {
+            return wrong("a number is not finite or a weight is not above 0".to_owned());
+        }
+        Ok(Reduction { category, basis, options: options.clone() })
+    }
+
+    /// A mined scenario as the vector z: series at n_t equidistant points over [0, T], then the extras.
+    pub fn vector(&self, scenario: &Scenario) -> Result<Vec<f64>> {
+        vector(scenario, &self.options)
+    }
+
+    /// The first `d` coefficients of a mined scenario.
+    pub fn coefficients(&self, scenario: &Scenario, d: usize) -> Result<Vec<f64>> {
+        Ok(self.basis.coefficients(&vector(scenario, &self.options)?, d))
+    }
+
     /// The scenario rebuilt from its first `d` coefficients.
     pub fn reduce(&self, scenario: &Scenario, d: usize) -> Result<ReducedScenario> {
-        let z = vector(scenario, &self.options)?;
-        let rebuilt = self.basis.reconstruct(&self.basis.coefficients(&z, d));
-        Ok(self.scenario_of(&rebuilt, scenario.side.sign()))
+        Ok(self.rebuild(&self.coefficients(scenario, d)?, scenario.side.sign()))
+    }
+
+    /// The scenario that belongs to coefficients. `side` is 1 for the left and −1 for the right: with
+    /// [`SvdLateral::Signed`] the lateral series is left-positive and is multiplied by it.
+    pub fn rebuild(&self, coefficients: &[f64], side: f64) -> ReducedScenario {
+        self.scenario_of(&self.basis.reconstruct(coefficients), side)
+    }
+
+    /// One column of the reconstruction from coefficients, in its unit and before any clamping; the same bits
+    /// as [`SvdBasis::reconstruct`] gives.
+    pub fn rebuilt_column(&self, coefficients: &[f64], column: usize) -> f64 {
+        let mut weighted = self.basis.mean[column];
+        for (c, direction) in coefficients.iter().zip(&self.basis.directions) {
+            weighted += c * direction[column];
+        }
+        weighted / self.basis.weights[column]
+    }
+
+    /// Column of T, the last one.
+    pub fn duration_column(&self) -> usize {
+        self.basis.mean.len() - 1
+    }
+
+    /// Column of the ego's initial speed; in LVD the leader's.
+    pub fn ego_speed_column(&self) -> usize {
+        match self.category {
+            Category::CutIn | Category::CutOut => series_count(self.category) * self.options.svd_instants,
+            Category::Lvd => 0,
+        }
+    }
+
+    /// Column of the gap D between the cutting-out vehicle and the one ahead.
+    pub fn lead_gap_column(&self) -> Option<usize> {
+        (self.category == Category::CutOut).then(|| self.ego_speed_column() + 1)
     }
 
     /// Vector → scenario: mirrored back and brought into the physical range.
@@ -98,7 +164,14 @@ impl Reduction {
 
     /// The case of a scenario under `d` coefficients. Sizes stay those of the scenario.
     pub fn case(&self, scenario: &Scenario, d: usize, dt_s: f64) -> Result<Case> {
-        let reduced = self.reduce(scenario, d)?;
+        self.case_of(&self.reduce(scenario, d)?, &Sizes::of(scenario), dt_s)
+    }
+
+    /// The case of a rebuilt scenario on a time grid.
+    ///
+    /// # Errors
+    /// For a cut-out without the size of the vehicle ahead.
+    pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, dt_s: f64) -> Result<Case> {
         let duration_s = reduced.duration_s;
         let fps = (self.options.svd_instants - 1) as f64 / duration_s;
         let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, dt_s);
@@ -109,10 +182,10 @@ impl Reduction {
             Lateral::Sampled { position_m, towards_mps }
         };
         let ahead = if self.category == Category::CutOut {
-            let (lead, _) = vehicle_ahead(scenario)?;
+            let lead = lead_size(sizes)?;
             let vehicle = Participant {
-                length_m: lead.length,
-                width_m: lead.width,
+                length_m: lead.length_m,
+                width_m: lead.width_m,
                 speed: speed(&reduced.v_lead),
                 lateral: Lateral::Centred,
             };
@@ -120,15 +193,14 @@ impl Reduction {
         } else {
             None
         };
-        let target = &scenario.target;
         Ok(Case {
             category: self.category,
-            ego_length_m: scenario.ego.length,
-            ego_width_m: scenario.ego.width,
+            ego_length_m: sizes.ego.length_m,
+            ego_width_m: sizes.ego.width_m,
             ego_speed_mps: reduced.v_ego,
             principal: Participant {
-                length_m: target.length,
-                width_m: target.width,
+                length_m: sizes.target.length_m,
+                width_m: sizes.target.width_m,
                 speed: speed(&reduced.v),
                 lateral,
             },

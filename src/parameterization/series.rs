@@ -60,16 +60,25 @@ pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> 
     speed.max(options.least_lateral_speed_mps)
 }
 
-/// Constant acceleration (v(T) − v(0))/T of a vehicle, with the option's end.
-pub fn accelerated(other: &Other, duration_s: f64, options: &ParameterizationOptions) -> Speed {
+/// (v(T) − v(0))/T of a vehicle, m/s²; 0 where T is 0.
+pub fn mean_acceleration(other: &Other, duration_s: f64) -> f64 {
     let (first, last) = (other.v[0], other.v[other.v.len() - 1]);
-    let acceleration_mps2 = if duration_s > 0.0 { (last - first) / duration_s } else { 0.0 };
+    if duration_s > 0.0 { (last - first) / duration_s } else { 0.0 }
+}
+
+/// A speed with constant acceleration from t = 0, with the option's end.
+pub fn accelerated(
+    initial_mps: f64,
+    acceleration_mps2: f64,
+    duration_s: f64,
+    options: &ParameterizationOptions,
+) -> Speed {
     let until_s = match options.after_duration {
         AfterDuration::Hold => duration_s,
         // Longer than any run.
         AfterDuration::Unlimited => 1e6,
     };
-    Speed::Kinematic { initial_mps: first, acceleration_mps2, until_s }
+    Speed::Kinematic { initial_mps, acceleration_mps2, until_s }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! [`crate::score`]; text and files go to the user.
 
 pub mod csv;
+pub mod density;
 pub mod files;
 pub mod lanes;
 pub mod radar;

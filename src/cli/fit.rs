@@ -1,0 +1,274 @@
+//! `lanesweep fit`: scenarios in, densities of their parameters out.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use sha2::{Digest, Sha256};
+
+use super::Exit;
+use super::console::{self, Verbosity};
+use super::source::{self, Source};
+use super::study::StudyConfig;
+use super::synth::GeneratorFlags;
+use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use crate::mining::Collection;
+use crate::parameterization::ParameterizationId;
+use crate::report::{density, files::make_folder};
+use crate::scenario::{Category, write_scenarios_to};
+use crate::{Error, Place, Result};
+
+/// How are the parameters of scenarios distributed?
+///
+/// Fits a kernel density to the kept scenarios of each category under each parameterization, counts which share
+/// of it is physically possible, tells how often such scenarios occur and how well drawn ones stand for unseen
+/// real ones. One density file per parameterization is written. Without data it runs on synthetic recordings of
+/// its own. Tables go to stdout, files to --out.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
+                        scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterization 2 \
+                        --with-thw --out cut-in-2.json")]
+pub struct Fit {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    dir: Option<PathBuf>,
+    /// Scenario file (JSON Lines) instead of recordings
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Folder for density files, or one file (.json) where one density is fitted
+    #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities")]
+    out: PathBuf,
+    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    category: Vec<String>,
+    /// Parameterizations, separated by commas: 1…7, a…g, i…v, or all [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    parameterization: Vec<String>,
+    /// Make the observed time headway one more parameter (thw_s)
+    #[arg(long)]
+    with_thw: bool,
+    /// Interval that the bandwidth is searched in
+    #[arg(long, value_enum, default_value_t)]
+    bandwidth_rule: RuleFlag,
+    /// Seed of P_valid and of the splits for M
+    #[arg(long, value_name = "N", default_value_t = FitOptions::default().seed)]
+    seed: u64,
+    /// Draws that P_valid is counted on
+    #[arg(long, value_name = "N", default_value_t = FitOptions::default().valid_draws)]
+    valid_draws: u64,
+    /// Do not compare drawn with unseen scenarios
+    #[arg(long)]
+    no_comparison: bool,
+    /// Hours driven for the scenarios, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "H")]
+    hours: Option<f64>,
+    /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "KM")]
+    km: Option<f64>,
+    /// Study options (TOML): tables `mining`, `parameterization`
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+/// [`BandwidthRule`] as a flag.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+enum RuleFlag {
+    /// From 0.2 times Silverman's to Silverman's, as with the reduction of scenarios
+    #[default]
+    Reduction,
+    /// From 0.2 to 5 times Silverman's, up to 1 at least
+    Wide,
+}
+
+impl Fit {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let config = StudyConfig::read(self.config.as_deref())?;
+        let ids = self.ids()?;
+        let typed = Driven { hours: self.hours, kilometres: self.km };
+        typed.validate()?;
+        let options = FitOptions {
+            parameterization: config.parameterization.clone(),
+            with_thw: self.with_thw,
+            rule: match self.bandwidth_rule {
+                RuleFlag::Reduction => BandwidthRule::Reduction,
+                RuleFlag::Wide => BandwidthRule::Wide,
+            },
+            valid_draws: self.valid_draws,
+            seed: self.seed,
+            representativeness: !self.no_comparison,
+        };
+        if self.valid_draws == 0 {
+            return Err(Error::usage(
+                Place::item("--valid-draws"),
+                "0 draws count nothing",
+                "give 100000, for instance",
+            ));
+        }
+        let source = match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(self.generator.options()?),
+        };
+        let files = self.files(&ids)?;
+        tracing::info!("{}", source.describe());
+        let collection = source.load(&config.mining, verbosity)?;
+        tracing::info!("{}", source::counts(&collection.scenarios));
+        let facts = self.facts(&source, &collection, typed)?;
+        if facts.driven.is_none() {
+            tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
+        }
+
+        let bar = console::progress(verbosity, ids.len() as u64, "fitting");
+        let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
+        let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
+        for (id, file) in ids.iter().zip(files) {
+            let result = DensityModel::fit(*id, &collection.scenarios, &facts, &options);
+            bar.inc(1);
+            let result = match result {
+                Ok(result) => result,
+                Err(error @ Error::Input { .. }) => {
+                    failed.push(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            for error in result.left_out.iter().chain(&result.not_compared) {
+                bar.suspend(|| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
+            }
+            complete &= result.left_out.is_empty();
+            fitted.push((file, result.model));
+        }
+        bar.finish_and_clear();
+        if fitted.is_empty() && !failed.is_empty() {
+            return Err(failed.swap_remove(0));
+        }
+        for error in &failed {
+            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
+        }
+        self.write(&fitted)?;
+        console::print(&text(&facts, &fitted))?;
+        tracing::info!("{} density files written to {}", fitted.len(), self.out.display());
+        Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
+    }
+
+    /// What is fitted, in the registry's order.
+    fn ids(&self) -> Result<Vec<ParameterizationId>> {
+        let categories = source::categories(&self.category, "--category")?;
+        let of_categories = || ParameterizationId::ALL.into_iter().filter(|p| categories.contains(&p.category));
+        let wanted: Vec<&str> = self.parameterization.iter().map(|key| key.trim()).collect();
+        if wanted.is_empty() || wanted.contains(&"all") {
+            return Ok(of_categories().collect());
+        }
+        if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
+            let of = |c: &Category| {
+                let keys: Vec<&str> = ParameterizationId::of(*c).map(|p| p.key).collect();
+                format!("{}: {}", c.label(), keys.join(" "))
+            };
+            let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
+            return Err(Error::usage(
+                Place::item("--parameterization"),
+                format!("there is no parameterization `{unknown}` of {}", names.join(", ")),
+                format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
+            ));
+        }
+        Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
+    }
+
+    /// One file per density, none of them an input.
+    fn files(&self, ids: &[ParameterizationId]) -> Result<Vec<PathBuf>> {
+        let single = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        if single && ids.len() != 1 {
+            return Err(Error::usage(
+                Place::item("--out"),
+                format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len()),
+                "give a folder, or choose one with --parameterization",
+            ));
+        }
+        let name = |id: &ParameterizationId| match single {
+            true => self.out.clone(),
+            false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
+        };
+        let files: Vec<PathBuf> = ids.iter().map(name).collect();
+        let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(&self.config).cloned().collect();
+        inputs.extend(self.scenarios.as_deref().map(ExposureFile::path_of));
+        for file in &files {
+            source::refuse_overwriting(file, &inputs, "--out")?;
+        }
+        Ok(files)
+    }
+
+    /// Label, checksum and exposure of the data.
+    fn facts(&self, source: &Source, collection: &Collection, typed: Driven) -> Result<DataFacts> {
+        let scenarios_sha256 = match source {
+            Source::Scenarios(path) => source::checksum(path)?,
+            Source::Folder(_) | Source::Generated(_) => {
+                // That of the file that `mine` would write: the same scenarios have the same checksum.
+                let mut digest = Hashing(Sha256::new());
+                write_scenarios_to(&mut digest, &collection.scenarios)?;
+                crate::sweep::hex(&digest.0.finalize())
+            }
+        };
+        let mut facts = DataFacts {
+            data: source.describe(),
+            synthetic: source.is_synthetic(),
+            scenarios_sha256,
+            driven: Driven::of(collection),
+        };
+        if let Source::Scenarios(path) = source
+            && let Some(beside) = ExposureFile::read_beside(path, &facts.scenarios_sha256)?
+        {
+            facts.driven = Some(beside.driven);
+            facts.synthetic = beside.synthetic;
+            if beside.synthetic {
+                facts.data = beside.data;
+            }
+        }
+        if typed.hours.is_some() || typed.kilometres.is_some() {
+            // What was typed counts; hours typed for one set do not mix with kilometres of another.
+            facts.driven = Some(typed);
+        }
+        Ok(facts)
+    }
+
+    fn write(&self, fitted: &[(PathBuf, DensityModel)]) -> Result<()> {
+        for (path, model) in fitted {
+            if let Some(dir) = path.parent().filter(|dir| *dir != Path::new("")) {
+                make_folder(dir)?;
+            }
+            write_density(path, model)?;
+        }
+        Ok(())
+    }
+}
+
+fn text(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> String {
+    let mut text = format!("{}\n\n", facts.data);
+    for (path, model) in fitted {
+        text.push_str(&density::text(model));
+        text.push_str(&format!("file       {}\n\n", path.display()));
+    }
+    if fitted.len() > 1 {
+        let models: Vec<&DensityModel> = fitted.iter().map(|(_, model)| model).collect();
+        text.push_str(&density::summary(&models));
+    }
+    if facts.synthetic {
+        text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
+    }
+    text
+}
+
+/// A writer that keeps nothing but a checksum.
+struct Hashing(Sha256);
+
+impl Write for Hashing {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

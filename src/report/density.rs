@@ -1,0 +1,135 @@
+//! Densities as terminal tables.
+
+use std::fmt::Write;
+
+use super::tables::{aligned, table};
+use crate::density::{DensityModel, Exposure, Rate, Representativeness, SearchEnd, standard_deviation};
+
+/// Everything of one density but its kernels.
+pub fn text(model: &DensityModel) -> String {
+    let id = model.space.id();
+    let provenance = &model.provenance;
+    let mut text = format!(
+        "{} {} ({}): density over {} scenarios; {} found, {} kept, {} left out\n",
+        id.category.label(),
+        id.key,
+        id.description,
+        model.kde.points().len(),
+        provenance.found,
+        provenance.kept,
+        provenance.left_out
+    );
+    let header = ["parameter", "unit", "mean", "deviation", "scale", "kernel", "valid"];
+    let mut parameters = table(header.map(str::to_owned).to_vec());
+    for (j, parameter) in model.space.parameters().iter().enumerate() {
+        let values: Vec<f64> = model.kde.points().iter().map(|p| p[j]).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let numbers = [mean, standard_deviation(&values), model.kde.scale()[j], model.kde.spread()[j]];
+        let mut row = vec![parameter.name.clone(), parameter.unit.clone()];
+        row.extend(numbers.map(short));
+        row.push(parameter.bounds_text());
+        parameters.add_row(row);
+    }
+    text.push_str(&aligned(parameters, 2));
+    let bandwidth = model.kde.bandwidth();
+    let end = match bandwidth.end {
+        SearchEnd::Inside => "",
+        SearchEnd::Lower => "; the search ended at the rule's lower end",
+        SearchEnd::Upper => "; the search ended at the rule's upper end",
+    };
+    let _ = writeln!(
+        text,
+        "bandwidth  {} (rule `{}`; Silverman's {}){end}",
+        short(bandwidth.value),
+        bandwidth.rule.key(),
+        short(bandwidth.silverman)
+    );
+    let valid = &model.valid;
+    let _ = writeln!(
+        text,
+        "P_valid    {:.4} [{:.4}, {:.4}], {} of {} draws, seed {}",
+        valid.estimate, valid.low, valid.high, valid.valid, valid.draws, valid.seed
+    );
+    let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
+    if let Some(representativeness) = &model.representativeness {
+        text.push_str(&compared(representativeness));
+    }
+    text
+}
+
+const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";
+
+fn exposure(exposure: &Exposure) -> String {
+    let mut parts = vec![format!("{} events", exposure.events)];
+    let mut rate = |rate: &Option<Rate>, driven: Option<f64>, unit: &str| {
+        if let (Some(rate), Some(driven)) = (rate, driven) {
+            parts.push(format!(
+                "in {} {unit}: {} per {unit} ± {} (√n), [{}, {}] exact",
+                short(driven),
+                short(rate.estimate),
+                short(rate.standard_deviation),
+                short(rate.low),
+                short(rate.high)
+            ));
+        }
+    };
+    rate(&exposure.per_hour, exposure.driven.hours, "h");
+    rate(&exposure.per_kilometre, exposure.driven.kilometres, "km");
+    parts.join("\n           ")
+}
+
+fn compared(r: &Representativeness) -> String {
+    format!(
+        "M          {} ± {} over {} splits of {} training and {} test scenarios, seed {}\n           W(gen, test) \
+         {}, W(gen, train) {}, W(train, test) {}\n",
+        short(r.metric),
+        short(r.metric_deviation),
+        r.repetitions,
+        r.train,
+        r.test,
+        r.seed,
+        short(r.generated_test),
+        short(r.generated_train),
+        short(r.train_test)
+    )
+}
+
+/// One row per density.
+pub fn summary(models: &[&DensityModel]) -> String {
+    let header = ["density", "parameters", "scenarios", "bandwidth", "P_valid", "M", "W(gen, test)", "W(train, test)"];
+    let mut rows = table(header.map(str::to_owned).to_vec());
+    for model in models {
+        let id = model.space.id();
+        let of = |value: fn(&Representativeness) -> f64| {
+            model.representativeness.as_ref().map_or("-".to_owned(), |r| short(value(r)))
+        };
+        rows.add_row([
+            format!("{} {}", id.category.label(), id.key),
+            model.space.dimensions().to_string(),
+            model.kde.points().len().to_string(),
+            short(model.kde.bandwidth().value),
+            format!("{:.4}", model.valid.estimate),
+            of(|r| r.metric),
+            of(|r| r.generated_test),
+            of(|r| r.train_test),
+        ]);
+    }
+    format!(
+        "All densities. M and W compare SVD parameterizations of one category with each other; those of kinematic \
+         ones\nhave their own units each.\n{}",
+        aligned(rows, 1)
+    )
+}
+
+/// Four significant digits.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = 3 - (value.abs().log10().floor() as i32);
+    match digits {
+        ..=0 => format!("{value:.0}"),
+        1..=6 => format!("{value:.*}", digits as usize),
+        _ => format!("{value:.3e}"),
+    }
+}
