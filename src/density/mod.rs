@@ -1,17 +1,19 @@
 //! Densities over scenario parameters.
 //!
 //! Here live the spaces that points of scenarios lie in, kernel density estimation and the Gaussian mixture that
-//! every density and every proposal is, the share of a density that is physically valid, exposure,
+//! every density and every proposal is with its fit, the share of a density that is physically valid, exposure,
 //! representativeness, and the density file. Here lives nothing about lanes. Scenarios come from
 //! [`crate::mining`] or a scenario file; points go to cases through [`crate::parameterization`].
 
 mod bandwidth;
 mod constrained;
+pub(crate) mod covariance;
 mod exposure;
 mod exposure_file;
 mod json_rows;
 mod kde;
 mod mixture;
+mod mixture_fit;
 mod model;
 mod model_file;
 mod normal;
@@ -19,6 +21,7 @@ mod parameters;
 mod quantity;
 mod representativeness;
 mod scaling;
+pub(crate) mod standard_normal;
 mod transport;
 mod valid;
 
@@ -27,7 +30,8 @@ pub use constrained::ConstrainedKde;
 pub use exposure::{Driven, Exposure, Rate, garwood};
 pub use exposure_file::ExposureFile;
 pub use kde::Kde;
-pub use mixture::Mixture;
+pub use mixture::{MAX_DIMENSIONS, Mixture};
+pub use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DataFacts, DensityModel, FitOptions, Fitted, Provenance};
 pub use model_file::{LARGEST_FILE_BYTES, read_density, write_density};
 pub use normal::{normal_cdf, normal_density, normal_quantile};
