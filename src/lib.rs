@@ -19,6 +19,7 @@ pub mod parameterization;
 pub mod profile;
 pub mod random;
 pub mod report;
+pub mod sampling;
 pub mod scalar;
 pub mod scenario;
 pub mod score;

@@ -69,6 +69,9 @@ fn in_range(parameter: &str, value: f64, lower: f64, upper: f64) -> std::result:
 }
 
 impl ParameterSpace {
+    /// Range of a valid T, s.
+    pub const DURATION_RANGE_S: [f64; 2] = [LEAST_DURATION_S, LONGEST_DURATION_S];
+
     /// The space of a parameterization; `reduction` is needed for one by SVD and ignored else.
     ///
     /// # Errors

@@ -155,8 +155,7 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
     if let Some(bytes) = room(8 * samples * u64::from(template.lateral_stride), &inputs.lateral) {
         inputs.lateral = device.buffer("lateral motions", bytes, storage);
     }
-    let generation =
-        Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
+    let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
     device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
     let buffers = [
         &made.generation,
@@ -172,10 +171,7 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
     let entries: Vec<wgpu::BindGroupEntry> = buffers
         .iter()
         .enumerate()
-        .map(|(binding, buffer)| wgpu::BindGroupEntry {
-            binding: binding as u32,
-            resource: buffer.as_entire_binding(),
-        })
+        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: binding as u32, resource: buffer.as_entire_binding() })
         .collect();
     let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("generator"),

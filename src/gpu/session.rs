@@ -45,8 +45,7 @@ impl<'p> GpuSession<'p> {
     pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, first_lanes: u64) -> Result<Self> {
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
-        let tables: Tables<f32> =
-            if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
+        let tables: Tables<f32> = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
         let mut pipelines = Vec::new();
         for (block, resolved) in plan.blocks.iter().zip(&constants) {
             pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));

@@ -154,7 +154,7 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
 macro_rules! declare_attention {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::driver::ModelId::ALL).
-        pub(super) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
+        pub(crate) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
             [$(profile.$file.attention(profile.frame.dt_s, category)),+]
         }
     };

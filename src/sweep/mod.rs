@@ -31,6 +31,7 @@ pub use drivers::Constants;
 pub use frame::{Frame, Simulation, Start};
 pub use instructions::Instructions;
 pub use lane::{Observer, Silent, Step, run_lane};
+pub(crate) use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther};
 pub use lane_step::Seen;
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};

@@ -253,9 +253,8 @@ fn reduced_speed<R: Real>(
     motion: &mut Motion<R>,
     tables: &mut Tables<R>,
 ) {
-    let instants: Vec<R> = (0..recipe.columns.instants)
-        .map(|k| column::<R>(recipe, basis, point, first + k).larger(R::ZERO))
-        .collect();
+    let instants: Vec<R> =
+        (0..recipe.columns.instants).map(|k| column::<R>(recipe, basis, point, first + k).larger(R::ZERO)).collect();
     let count = entries(recipe, duration);
     let per_step = instants_per_step(recipe, duration);
     motion.kind |= SPEED_SAMPLED;
@@ -309,9 +308,9 @@ mod tests {
     #[test]
     fn the_polynomial_is_the_sine_of_the_specification() {
         let worst = |value: &dyn Fn(f64) -> f64| {
-            (0..=100_000).map(|k| f64::from(k) / 1e5).fold(0.0, |worst: f64, x| {
-                worst.max((value(x) - libm::sin(std::f64::consts::FRAC_PI_2 * x)).abs())
-            })
+            (0..=100_000)
+                .map(|k| f64::from(k) / 1e5)
+                .fold(0.0, |worst: f64, x| worst.max((value(x) - libm::sin(std::f64::consts::FRAC_PI_2 * x)).abs()))
         };
         let narrow = worst(&|x| f64::from(quarter_sine(x as f32)));
         let wide = worst(&quarter_sine::<f64>);
