@@ -2,7 +2,8 @@
 //!
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
-//! (the number a lane computes with), [`gpu`] (compute devices), [`conformance`] (other simulators' tables) and
+//! (the number a lane computes with), [`random`], [`density`] and
+//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables) and
 //! [`cli`].
 
 mod atomic_file;
@@ -13,6 +14,7 @@ pub mod density;
 #[macro_use]
 pub mod driver;
 pub mod error;
+pub mod estimate;
 pub mod gpu;
 pub mod mining;
 pub mod parameterization;

@@ -1,0 +1,38 @@
+//! Probabilities of rare failures from samples: estimators, their intervals, and what is to be believed of them.
+//!
+//! Here lives nothing about vehicles: a [`Density`] draws points as pure functions of an index, a [`LimitState`]
+//! gives each point a value that is ≤ 0 where it fails, and every estimator gives one [`Estimate`]. Points go to the
+//! limit state in batches, as it runs on vector hardware. The same seed gives the same bits on any number of
+//! threads and in any division of the indices.
+
+mod balance;
+mod blocks;
+mod cross_entropy;
+mod draws;
+mod importance;
+mod interval;
+mod monte_carlo;
+mod problem;
+mod stop;
+mod strata;
+mod subset;
+mod summary;
+mod trust;
+mod weights;
+
+pub use balance::{Technique, balance_heuristic};
+pub use blocks::{BLOCK, BlockSums, Join};
+pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
+pub use importance::{
+    Defended, FitProposal, Importance, PilotCheck, defended, from_pilot, from_weight_sums, importance, importance_sums,
+    worst_share,
+};
+pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
+pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
+pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
+pub use stop::{Checkpoints, StopReason, StopRule};
+pub use strata::{Stratum, stratified};
+pub use subset::{Subset, SubsetLevel, SubsetRun, subset};
+pub use summary::{Estimate, WeightFigures};
+pub use trust::{Trust, Verdict, Warning};
+pub use weights::{WeightSums, WeightedDraw};

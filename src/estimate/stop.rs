@@ -1,0 +1,143 @@
+//! When a sample is large enough. Rules are looked at after fixed numbers of samples only, so that how fast a machine
+//! is, and how many threads it has, cannot move the end.
+
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::blocks::BLOCK;
+
+/// Sample sizes at which the rules are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Checkpoints {
+    /// 4,096 · 2^k: few looks, so the interval suffers little from being looked at repeatedly.
+    Doubling,
+    /// Every so many samples, rounded up to blocks of 4,096.
+    Every(u64),
+}
+
+impl Checkpoints {
+    /// The first checkpoint after `samples`.
+    pub fn next(self, samples: u64) -> u64 {
+        match self {
+            Checkpoints::Doubling => {
+                let mut at = BLOCK;
+                while at <= samples && at < 1 << 62 {
+                    at *= 2;
+                }
+                at
+            }
+            Checkpoints::Every(step) => {
+                let step = step.max(1).div_ceil(BLOCK) * BLOCK;
+                (samples / step + 1) * step
+            }
+        }
+    }
+}
+
+/// When to end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StopRule {
+    /// Most samples, ≥ 1. Always a limit.
+    pub samples: u64,
+    /// End at the first checkpoint at which half the interval's width over the estimate is at most this, there
+    /// being at least [`StopRule::LEAST_FAILURES`] failures.
+    pub relative_half_width: Option<f64>,
+    /// End at the first checkpoint after this time. The result then depends on the machine and says so.
+    pub time_limit: Option<Duration>,
+    /// Where the rules are looked at.
+    pub checkpoints: Checkpoints,
+}
+
+/// What ended a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The number of samples asked for.
+    Samples,
+    /// The interval was narrow enough.
+    RelativeHalfWidth,
+    /// Time ran out: another machine would have ended elsewhere.
+    TimeLimit,
+}
+
+impl StopReason {
+    /// Whether the same call ends at the same sample everywhere.
+    pub fn is_reproducible(self) -> bool {
+        self != StopReason::TimeLimit
+    }
+}
+
+impl StopRule {
+    /// Failures before a narrow interval is believed: fewer make intervals narrow by luck.
+    pub const LEAST_FAILURES: u64 = 10;
+
+    /// So many samples and no other rule.
+    pub fn samples(samples: u64) -> StopRule {
+        StopRule { samples, relative_half_width: None, time_limit: None, checkpoints: Checkpoints::Doubling }
+    }
+
+    /// The sample size at which to look next.
+    pub(crate) fn next(&self, samples: u64) -> u64 {
+        if self.relative_half_width.is_none() && self.time_limit.is_none() {
+            return self.samples;
+        }
+        self.checkpoints.next(samples).min(self.samples)
+    }
+
+    /// Whether to end at this checkpoint.
+    pub(crate) fn at(
+        &self,
+        samples: u64,
+        failures: u64,
+        relative_half_width: f64,
+        started: Instant,
+    ) -> Option<StopReason> {
+        let is_narrow = self.relative_half_width.is_some_and(|goal| relative_half_width <= goal);
+        if is_narrow && failures >= Self::LEAST_FAILURES {
+            Some(StopReason::RelativeHalfWidth)
+        } else if samples >= self.samples {
+            Some(StopReason::Samples)
+        } else if self.time_limit.is_some_and(|limit| started.elapsed() >= limit) {
+            Some(StopReason::TimeLimit)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checkpoints_are_functions_of_the_sample_size_only() {
+        let mut at = 0;
+        let mut doubling = Vec::new();
+        for _ in 0..4 {
+            at = Checkpoints::Doubling.next(at);
+            doubling.push(at);
+        }
+        assert_eq!(doubling, [4096, 8192, 16_384, 32_768]);
+        assert_eq!(Checkpoints::Every(65_536).next(65_536), 131_072);
+        assert_eq!(Checkpoints::Every(5000).next(1), 8192);
+    }
+
+    #[test]
+    fn a_narrow_interval_of_few_failures_does_not_end_a_sample() {
+        let rule = StopRule { relative_half_width: Some(0.3), ..StopRule::samples(100_000) };
+        let now = Instant::now();
+        assert_eq!(rule.at(4096, 9, 0.1, now), None);
+        assert_eq!(rule.at(4096, 10, 0.3, now), Some(StopReason::RelativeHalfWidth));
+        assert_eq!(rule.at(100_000, 3, 9.0, now), Some(StopReason::Samples));
+    }
+
+    #[test]
+    fn a_time_limit_ends_at_a_checkpoint_and_is_not_reproducible() {
+        let rule = StopRule { time_limit: Some(Duration::ZERO), ..StopRule::samples(100_000) };
+        assert_eq!(rule.next(0), 4096);
+        let reason = rule.at(4096, 0, 9.0, Instant::now()).unwrap();
+        assert!(!reason.is_reproducible());
+    }
+}

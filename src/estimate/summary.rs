@@ -1,0 +1,113 @@
+//! The one result that every estimator gives.
+
+use serde::{Deserialize, Serialize};
+
+use super::interval::Interval;
+use super::stop::StopReason;
+use super::trust::Trust;
+
+/// A probability of failure with all that is known of its accuracy.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Estimator: `monte_carlo`, `stratified`, `importance`, `importance_self_normalised`, `cross_entropy`,
+    /// `subset`, `balance`.
+    pub method: String,
+    /// The estimate, in [0, 1].
+    pub probability: f64,
+    /// Interval for the probability.
+    pub interval: Interval,
+    /// Half the interval's width over the probability; ∞ at zero.
+    pub relative_half_width: f64,
+    /// Estimated variance of the probability.
+    pub variance: f64,
+    /// √variance over the probability; ∞ at zero.
+    pub coefficient_of_variation: f64,
+    /// Evaluations of the limit state, pilots and levels included.
+    pub runs: u64,
+    /// Failures in the sample that the estimate rests on (the last level's, the final sample's).
+    pub failures: u64,
+    /// Indices without a valid point.
+    pub voids: u64,
+    /// Variance of crude Monte Carlo with as many runs over this variance: P(1 − P)/(runs · variance).
+    pub variance_reduction: f64,
+    /// For weighted samples.
+    pub weights: Option<WeightFigures>,
+    /// What ended the sample.
+    pub stopped: StopReason,
+    /// What speaks against believing it.
+    pub trust: Trust,
+}
+
+/// What the weights of a sample say about it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WeightFigures {
+    /// Effective sample size (Σw)²/Σw².
+    pub effective_size: f64,
+    /// The same over the failures.
+    pub effective_size_failures: f64,
+    /// Largest weight over the sum of all.
+    pub largest_share: f64,
+    /// Largest failure's share of the estimate.
+    pub largest_share_failures: f64,
+    /// Mean weight, 1 in expectation.
+    pub mean_weight: f64,
+    /// Standard error of the mean weight.
+    pub mean_weight_error: f64,
+    /// Share of the estimate carried by failures where density over proposal exceeds
+    /// [`super::Warning::THIN_RATIO`].
+    pub thin_share: f64,
+    /// How many those failures are.
+    pub thin_failures: u64,
+    /// Σ over failures w / Σ w.
+    pub self_normalised: f64,
+    /// Its variance, by the delta method.
+    pub self_normalised_variance: f64,
+}
+
+impl Estimate {
+    /// Fills in what follows from the rest.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn new(
+        method: &str,
+        probability: f64,
+        variance: f64,
+        interval: Interval,
+        runs: u64,
+        failures: u64,
+        voids: u64,
+        stopped: StopReason,
+    ) -> Estimate {
+        let mut trust = Trust::default();
+        trust.about_failures(failures);
+        trust.warn_if(!stopped.is_reproducible(), super::Warning::NotReproducible);
+        let mut estimate = Estimate {
+            method: method.to_owned(),
+            probability,
+            interval,
+            relative_half_width: interval.relative_half_width(probability),
+            variance,
+            coefficient_of_variation: if probability > 0.0 { variance.sqrt() / probability } else { f64::INFINITY },
+            runs,
+            failures,
+            voids,
+            variance_reduction: f64::NAN,
+            weights: None,
+            stopped,
+            trust,
+        };
+        estimate.set_runs(runs);
+        estimate
+    }
+
+    /// Counts runs that were spent before the final sample too.
+    pub(crate) fn set_runs(&mut self, runs: u64) {
+        self.runs = runs;
+        let crude = self.probability * (1.0 - self.probability) / runs as f64;
+        self.variance_reduction = if self.variance > 0.0 { crude / self.variance } else { f64::NAN };
+    }
+
+    /// √variance.
+    pub fn standard_error(&self) -> f64 {
+        self.variance.sqrt()
+    }
+}

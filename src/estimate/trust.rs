@@ -1,0 +1,236 @@
+//! What speaks against believing an estimate. Each warning has one threshold, documented where it stands.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// One thing that is wrong, with the figure that shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "warning", rename_all = "snake_case")]
+pub enum Warning {
+    /// No failure in the sample: the probability is only bounded from above.
+    NoFailures,
+    /// Fewer than [`Warning::LEAST_FAILURES`] failures: normal intervals do not hold.
+    FewFailures {
+        /// How many.
+        failures: u64,
+    },
+    /// Effective sample size over the failures below [`Warning::LEAST_EFFECTIVE_SIZE`]: the variance itself is
+    /// badly known.
+    LowEffectiveSize {
+        /// (Σw)²/Σw² over failures.
+        effective_size: f64,
+    },
+    /// One failure carries more than [`Warning::LARGEST_SHARE`] of the estimate.
+    OneWeightDominates {
+        /// Its share.
+        share: f64,
+    },
+    /// The mean weight, 1 in expectation, is off by more than [`Warning::MEAN_WEIGHT_ERRORS`] standard errors, or by
+    /// more than [`Warning::MEAN_WEIGHT_OFF`]: part of the density has not been sampled.
+    MeanWeightOff {
+        /// The mean weight.
+        mean: f64,
+        /// |mean − 1| over its standard error.
+        standard_errors: f64,
+    },
+    /// Failures where the proposal is thin (below a fifth of the density) carry more than
+    /// [`Warning::THIN_SHARE`] of the estimate: the proposal misses a way to fail.
+    ModeMissed {
+        /// Their share of the estimate.
+        share: f64,
+        /// How many they are.
+        failures: u64,
+    },
+    /// The pilot, drawn from the density itself, has a number of failures that is less likely than
+    /// [`Warning::PILOT_LIKELIHOOD`] under the estimate.
+    DisagreesWithPilot {
+        /// Failures of the pilot.
+        failures: u64,
+        /// Failures that the estimate lets expect.
+        expected: f64,
+    },
+    /// Markov chains moved in less than [`Warning::LEAST_ACCEPTANCE`] of their steps.
+    ChainsStuck {
+        /// Level, counted from 1.
+        level: usize,
+        /// Share of steps that moved.
+        acceptance: f64,
+    },
+    /// The surviving samples descend from effectively fewer than [`Warning::LEAST_LINEAGES`] independent ones.
+    FewLineages {
+        /// Effective number.
+        lineages: f64,
+    },
+    /// The levels ended before any failure was reached: nothing nearer to failure was found, or the number of
+    /// levels was used up.
+    LevelsNotReached {
+        /// Levels used.
+        levels: usize,
+        /// Limit state reached, > 0.
+        threshold: f64,
+    },
+    /// More than [`Warning::VOID_SHARE`] of the indices gave no valid point.
+    VoidDraws {
+        /// Their share.
+        share: f64,
+    },
+    /// The time limit ended the sample: the result depends on the machine.
+    NotReproducible,
+}
+
+impl Warning {
+    /// Failures below which [`Warning::FewFailures`] is raised.
+    pub const LEAST_FAILURES: u64 = 10;
+    /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
+    pub const LEAST_EFFECTIVE_SIZE: f64 = 30.0;
+    /// Share of the estimate above which [`Warning::OneWeightDominates`] is raised.
+    pub const LARGEST_SHARE: f64 = 0.1;
+    /// Standard errors above which [`Warning::MeanWeightOff`] is raised.
+    pub const MEAN_WEIGHT_ERRORS: f64 = 4.0;
+    /// Distance from 1 above which [`Warning::MeanWeightOff`] is raised.
+    pub const MEAN_WEIGHT_OFF: f64 = 0.2;
+    /// Density over proposal above which a point counts as thinly covered. With a defensive share of 0.1 the
+    /// defensive part is then likelier than the rest to have drawn it.
+    pub const THIN_RATIO: f64 = 5.0;
+    /// Share of the estimate above which [`Warning::ModeMissed`] is raised.
+    pub const THIN_SHARE: f64 = 0.1;
+    /// Two-sided likelihood below which [`Warning::DisagreesWithPilot`] is raised.
+    pub const PILOT_LIKELIHOOD: f64 = 0.001;
+    /// Acceptance below which [`Warning::ChainsStuck`] is raised.
+    pub const LEAST_ACCEPTANCE: f64 = 0.1;
+    /// Lineages below which [`Warning::FewLineages`] is raised.
+    pub const LEAST_LINEAGES: f64 = 10.0;
+    /// Share of void indices above which [`Warning::VoidDraws`] is raised.
+    pub const VOID_SHARE: f64 = 0.001;
+
+    /// Whether the estimate must not be used at all.
+    pub fn is_grave(&self) -> bool {
+        match self {
+            Warning::MeanWeightOff { .. }
+            | Warning::ModeMissed { .. }
+            | Warning::DisagreesWithPilot { .. }
+            | Warning::LevelsNotReached { .. } => true,
+            Warning::OneWeightDominates { share } => *share > 0.5,
+            Warning::LowEffectiveSize { effective_size } => *effective_size < 5.0,
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::NoFailures => write!(f, "no failure was found: the probability is only bounded from above"),
+            Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
+            Warning::LowEffectiveSize { effective_size } => {
+                write!(f, "the failures count as no more than {effective_size:.1} equally weighted ones")
+            }
+            Warning::OneWeightDominates { share } => {
+                write!(f, "one failure carries {:.0} % of the estimate", 100.0 * share)
+            }
+            Warning::MeanWeightOff { mean, standard_errors } => write!(
+                f,
+                "the mean weight is {mean:.3} ({standard_errors:.1} standard errors from 1): part of the density was not sampled"
+            ),
+            Warning::ModeMissed { share, failures } => write!(
+                f,
+                "{failures} failures where the proposal is thin carry {:.0} % of the estimate: it misses a way to fail",
+                100.0 * share
+            ),
+            Warning::DisagreesWithPilot { failures, expected } => {
+                write!(f, "the pilot had {failures} failures where the estimate lets expect {expected:.1}")
+            }
+            Warning::ChainsStuck { level, acceptance } => {
+                write!(f, "the chains of level {level} moved in only {:.0} % of their steps", 100.0 * acceptance)
+            }
+            Warning::FewLineages { lineages } => {
+                write!(f, "the last samples descend from effectively {lineages:.1} independent ones")
+            }
+            Warning::LevelsNotReached { levels, threshold } => {
+                write!(f, "after {levels} levels the limit state is still at {threshold:.3e}: no failure was reached")
+            }
+            Warning::VoidDraws { share } => {
+                write!(f, "{:.2} % of the draws gave no valid point", 100.0 * share)
+            }
+            Warning::NotReproducible => write!(f, "the time limit ended the sample: another machine ends elsewhere"),
+        }
+    }
+}
+
+/// The verdict in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// No warning.
+    Sound,
+    /// Warnings, none of them grave.
+    Doubtful,
+    /// A grave warning.
+    Unusable,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Verdict::Sound => "sound",
+            Verdict::Doubtful => "doubtful",
+            Verdict::Unusable => "unusable",
+        })
+    }
+}
+
+/// All warnings of an estimate. An empty list is no proof: a way to fail that no draw has met leaves no trace.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trust {
+    /// Warnings, in the order of their discovery.
+    pub warnings: Vec<Warning>,
+}
+
+impl Trust {
+    /// The verdict.
+    pub fn verdict(&self) -> Verdict {
+        if self.warnings.iter().any(Warning::is_grave) {
+            Verdict::Unusable
+        } else if self.warnings.is_empty() {
+            Verdict::Sound
+        } else {
+            Verdict::Doubtful
+        }
+    }
+
+    /// Adds a warning where its condition holds.
+    pub(crate) fn warn_if(&mut self, condition: bool, warning: Warning) {
+        if condition {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// The warnings about the number of failures.
+    pub(crate) fn about_failures(&mut self, failures: u64) {
+        self.warn_if(failures == 0, Warning::NoFailures);
+        self.warn_if((1..Warning::LEAST_FAILURES).contains(&failures), Warning::FewFailures { failures });
+    }
+
+    /// The warning about void indices.
+    pub(crate) fn about_voids(&mut self, voids: u64, draws: u64) {
+        let share = voids as f64 / draws.max(1) as f64;
+        self.warn_if(share > Warning::VOID_SHARE, Warning::VoidDraws { share });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_follows_the_gravest_warning() {
+        let of = |warnings: Vec<Warning>| Trust { warnings }.verdict();
+        assert_eq!(of(vec![]), Verdict::Sound);
+        assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]), Verdict::Doubtful);
+        let missed = Warning::ModeMissed { share: 0.4, failures: 2 };
+        assert_eq!(of(vec![Warning::NoFailures, missed]), Verdict::Unusable);
+        assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]), Verdict::Doubtful);
+        assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.7 }]), Verdict::Unusable);
+    }
+}
