@@ -25,6 +25,7 @@ use crate::{Error, Place, Result};
 /// real ones. One density file per parameterization is written. Without data it runs on synthetic recordings of
 /// its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
                         scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterization 2 \
                         --with-thw --out cut-in-2.json")]

@@ -12,7 +12,8 @@
 //! **Validity.** Outside the valid region the density is cut off (f/P_valid). Bounds of single parameters are in
 //! [`Parameter`]; besides, LVD needs v1 < v0 and T = (v0 − v1)/ā in [0.1 s, 600 s], and a reconstruction by SVD
 //! needs T in the same range and no negative ego speed (LVD: first speed of the leader) or gap D. Speeds inside
-//! reconstructed series are no reason to refuse a point: below 0 they are set to 0, as in a study.
+//! reconstructed series are no reason to refuse a point: below 0 they are set to 0, as in a study. The filters of
+//! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
 use super::quantity::{LONGEST_DURATION_S, Parameter, Quantity};
 use crate::parameterization::{

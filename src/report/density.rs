@@ -47,7 +47,7 @@ pub fn text(model: &DensityModel) -> String {
     let valid = &model.valid;
     let _ = writeln!(
         text,
-        "P_valid    {:.4} [{:.4}, {:.4}], {} of {} draws, seed {}",
+        "P_valid    {:.5} [{:.5}, {:.5}], {} of {} draws, seed {}",
         valid.estimate, valid.low, valid.high, valid.valid, valid.draws, valid.seed
     );
     let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
@@ -108,7 +108,7 @@ pub fn summary(models: &[&DensityModel]) -> String {
             model.space.dimensions().to_string(),
             model.kde.points().len().to_string(),
             short(model.kde.bandwidth().value),
-            format!("{:.4}", model.valid.estimate),
+            format!("{:.5}", model.valid.estimate),
             of(|r| r.metric),
             of(|r| r.generated_test),
             of(|r| r.train_test),
