@@ -12,7 +12,7 @@ use super::stop::StopRule;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::density::{FitOptions, Mixture};
+use crate::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::random::Stream;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
