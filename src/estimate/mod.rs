@@ -7,6 +7,7 @@
 
 mod balance;
 mod blocks;
+mod clusters;
 mod cross_entropy;
 mod draws;
 mod importance;
@@ -22,6 +23,7 @@ mod weights;
 
 pub use balance::{Technique, balance_heuristic};
 pub use blocks::{BLOCK, BlockSums, Join};
+pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
     Defended, FitProposal, Importance, PilotCheck, defended, from_pilot, from_weight_sums, importance, importance_sums,

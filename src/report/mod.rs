@@ -11,6 +11,7 @@ pub mod lanes;
 pub mod radar;
 pub mod reference;
 pub mod run_record;
+pub mod sampling;
 pub mod study;
 pub mod tables;
 pub mod verification;

@@ -3,8 +3,26 @@
 //! Here live the way from a density file to a case generator and the plan of a sampling run. Here lives nothing
 //! about estimators. Densities come from [`crate::density`], lanes run in [`crate::sweep`].
 
+mod bootstrap;
+mod crude;
 mod generator;
+mod lanes;
+mod limit_state;
+mod map;
 mod plan;
+mod proposal_file;
+mod risk;
+mod rows;
+mod tally;
 
+pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
+pub use crude::{Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, sample_crude};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
+pub use lanes::{LaneLimitState, truncated};
+pub use limit_state::limit_state;
+pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
+pub use proposal_file::{read_proposal, write_proposal};
+pub use risk::{Risk, RiskRate};
+pub use rows::{EstimateRow, crude_rows, headway_name};
+pub use tally::{SampleTally, TallyOptions, WorstSample};

@@ -1,0 +1,490 @@
+//! A sampling run as files and as text.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::run_record::DeviceRecord;
+use super::tables::{aligned, table};
+use crate::criterion::Criterion;
+use crate::density::{DensityModel, Provenance};
+use crate::driver::ModelId;
+use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
+use crate::sampling::{Checkpoint, EstimateRow, MapCounts, RiskRate, SampleTally, WorstSample};
+use crate::sweep::generated::ATTEMPTS;
+use crate::sweep::{LanePlan, Outcome};
+use crate::{Error, Result};
+
+/// The density of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct DensityRecord {
+    /// Its content's SHA-256.
+    pub sha256: String,
+    /// Category.
+    pub category: &'static str,
+    /// Parameterization.
+    pub parameterization: String,
+    /// Names of the parameters.
+    pub parameters: Vec<String>,
+    /// Scenarios that it was fitted on.
+    pub kernels: usize,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+impl DensityRecord {
+    /// Of a density.
+    ///
+    /// # Errors
+    /// As [`DensityModel::content_sha256`].
+    pub fn of(density: &DensityModel) -> Result<DensityRecord> {
+        Ok(DensityRecord {
+            sha256: density.content_sha256()?,
+            category: density.category().key(),
+            parameterization: density.space.id().key.to_owned(),
+            parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
+            kernels: density.kde.points().len(),
+            provenance: density.provenance.clone(),
+        })
+    }
+}
+
+/// Draws of crude Monte Carlo.
+#[derive(Debug, Clone, Serialize)]
+pub struct DrawRecord {
+    /// Sample indices that were drawn: [first, one past the last].
+    pub ranges: Vec<[u64; 2]>,
+    /// Samples, void ones included.
+    pub samples: u64,
+    /// Samples without a valid point, which no estimate counts.
+    pub voids: u64,
+    /// Draws in all.
+    pub tries: u64,
+    /// Invalid ones among them.
+    pub rejected_share: f64,
+    /// Lanes.
+    pub lanes: u64,
+    /// Lanes that ended at the time cap.
+    pub capped_lanes: u64,
+}
+
+impl DrawRecord {
+    /// Of a tally.
+    pub fn of(tally: &SampleTally, plan: &LanePlan) -> DrawRecord {
+        let rejected = tally.tries - tally.valid().min(tally.tries);
+        DrawRecord {
+            ranges: tally.covered().iter().map(|r| [r.start, r.end]).collect(),
+            samples: tally.samples(),
+            voids: tally.voids,
+            tries: tally.tries,
+            rejected_share: rejected as f64 / tally.tries.max(1) as f64,
+            lanes: tally.samples() * plan.lanes_per_unit(&plan.blocks[0]),
+            capped_lanes: tally.capped.iter().sum(),
+        }
+    }
+}
+
+/// How an adaptive estimator went.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Levels {
+    /// Cross-entropy.
+    CrossEntropy(Vec<CrossEntropyStep>),
+    /// Subset simulation.
+    Subset(Vec<SubsetLevel>),
+}
+
+/// What belongs to the machine and not to the result.
+#[derive(Debug, Clone, Serialize)]
+pub struct HostRecord {
+    /// What computed.
+    pub backend: String,
+    /// The device, where one did.
+    pub device: Option<DeviceRecord>,
+    /// Lanes that were computed again on the CPU, all equal.
+    pub rechecked_lanes: u64,
+    /// Wall clock, s.
+    pub seconds: f64,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// `estimate.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct EstimateFile {
+    /// Version of this file.
+    pub lanesweep_estimate: u64,
+    /// Program and version.
+    pub program: String,
+    /// Estimator: `mc`, `is`, `ce`, `subset`.
+    pub estimator: &'static str,
+    /// The density sampled.
+    pub density: DensityRecord,
+    /// Profile.
+    pub profile: String,
+    /// Models.
+    pub models: Vec<ModelId>,
+    /// Headways.
+    pub headways: Vec<String>,
+    /// Kind of points: `random`, `sobol`.
+    pub points: &'static str,
+    /// Samples asked for.
+    pub samples: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Hash of the plan, of crude Monte Carlo.
+    pub plan_sha256: Option<String>,
+    /// Draws of crude Monte Carlo.
+    pub draws: Option<DrawRecord>,
+    /// What ended it.
+    pub stopped: StopReason,
+    /// The same flags give the same numbers on every machine.
+    pub reproducible: bool,
+    /// Estimates.
+    pub estimates: Vec<EstimateRow>,
+    /// Levels of the adaptive estimators, one per model.
+    pub levels: Vec<Levels>,
+    /// The share of the data in the uncertainty, where asked for.
+    pub bootstrap: Option<crate::sampling::BootstrapRecord>,
+    /// The machine.
+    pub host: HostRecord,
+}
+
+impl EstimateFile {
+    /// As JSON. What is not finite is null.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn to_json(&self) -> Result<Vec<u8>> {
+        let mut text = serde_json::to_vec_pretty(self)
+            .map_err(|e| Error::Internal(format!("an estimate cannot be written: {e}")))?;
+        text.push(b'\n');
+        Ok(text)
+    }
+
+    /// As the terminal shows it.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let density = &self.density;
+        let _ = writeln!(
+            text,
+            "{} {}: density over {} scenarios ({})",
+            density.category, density.parameterization, density.kernels, density.provenance.data
+        );
+        if let Some(draws) = &self.draws {
+            let _ = writeln!(
+                text,
+                "{} samples, {} lanes; {:.2} % of the draws invalid and drawn again{}{}",
+                draws.samples,
+                draws.lanes,
+                100.0 * draws.rejected_share,
+                if draws.voids > 0 {
+                    format!(", {} samples void (none of {ATTEMPTS} draws valid)", draws.voids)
+                } else {
+                    String::new()
+                },
+                if draws.capped_lanes > 0 {
+                    format!("; {} lanes ended at the time cap", draws.capped_lanes)
+                } else {
+                    String::new()
+                },
+            );
+        }
+        let header = [
+            "model",
+            "criterion",
+            "THW",
+            "failures",
+            "runs",
+            "P",
+            "interval",
+            "±",
+            "per hour",
+            "per 1000 km",
+            "verdict",
+        ];
+        let mut rows = table(header.map(str::to_owned).to_vec());
+        for row in &self.estimates {
+            let e = &row.estimate;
+            rows.add_row(vec![
+                row.model.name().to_owned(),
+                row.criterion.label().to_owned(),
+                row.headway.clone(),
+                e.failures.to_string(),
+                e.runs.to_string(),
+                short(e.probability),
+                interval_text(e.interval.low, e.interval.high, e.interval.kind),
+                if e.relative_half_width.is_finite() {
+                    format!("{:.1} %", 100.0 * e.relative_half_width)
+                } else {
+                    "–".to_owned()
+                },
+                rate_text(row.risk.per_hour),
+                rate_text(row.risk.per_1000_km),
+                e.trust.verdict().to_string(),
+            ]);
+        }
+        text.push_str(&aligned(rows, 3));
+        for row in self
+            .estimates
+            .iter()
+            .filter(|r| !r.estimate.trust.warnings.is_empty() && r.headway_is_shown(&self.estimates))
+        {
+            for warning in &row.estimate.trust.warnings {
+                let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
+            }
+        }
+        if let Some(weighted) = self.estimates.iter().find_map(|r| r.estimate.weights.as_ref().map(|_| ())) {
+            let () = weighted;
+            text.push_str(&self.weights_text());
+        }
+        text
+    }
+
+    /// What the weights of importance samples say.
+    fn weights_text(&self) -> String {
+        let header =
+            ["model", "criterion", "variance reduction", "ESS", "ESS of failures", "largest share", "mean weight"];
+        let mut rows = table(header.map(str::to_owned).to_vec());
+        for row in &self.estimates {
+            let Some(w) = &row.estimate.weights else { continue };
+            rows.add_row(vec![
+                row.model.name().to_owned(),
+                row.criterion.label().to_owned(),
+                short(row.estimate.variance_reduction),
+                format!("{:.0}", w.effective_size),
+                format!("{:.0}", w.effective_size_failures),
+                format!("{:.2} %", 100.0 * w.largest_share_failures),
+                format!("{:.4} ± {:.4}", w.mean_weight, w.mean_weight_error),
+            ]);
+        }
+        aligned(rows, 2)
+    }
+
+    /// `estimates.csv`.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn csv(&self) -> Result<Vec<u8>> {
+        let header = [
+            "category",
+            "parameterization",
+            "estimator",
+            "model",
+            "criterion",
+            "headway",
+            "runs",
+            "failures",
+            "probability",
+            "low",
+            "high",
+            "level",
+            "interval",
+            "relative_half_width",
+            "coefficient_of_variation",
+            "variance_reduction",
+            "ess",
+            "ess_failures",
+            "largest_weight_share",
+            "mean_weight",
+            "risk_per_hour",
+            "risk_per_hour_sd",
+            "risk_per_1000_km",
+            "risk_per_1000_km_sd",
+            "verdict",
+            "data",
+        ];
+        let mut rows = vec![header.map(str::to_owned).to_vec()];
+        for row in &self.estimates {
+            let e = &row.estimate;
+            let weight = |f: fn(&crate::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
+            let rate = |r: Option<RiskRate>| [r.map(|r| r.estimate), r.map(|r| r.standard_deviation)];
+            let mut fields = vec![
+                self.density.category.to_owned(),
+                self.density.parameterization.clone(),
+                self.estimator.to_owned(),
+                row.model.name().to_owned(),
+                row.criterion.key().to_owned(),
+                row.headway.clone(),
+                e.runs.to_string(),
+                e.failures.to_string(),
+            ];
+            let numbers = [Some(e.probability), Some(e.interval.low), Some(e.interval.high), Some(e.interval.level)];
+            fields.extend(numbers.map(number));
+            fields.push(kind_name(e.interval.kind).to_owned());
+            let numbers = [
+                Some(e.relative_half_width),
+                Some(e.coefficient_of_variation),
+                Some(e.variance_reduction),
+                weight(|w| w.effective_size),
+                weight(|w| w.effective_size_failures),
+                weight(|w| w.largest_share_failures),
+                weight(|w| w.mean_weight),
+            ];
+            fields.extend(numbers.map(number));
+            fields.extend(rate(row.risk.per_hour).map(number));
+            fields.extend(rate(row.risk.per_1000_km).map(number));
+            fields.push(e.trust.verdict().to_string());
+            fields.push(self.density.provenance.data.clone());
+            rows.push(fields);
+        }
+        super::csv::text(rows)
+    }
+}
+
+impl EstimateRow {
+    /// Warnings are told once: over all headways where there are several.
+    fn headway_is_shown(&self, all: &[EstimateRow]) -> bool {
+        self.headway == "all" || !all.iter().any(|row| row.headway == "all")
+    }
+}
+
+/// `convergence.csv`.
+///
+/// # Errors
+/// None for what this program made.
+pub fn convergence_csv(checkpoints: &[Checkpoint]) -> Result<Vec<u8>> {
+    let mut rows = vec![["samples", "model", "criterion", "probability", "low", "high"].map(str::to_owned).to_vec()];
+    for checkpoint in checkpoints {
+        for row in &checkpoint.rows {
+            rows.push(vec![
+                checkpoint.samples.to_string(),
+                row.model.name().to_owned(),
+                row.criterion.key().to_owned(),
+                row.probability.to_string(),
+                row.interval[0].to_string(),
+                row.interval[1].to_string(),
+            ]);
+        }
+    }
+    super::csv::text(rows)
+}
+
+/// One of the worst lanes, with what it was.
+pub struct WorstRow<'a> {
+    /// Place among the model's worst, from 1.
+    pub rank: usize,
+    /// The lane and its limit state.
+    pub lane: WorstSample,
+    /// Its key.
+    pub key: String,
+    /// Its sample index.
+    pub sample: u64,
+    /// Driver model.
+    pub model: ModelId,
+    /// Headway, s, where it is one of the plan's or a parameter.
+    pub headway: String,
+    /// Its point.
+    pub point: Vec<f64>,
+    /// Its outcome.
+    pub outcome: &'a Outcome<f64>,
+}
+
+/// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
+///
+/// # Errors
+/// None for what this program made.
+pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> Result<Vec<u8>> {
+    let mut header: Vec<String> =
+        ["model", "rank", "lane", "sample", "headway", "criterion", "limit_state"].map(str::to_owned).to_vec();
+    header.extend(
+        [
+            "collision",
+            "ttc",
+            "btn",
+            "min_ttc_s",
+            "max_btn",
+            "min_gap_m",
+            "impact_speed_mps",
+            "impact_closing_speed_mps",
+        ]
+        .map(str::to_owned),
+    );
+    header.extend(parameters.iter().cloned());
+    let mut table = vec![header];
+    for row in rows {
+        let o = row.outcome;
+        let mut fields = vec![
+            row.model.name().to_owned(),
+            row.rank.to_string(),
+            row.key.clone(),
+            row.sample.to_string(),
+            row.headway.clone(),
+            criterion.key().to_owned(),
+            row.lane.value.to_string(),
+        ];
+        fields.extend(Criterion::ALL.map(|c| u8::from(o.verdicts.failed(c)).to_string()));
+        let values = [o.min_ttc, o.max_btn, o.min_gap, o.impact_speed, o.impact_closing_speed];
+        fields.extend(values.map(|v| number(Some(v))));
+        fields.extend(row.point.iter().map(f64::to_string));
+        table.push(fields);
+    }
+    super::csv::text(table)
+}
+
+/// A failure map of one model as CSV.
+///
+/// # Errors
+/// None for what this program made.
+pub fn map_csv(map: &MapCounts, model: usize) -> Result<Vec<u8>> {
+    let (x, y) = (map.axes.x.edges(), map.axes.y.edges());
+    let header = [
+        format!("{}_low", map.axes.x.name),
+        format!("{}_high", map.axes.x.name),
+        format!("{}_low", map.axes.y.name),
+        format!("{}_high", map.axes.y.name),
+        "lanes".to_owned(),
+        "failures".to_owned(),
+    ];
+    let mut rows = vec![header.to_vec()];
+    for (at, lanes) in map.lanes.iter().enumerate() {
+        let (row, column) = (at / (x.len() - 1), at % (x.len() - 1));
+        rows.push(vec![
+            x[column].to_string(),
+            x[column + 1].to_string(),
+            y[row].to_string(),
+            y[row + 1].to_string(),
+            lanes.to_string(),
+            map.failures[model][at].to_string(),
+        ]);
+    }
+    super::csv::text(rows)
+}
+
+fn number(value: Option<f64>) -> String {
+    value.filter(|v| v.is_finite()).map_or(String::new(), |v| v.to_string())
+}
+
+/// Three digits, in powers of ten where it is small.
+fn short(value: f64) -> String {
+    if !value.is_finite() {
+        "–".to_owned()
+    } else if value == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e4).contains(&value.abs()) {
+        format!("{value:.4}")
+    } else {
+        format!("{value:.2e}")
+    }
+}
+
+fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
+    match kind {
+        IntervalKind::RuleOfThree => format!("≤ {}", short(high)),
+        _ => format!("{} … {}", short(low), short(high)),
+    }
+}
+
+fn rate_text(rate: Option<RiskRate>) -> String {
+    rate.map_or("unknown".to_owned(), |r| format!("{} ± {}", short(r.estimate), short(r.standard_deviation)))
+}
+
+fn kind_name(kind: IntervalKind) -> &'static str {
+    match kind {
+        IntervalKind::Wilson => "wilson",
+        IntervalKind::ClopperPearson => "clopper_pearson",
+        IntervalKind::RuleOfThree => "rule_of_three",
+        IntervalKind::LogStudent => "log_student",
+        IntervalKind::Nothing => "nothing",
+    }
+}

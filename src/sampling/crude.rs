@@ -1,0 +1,169 @@
+//! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the samples.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::rows::{EstimateRow, crude_rows};
+use super::tally::{SampleTally, TallyOptions};
+use crate::criterion::Criterion;
+use crate::density::Exposure;
+use crate::driver::ModelId;
+use crate::estimate::{BinomialInterval, StopReason, StopRule};
+use crate::sweep::{Backend, Chunk, LanePlan, Recheck, SweepOptions, SweepSummary, Wanted, sweep};
+use crate::{Error, Place, Result};
+
+/// How sampled lanes are computed.
+#[derive(Clone, Copy)]
+pub struct Lanes<'a> {
+    /// What computes.
+    pub backend: &'a dyn Backend,
+    /// What stands in for a device that fails.
+    pub fallback: Option<&'a dyn Backend>,
+    /// Checks a sample of a device's lanes.
+    pub recheck: Option<&'a Recheck<'a>>,
+}
+
+/// How estimates are made of counts.
+#[derive(Debug, Clone, Copy)]
+pub struct CrudeOptions<'a> {
+    /// When to end; looked at only where the whole run is sampled.
+    pub stop: StopRule,
+    /// Kind of interval.
+    pub interval: BinomialInterval,
+    /// Its level.
+    pub level: f64,
+    /// The exposure that risks follow from.
+    pub exposure: Option<&'a Exposure>,
+    /// The headway is a parameter of the density.
+    pub is_sampled_headway: bool,
+}
+
+/// The estimates after so many samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Checkpoint {
+    /// Samples, void ones included.
+    pub samples: u64,
+    /// One per model and criterion: probability, interval. Over all headways where there are several.
+    pub rows: Vec<CheckpointRow>,
+}
+
+/// One estimate at a checkpoint.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckpointRow {
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Estimate.
+    pub probability: f64,
+    /// Ends of its interval.
+    pub interval: [f64; 2],
+}
+
+/// What a run of crude Monte Carlo gave.
+#[derive(Debug, Clone)]
+pub struct CrudeRun {
+    /// The counts.
+    pub tally: SampleTally,
+    /// The estimates.
+    pub rows: Vec<EstimateRow>,
+    /// How they came about; empty for a range that does not begin at 0.
+    pub convergence: Vec<Checkpoint>,
+    /// What ended it.
+    pub stopped: StopReason,
+    /// How the sweep went.
+    pub summary: SweepSummary,
+}
+
+/// Samples `range` of a plan that makes its own cases. The stop rules are looked at after 4,096·2^k samples. `each`
+/// takes every chunk (rows on request, progress).
+///
+/// # Errors
+/// [`Error::Usage`] for stop rules or an end beyond the plan with a range that is not the whole; of the backends; of
+/// `each`.
+pub fn sample_crude(
+    plan: &LanePlan,
+    range: Range<u64>,
+    lanes: &Lanes,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+    mut each: impl FnMut(&Chunk) -> Result<()>,
+) -> Result<CrudeRun> {
+    let started = Instant::now();
+    if range.start >= range.end || range.end > plan.unit_count() {
+        let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
+        return Err(Error::usage(Place::item("--lanes"), problem, "give A..B with A < B, counted from 0"));
+    }
+    let is_whole = range == (0..plan.unit_count());
+    if !is_whole && (options.stop.relative_half_width.is_some() || options.stop.time_limit.is_some()) {
+        let problem = "a part of a run cannot tell when the whole is good enough";
+        return Err(Error::usage(Place::item("--lanes"), problem, "leave the stop rules out, or --lanes"));
+    }
+    let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
+    let how = SweepOptions { wanted, fallback: lanes.fallback, recheck: lanes.recheck };
+    let mut tally = SampleTally::empty(plan, counting);
+    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+    let mut convergence = Vec::new();
+    let mut at = range.start;
+    let rows_of = |tally: &SampleTally, stopped| {
+        let &CrudeOptions { interval, level, exposure, is_sampled_headway, .. } = options;
+        crude_rows(plan, tally, exposure, is_sampled_headway, interval, level, stopped)
+    };
+    loop {
+        let next = if is_whole { options.stop.checkpoints.next(at).min(range.end) } else { range.end };
+        // Borrowed by the closure, so that a chunk is counted as soon as it is there.
+        let mut counted = Ok(());
+        let part = sweep(plan, at..next, lanes.backend, &how, |chunk| {
+            each(&chunk)?;
+            let partial = SampleTally::of_chunk(plan, &chunk, counting)?;
+            let before = std::mem::replace(&mut tally, SampleTally::empty(plan, counting));
+            match before.merge(partial) {
+                Ok(joined) => tally = joined,
+                Err(error) => counted = Err(error),
+            }
+            Ok(())
+        })?;
+        counted?;
+        summary.add(&part);
+        at = next;
+        let rows = rows_of(&tally, StopReason::Samples);
+        if is_whole {
+            convergence.push(Checkpoint { samples: at, rows: overall(&rows) });
+        }
+        if let Some(stopped) = stopped(options, counting.criterion, &rows, at, range.end, started) {
+            let rows = rows_of(&tally, stopped);
+            return Ok(CrudeRun { tally, rows, convergence, stopped, summary });
+        }
+    }
+}
+
+/// The rows over all headways.
+fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
+    let has_all = rows.iter().any(|row| row.headway == "all");
+    let kept = rows.iter().filter(|row| !has_all || row.headway == "all");
+    let of = |row: &EstimateRow| CheckpointRow {
+        model: row.model,
+        criterion: row.criterion,
+        probability: row.estimate.probability,
+        interval: [row.estimate.interval.low, row.estimate.interval.high],
+    };
+    kept.map(of).collect()
+}
+
+/// The widest of the criterion's intervals decides, over all models.
+fn stopped(
+    options: &CrudeOptions,
+    criterion: Criterion,
+    rows: &[EstimateRow],
+    samples: u64,
+    end: u64,
+    started: Instant,
+) -> Option<StopReason> {
+    let has_all = rows.iter().any(|row| row.headway == "all");
+    let judged = rows.iter().filter(|r| r.criterion == criterion && (!has_all || r.headway == "all"));
+    let widest = judged.max_by(|a, b| a.estimate.relative_half_width.total_cmp(&b.estimate.relative_half_width))?;
+    let rule = StopRule { samples: end, ..options.stop };
+    rule.at(samples, widest.estimate.failures, widest.estimate.relative_half_width, started)
+}
