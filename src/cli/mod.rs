@@ -10,6 +10,8 @@ mod environment;
 mod exit;
 mod fit;
 mod mine;
+mod sample;
+mod sample_lanes;
 mod simulate;
 mod source;
 mod study;
@@ -74,6 +76,7 @@ enum Verb {
     Study(study::Study),
     Mine(mine::Mine),
     Fit(fit::Fit),
+    Sample(Box<sample::Sample>),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
@@ -150,6 +153,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Study(verb) => verb.run(cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(cli.common.verbosity()),
+        Verb::Sample(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),

@@ -13,6 +13,7 @@ mod draws;
 mod importance;
 mod interval;
 mod monte_carlo;
+mod pilot;
 mod problem;
 mod stop;
 mod strata;
@@ -31,6 +32,7 @@ pub use importance::{
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
+pub use pilot::from_pilot_with_proposal;
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use strata::{Stratum, stratified};

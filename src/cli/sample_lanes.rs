@@ -1,0 +1,112 @@
+//! The lanes of a sampling run: progress, rows on request, and the files that come of the counts.
+
+use std::io::Write;
+use std::ops::Range;
+use std::path::Path;
+
+use super::console::{self, Verbosity};
+use crate::density::DensityModel;
+use crate::report::files::{write_atomically, write_atomically_with};
+use crate::report::sampling::{WorstRow, convergence_csv, map_csv, worst_csv};
+use crate::report::{lanes, lanes::Digits};
+use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
+use crate::sweep::{LanePlan, LaneRunner, Outcome};
+use crate::{Error, Result};
+
+/// Samples, with one row per lane where asked for.
+pub(super) fn run(
+    plan: &LanePlan,
+    range: Range<u64>,
+    how: &Lanes,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+    rows: Option<&Path>,
+    verbosity: Verbosity,
+) -> Result<CrudeRun> {
+    let bar = console::progress(verbosity, range.end - range.start, "sampling");
+    let Some(path) = rows else {
+        let run = sample_crude(plan, range, how, counting, options, |chunk| {
+            bar.inc(chunk.units.end - chunk.units.start);
+            Ok(())
+        });
+        bar.finish_and_clear();
+        return run;
+    };
+    // Rows hold every value, so the lanes must.
+    let counting = TallyOptions { worst: counting.worst.max(1), ..counting.clone() };
+    let mut run = None;
+    let written = write_atomically_with(path, |out: &mut dyn Write| {
+        lanes::write_header(out)?;
+        let sampled = sample_crude(plan, range, how, &counting, options, |chunk| {
+            bar.inc(chunk.units.end - chunk.units.start);
+            lanes::write_chunk(out, plan, chunk, Digits::Binary32).map_err(|e| Error::io(path, "write", e))
+        });
+        let failed = sampled.is_err();
+        run = Some(sampled);
+        // The run's own error is the one to tell.
+        if failed { Err(std::io::Error::other("the run failed")) } else { Ok(()) }
+    });
+    bar.finish_and_clear();
+    let run = run.ok_or_else(|| Error::Internal("the rows were not written".to_owned()))??;
+    written.map(|()| run)
+}
+
+/// Everything of a run but `estimate.json`.
+pub(super) fn write(
+    out: &Path,
+    plan: &LanePlan,
+    density: &DensityModel,
+    run: &CrudeRun,
+    counting: &TallyOptions,
+) -> Result<()> {
+    let is_part = run.convergence.is_empty();
+    if is_part {
+        let text =
+            serde_json::to_vec(&run.tally).map_err(|e| Error::Internal(format!("a part cannot be written: {e}")))?;
+        write_atomically(&out.join("part.json"), &text)?;
+    } else {
+        write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
+    }
+    let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
+    if counting.worst > 0 {
+        let runner = LaneRunner::<f32>::new(plan);
+        let mut rows: Vec<(WorstRow, Outcome<f64>)> = Vec::new();
+        let Some(generator) = plan.generator() else {
+            return Err(Error::Internal("the plan has no generator".to_owned()));
+        };
+        let mut listed = Vec::new();
+        for (model, lanes) in run.tally.worst.iter().enumerate() {
+            for (at, &lane) in lanes.iter().enumerate() {
+                let key = plan
+                    .key(lane.lane)
+                    .ok_or_else(|| Error::Internal(format!("lane {} is not in the plan", lane.lane)))?;
+                listed.push((plan.models[model], at + 1, lane, key, runner.run(&key).widen()));
+            }
+        }
+        for (model, rank, lane, key, outcome) in &listed {
+            let drawn = generator.draw(key.unit);
+            let point: Vec<f64> = drawn.values[..names.len()].iter().map(|&v| f64::from(v)).collect();
+            let headway =
+                density.space.thw_s(&point).map_or(plan.headways[key.headway].to_string(), |t| format!("{t}s"));
+            let row = WorstRow {
+                rank: *rank,
+                lane: *lane,
+                key: plan.key_text(key),
+                sample: key.unit,
+                model: *model,
+                headway,
+                point,
+                outcome,
+            };
+            rows.push((row, *outcome));
+        }
+        let rows: Vec<WorstRow> = rows.into_iter().map(|(row, _)| row).collect();
+        write_atomically(&out.join("worst.csv"), &worst_csv(&rows, &names, counting.criterion)?)?;
+    }
+    if let Some(map) = &run.tally.map {
+        for (model, id) in plan.models.iter().enumerate() {
+            write_atomically(&out.join(format!("map-{}.csv", id.name())), &map_csv(map, model)?)?;
+        }
+    }
+    Ok(())
+}
