@@ -7,8 +7,8 @@
 
 use lanesweep::density::Mixture;
 use lanesweep::estimate::{
-    BinomialInterval, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, StandardNormal, Subset,
-    Technique, Truncated, Verdict, balance_heuristic, cross_entropy, from_pilot, monte_carlo, subset,
+    BinomialInterval, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot, StandardNormal,
+    Subset, Technique, Truncated, Verdict, balance_heuristic, cross_entropy, from_pilot, monte_carlo, subset,
 };
 use rayon::prelude::*;
 
@@ -117,24 +117,24 @@ fn binomial_intervals_hold() {
 fn importance_sampling_intervals_hold() {
     heading();
     let mut misses = Misses::default();
-    let mut of = |name: &str, truth: f64, density: &dyn Density, limit: &dyn LimitState, defence: f64| {
+    let mut of = |name: &str, truth: f64, density: &dyn Density, limit: &dyn LimitState| {
         let limit = |points: &[Vec<f64>]| limit.evaluate(points);
         let row = repeat(name, truth, REPEATS, |seed| {
-            from_pilot(density, &limit, &silverman, 5000, 0.02, defence, &Importance::new(seed, 5000))
+            from_pilot(density, &limit, &silverman, &Pilot::guarded(5000), &Importance::new(seed, 5000))
                 .expect("an estimate")
         });
         misses.want(row.coverage >= 0.92, &row, "92 %");
     };
     for (beta, d) in [(2.0, 2), (3.0, 2), (3.5, 2), (2.5, 5), (3.0, 5), (2.0, 10)] {
         let density = StandardNormal { dimensions: d };
-        of(&format!("pilot KDE, linear {beta}, d = {d}"), tail(beta), &density, &linear(beta), 0.1);
+        of(&format!("pilot KDE, linear {beta}, d = {d}"), tail(beta), &density, &linear(beta));
     }
     let truth = four_branch_probability(3.0, 3.5);
-    of("pilot KDE, four branches", truth, &StandardNormal { dimensions: 2 }, &four_branch(3.0, 3.5), 0.1);
+    of("pilot KDE, four branches", truth, &StandardNormal { dimensions: 2 }, &four_branch(3.0, 3.5));
     // Half of the plane cut off: the first parameter is a speed.
     let half = Truncated::with_share(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a share");
     let slow = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
-    of("pilot KDE, half cut off", 2.0 * tail(3.0), &half, &slow, 0.1);
+    of("pilot KDE, half cut off", 2.0 * tail(3.0), &half, &slow);
 }
 
 #[test]

@@ -24,8 +24,8 @@ pub use balance::{Technique, balance_heuristic};
 pub use blocks::{BLOCK, BlockSums, Join};
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
-    Defended, FitProposal, Importance, PilotCheck, defended, from_pilot, from_weight_sums, importance, importance_sums,
-    worst_share,
+    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
+    importance_sums, worst_share,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
