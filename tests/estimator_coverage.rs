@@ -13,6 +13,7 @@ use lanesweep::estimate::{
 use rayon::prelude::*;
 
 #[path = "common/reliability.rs"]
+#[allow(dead_code)]
 mod reliability;
 use reliability::{four_branch, four_branch_probability, linear, silverman, tail, unit_mixture};
 
