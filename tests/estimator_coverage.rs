@@ -192,11 +192,19 @@ fn subset_simulation_intervals_hold() {
     };
     for (beta, d) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.0, 10), (5.0, 2)] {
         let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
-        of(format!("subset, random walk, linear {beta}, d = {d}"), tail(beta), &walked, &linear(beta));
+        of(format!("subset, mixture, linear {beta}, d = {d}"), tail(beta), &walked, &linear(beta));
         of(format!("subset, pCN, linear {beta}, d = {d}"), tail(beta), &standard, &linear(beta));
     }
+    // Kernels in two heaps: far from any Gaussian; the share of each kernel beyond the limit is known.
+    let points: Vec<Vec<f64>> = (0..200)
+        .map(|i| vec![if i % 4 == 0 { 3.0 } else { 0.0 } + 0.005 * f64::from(i), 0.01 * f64::from(i)])
+        .collect();
+    let kernels = Mixture::of_kernels(points.clone(), &[0.5, 0.3]).expect("well formed");
+    let truth = points.iter().map(|p| tail((6.0 - p[0]) / 0.5)).sum::<f64>() / 200.0;
+    let first = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 6.0 - x[0]).collect());
+    of("subset, mixture, two heaps of kernels".to_owned(), truth, &kernels, &first);
     let truth = four_branch_probability(3.0, 3.5);
-    of("subset, random walk, four branches".to_owned(), truth, &unit_mixture(2), &four_branch(3.0, 3.5));
+    of("subset, mixture, four branches".to_owned(), truth, &unit_mixture(2), &four_branch(3.0, 3.5));
 }
 
 #[test]
@@ -210,7 +218,7 @@ fn one_in_a_million_is_reached_with_a_hundred_thousand_runs() {
     for d in [2, 5, 10] {
         let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
         let rows = [
-            repeat(&format!("subset, random walk, 1e-6, d = {d}"), truth, 100, |seed| {
+            repeat(&format!("subset, mixture, 1e-6, d = {d}"), truth, 100, |seed| {
                 subset(&walked, &linear(beta), &Subset::new(seed, 15_000)).expect("an estimate").estimate
             }),
             repeat(&format!("subset, pCN, 1e-6, d = {d}"), truth, 100, |seed| {
