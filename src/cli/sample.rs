@@ -14,8 +14,8 @@ use crate::criterion::Criterion;
 use crate::density::{BandwidthRule, DensityModel, Kde, Mixture, read_density, write_density};
 use crate::driver::ModelId;
 use crate::estimate::{
-    BinomialInterval, Checkpoints, CrossEntropy, Defended, Density, Estimate, Importance, StopReason, StopRule, Subset,
-    Technique, balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, importance, subset,
+    BinomialInterval, Checkpoints, CrossEntropy, Defended, Density, Estimate, Importance, Pilot, StopReason, StopRule,
+    Subset, Technique, balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, importance, subset,
 };
 use crate::profile::Profile;
 use crate::report::files::make_folder;
@@ -91,6 +91,9 @@ pub struct Sample {
     /// Share of the pilot's worst points that the proposal of is is fitted to
     #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
     worst_share: f64,
+    /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+    broad: f64,
     /// Share of the density in the proposals of is and ce; 0 is the published form
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     defence: f64,
@@ -215,6 +218,7 @@ impl Sample {
         share("--level", self.level, false)?;
         share("--worst-share", self.worst_share, false)?;
         share("--defence", self.defence, true)?;
+        share("--broad", self.broad, true)?;
         if self.until.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
             return Err(Error::usage(Place::item("--until"), "no half-width", "give a number above 0, such as 0.05"));
         }
@@ -504,9 +508,12 @@ impl Run<'_> {
                     nominal,
                     &lanes,
                     &fit,
-                    flags.pilot,
-                    flags.worst_share,
-                    flags.defence,
+                    &Pilot {
+                        worst: flags.worst_share,
+                        broad: flags.broad,
+                        defence: flags.defence,
+                        ..Pilot::guarded(flags.pilot)
+                    },
                     &importance_options,
                 )?;
                 write_proposal(&proposal_file, &self.density, &proposal)?;
