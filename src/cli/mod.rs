@@ -10,6 +10,7 @@ mod environment;
 mod exit;
 mod fit;
 mod mine;
+mod rerun;
 mod sample;
 mod sample_lanes;
 mod simulate;

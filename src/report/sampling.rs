@@ -10,9 +10,10 @@ use crate::criterion::Criterion;
 use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
+use crate::profile::Profile;
 use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, MapCounts, RiskRate, SampleTally, WorstSample};
 use crate::sweep::generated::ATTEMPTS;
-use crate::sweep::{LanePlan, Outcome};
+use crate::sweep::{Headway, LanePlan, Outcome};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -120,12 +121,14 @@ pub struct EstimateFile {
     pub estimator: &'static str,
     /// The density sampled.
     pub density: DensityRecord,
-    /// Profile.
-    pub profile: String,
+    /// Profile, with its time step.
+    pub profile: Profile,
     /// Models.
     pub models: Vec<ModelId>,
-    /// Headways.
+    /// Headways, by name.
     pub headways: Vec<String>,
+    /// The same as the plan has them.
+    pub plan_headways: Vec<Headway>,
     /// Kind of points: `random`, `sobol`.
     pub points: &'static str,
     /// Samples asked for.
