@@ -145,13 +145,12 @@ fn balanced_proposals_hold() {
     let mut misses = Misses::default();
     let density = StandardNormal { dimensions: 2 };
     let at = |x: f64, y: f64| Mixture::of_kernels(vec![vec![x, y]], &[1.0, 1.0]).expect("well formed");
-    let (a, b) = (at(2.5, 2.5), at(-2.5, -2.5));
+    // One proposal for each branch: with a branch left out the nominal draws meet it once or so, and no interval can
+    // hold (the weights then warn of few effective failures).
+    let branches = [at(2.3, 2.3), at(-2.3, -2.3), at(2.7, -2.7), at(-2.7, 2.7)];
     let row = repeat("balance, four branches", four_branch_probability(3.0, 3.5), REPEATS, |seed| {
-        let techniques = [
-            Technique { proposal: &a, draws: 2000 },
-            Technique { proposal: &b, draws: 2000 },
-            Technique { proposal: &density, draws: 2000 },
-        ];
+        let mut techniques = vec![Technique { proposal: &density, draws: 1000 }];
+        techniques.extend(branches.iter().map(|proposal| Technique { proposal, draws: 1000 }));
         balance_heuristic(&density, &techniques, &four_branch(3.0, 3.5), seed, 0.95).expect("an estimate")
     });
     misses.want(row.coverage >= 0.92, &row, "92 %");

@@ -260,7 +260,7 @@ impl<'a> Walk<'a> {
         let mut step = 0_u64;
         while next.len() < states.len() {
             step += 1;
-            let walks = !self.density.is_standard_normal() && step % KINDS == 0;
+            let walks = !self.density.is_standard_normal() && step.is_multiple_of(KINDS);
             let kind = usize::from(walks);
             chains.truncate(states.len() - next.len());
             let candidates: Vec<Option<(Vec<f64>, f64)>> = chains
