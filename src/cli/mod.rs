@@ -12,6 +12,7 @@ mod fit;
 mod mine;
 mod rerun;
 mod sample;
+mod sample_join;
 mod sample_lanes;
 mod simulate;
 mod source;

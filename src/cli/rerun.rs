@@ -4,9 +4,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::density::read_density;
+use crate::density::{DensityModel, read_density};
 use crate::driver::ModelId;
 use crate::profile::Profile;
+use crate::report::sampling::RunFacts;
 use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
 use crate::sweep::{Headway, LanePlan};
 use crate::{Error, Place, Result};
@@ -30,6 +31,14 @@ struct Recorded {
 /// # Errors
 /// [`Error::Io`], [`Error::Input`] where the folder does not hold a run of crude Monte Carlo, whole and unchanged.
 pub(super) fn plan_of(dir: &Path) -> Result<LanePlan> {
+    Ok(run_of(dir)?.1)
+}
+
+/// The same with what the run was asked for and its density.
+///
+/// # Errors
+/// As [`plan_of`].
+pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
     let path = dir.join("estimate.json");
     let wrong = |problem: String| {
         let help = "give the folder (--out) of a `lanesweep sample` run of crude Monte Carlo by this version";
@@ -41,20 +50,30 @@ pub(super) fn plan_of(dir: &Path) -> Result<LanePlan> {
         return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", run.estimator)));
     }
     let density = read_density(&dir.join("density.json"))?;
-    let options = SamplePlanOptions {
+    let is_sobol = run.points == "sobol";
+    let facts = RunFacts {
+        estimator: "mc",
+        profile: run.profile,
+        models: run.models,
+        headways: run.plan_headways,
+        points: if is_sobol { "sobol" } else { "random" },
         samples: run.samples,
         seed: run.seed,
-        source: if run.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
-        models: run.models,
+    };
+    let options = SamplePlanOptions {
+        samples: facts.samples,
+        seed: facts.seed,
+        source: if is_sobol { SampleSource::Sobol } else { SampleSource::Random },
+        models: facts.models.clone(),
         headways: if density.space.has_thw() {
             SampleHeadways::Sampled
         } else {
-            SampleHeadways::Each(run.plan_headways)
+            SampleHeadways::Each(facts.headways.clone())
         },
     };
-    let plan = plan_samples(&density, &density.mixture()?, &run.profile, &options)?;
+    let plan = plan_samples(&density, &density.mixture()?, &facts.profile, &options)?;
     match run.plan_sha256 {
-        Some(hash) if hash == plan.hash() => Ok(plan),
+        Some(hash) if hash == plan.hash() => Ok((facts, plan, density)),
         _ => Err(wrong("its plan is not the one that the density and the profile beside it make".to_owned())),
     }
 }

@@ -9,7 +9,7 @@ use crate::density::DensityModel;
 use crate::report::files::{write_atomically, write_atomically_with};
 use crate::report::sampling::{WorstRow, convergence_csv, map_csv, worst_csv};
 use crate::report::{lanes, lanes::Digits};
-use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
+use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude, write_part};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
 use crate::{Error, Result};
 
@@ -58,13 +58,11 @@ pub(super) fn write(
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
+    is_part: bool,
 ) -> Result<()> {
-    let is_part = run.convergence.is_empty();
     if is_part {
-        let text =
-            serde_json::to_vec(&run.tally).map_err(|e| Error::Internal(format!("a part cannot be written: {e}")))?;
-        write_atomically(&out.join("part.json"), &text)?;
-    } else {
+        write_part(&out.join("part.json"), counting.criterion, &run.tally)?;
+    } else if !run.convergence.is_empty() {
         write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();

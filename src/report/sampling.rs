@@ -110,6 +110,25 @@ pub struct HostRecord {
     pub threads: usize,
 }
 
+/// What a run was asked for.
+#[derive(Debug, Clone)]
+pub struct RunFacts {
+    /// Estimator: `mc`, `is`, `ce`, `subset`.
+    pub estimator: &'static str,
+    /// Profile, with its time step.
+    pub profile: Profile,
+    /// Models.
+    pub models: Vec<ModelId>,
+    /// Headways of the plan; none where the density draws them.
+    pub headways: Vec<Headway>,
+    /// Kind of points: `random`, `sobol`.
+    pub points: &'static str,
+    /// Samples asked for.
+    pub samples: u64,
+    /// Seed.
+    pub seed: u64,
+}
+
 /// `estimate.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct EstimateFile {
@@ -154,6 +173,41 @@ pub struct EstimateFile {
 }
 
 impl EstimateFile {
+    /// What every run says of itself; draws, levels and replicates are added by those that have them.
+    ///
+    /// # Errors
+    /// As [`DensityModel::content_sha256`].
+    pub fn new(
+        density: &DensityModel,
+        facts: RunFacts,
+        estimates: Vec<EstimateRow>,
+        host: HostRecord,
+    ) -> Result<EstimateFile> {
+        let names = facts.headways.iter().map(Headway::to_string);
+        let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
+        Ok(EstimateFile {
+            lanesweep_estimate: 1,
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            estimator: facts.estimator,
+            density: DensityRecord::of(density)?,
+            profile: facts.profile,
+            models: facts.models,
+            headways: if density.space.has_thw() { vec!["sampled".to_owned()] } else { names.collect() },
+            plan_headways: facts.headways,
+            points: facts.points,
+            samples: facts.samples,
+            seed: facts.seed,
+            plan_sha256: None,
+            draws: None,
+            stopped: stopped.unwrap_or(StopReason::Samples),
+            reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
+            estimates,
+            levels: Vec::new(),
+            bootstrap: None,
+            host,
+        })
+    }
+
     /// As JSON. What is not finite is null.
     ///
     /// # Errors
