@@ -176,14 +176,14 @@ impl Axis {
 
 /// The values a logarithmic axis must have room for, of estimates and their intervals (estimate, lower, upper).
 ///
-/// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than three decades
+/// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than one decade
 /// below the smallest estimate or, where that is zero, upper end. Below an upper end that stands for a zero estimate
 /// there is room for an arrow.
 pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
     let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
     let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
-    let lows = intervals.iter().map(|(_, l, _)| *l).filter(shown).map(|l| l.max(smallest / 1000.0));
+    let lows = intervals.iter().map(|(_, l, _)| *l).filter(shown).map(|l| l.max(smallest / 10.0));
     middles.iter().copied().chain(intervals.iter().map(|(_, _, u)| *u)).chain(lows).filter(shown).collect()
 }
 
@@ -255,6 +255,12 @@ fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
 /// The common logarithm of digit · 10^exponent.
 fn place((digit, exponent): OneTwoFive) -> f64 {
     f64::from(exponent) + libm::log10(f64::from(digit))
+}
+
+/// A plain number not much above `value` (positive), at which an axis from zero can end.
+pub(super) fn plain_end(value: f64) -> f64 {
+    let step = plain_step(value / 8.0);
+    (value / step - 1e-9).ceil() * step
 }
 
 /// The smallest 1, 2 or 5 times a power of ten that is not below `step` (positive).
@@ -340,6 +346,6 @@ mod tests {
     #[test]
     fn a_lower_end_near_zero_does_not_squeeze_the_estimates() {
         let reach = logarithmic_reach(&[(1e-3, 1e-200, 1e-2), (0.0, 0.0, 3e-3)]);
-        assert!(reach.iter().all(|v| *v >= 1e-6), "{reach:?}");
+        assert!(reach.iter().all(|v| *v >= 1e-4), "{reach:?}");
     }
 }

@@ -113,14 +113,14 @@ impl ConvergenceFigure {
         for (row, in_row) in panels.chunks(columns).enumerate() {
             let heads: Vec<Vec<String>> = in_row.iter().map(|p| NAME_BOLD.wrap(p, width_px)).collect();
             let heads_px = heads.iter().map(Vec::len).max().unwrap_or(0) as f64 * NAME_BOLD.line_px();
-            let (plot_top, mut bottom) = (y + heads_px + 24.0, y);
+            let (plot_top, mut bottom) = (y + heads_px + 30.0, y);
             for (column, (panel, head)) in in_row.iter().zip(&heads).enumerate() {
                 let left = BORDER_PX + column as f64 * (width_px + GAP_PX);
                 let across = (left + LEFT_PX, left + width_px - RIGHT_PX);
                 let down = (plot_top, plot_top + height_px);
                 let Some(axes) = Axes::around(drawn, across, down) else { return top };
                 paragraph(scene, (left, y), &head.join(" "), NAME_BOLD, width_px);
-                text(scene, (left, plot_top - 9.0), "Failure probability", TICK, TextAnchor::Start);
+                text(scene, (left, plot_top - 13.0), "Failure probability", TICK, TextAnchor::Start);
                 bottom = axes.frame(scene, across, down, most_x);
                 if panels.len() <= row * columns + column + columns {
                     text(scene, (across.1, bottom + 14.0), "Samples", TICK, TextAnchor::End);
@@ -183,16 +183,17 @@ impl Axes {
         (self.x.at(samples as f64), self.y.at(probability))
     }
 
-    /// The intervals as one area; of a single point as a whisker.
+    /// The intervals of neighbouring estimates as an area, of a single one as a whisker. Those of zeros are left to
+    /// the arrows: as areas down to the edge they would cover half of the panel and say no more.
     fn band(&self, scene: &mut Scene, points: &[ConvergencePoint], look: &Look) {
-        if let [p] = points {
-            scene.add(look.line(path_data(&[self.at(p.samples, p.lower), self.at(p.samples, p.upper)], false)));
-            return;
-        }
-        let upper = points.iter().map(|p| self.at(p.samples, p.upper));
-        let outline: Vec<_> = upper.chain(points.iter().rev().map(|p| self.at(p.samples, p.lower))).collect();
-        if !outline.is_empty() {
-            area(scene, &outline, look.colour.clone(), 0.15);
+        for run in points.split(|p| p.probability == 0.0) {
+            let upper = run.iter().map(|p| self.at(p.samples, p.upper));
+            let outline: Vec<_> = upper.chain(run.iter().rev().map(|p| self.at(p.samples, p.lower))).collect();
+            match run.len() {
+                0 => {}
+                1 => scene.add(look.line(path_data(&outline, false))),
+                _ => area(scene, &outline, look.colour.clone(), 0.15),
+            }
         }
     }
 
@@ -231,7 +232,9 @@ impl Axes {
 /// A short bar with an arrow downwards: the value is somewhere below.
 fn limit(scene: &mut Scene, (x, y): (f64, f64), look: &Look) {
     let solid = Look { dash: None, line_px: 1.6, ..look.clone() };
-    scene.elements.push(solid.line(path_data(&[(x - 5.0, y), (x + 5.0, y)], false)));
+    // The lines drawn first are the wider ones: where limits coincide, as they do early on, each can be seen.
+    let half = 1.6 * look.marker_px;
+    scene.elements.push(solid.line(path_data(&[(x - half, y), (x + half, y)], false)));
     scene.elements.push(solid.line(path_data(&[(x, y), (x, y + 9.0)], false)));
     area(scene, &[(x - 3.5, y + 8.0), (x + 3.5, y + 8.0), (x, y + 15.0)], look.colour.clone(), 1.0);
 }
@@ -239,7 +242,7 @@ fn limit(scene: &mut Scene, (x, y): (f64, f64), look: &Look) {
 /// As in the legend's other figures, but thin: dozens of points lie close together.
 fn look(index: usize, count: usize) -> Look {
     let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
-    Look { line_px: 2.6 - 1.0 * depth, marker_px: 5.5 - 1.5 * depth, ..Look::of(index, count) }
+    Look { line_px: 2.6 - 1.0 * depth, marker_px: 5.5 - 2.0 * depth, ..Look::of(index, count) }
 }
 
 fn drawable(series: &ConvergenceSeries) -> Vec<ConvergencePoint> {
@@ -262,8 +265,8 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 /// What the marks mean, as far as they occur.
 fn caption(drawn: &[Vec<ConvergencePoint>]) -> String {
     let mut words = "Marker: estimate. Area or whisker: its interval. Both axes are logarithmic.".to_string();
-    if drawn.iter().flatten().any(|p| p.lower <= 0.0) {
-        words.push_str(" An interval that reaches the lower edge goes on to zero.");
+    if drawn.iter().flatten().any(|p| p.probability > 0.0 && p.lower < p.probability / 10.0) {
+        words.push_str(" An interval that reaches the lower edge goes on below it.");
     }
     if drawn.iter().flatten().any(|p| p.probability == 0.0) {
         words.push_str(" Arrow: the estimate is zero; the bar is the interval's upper end.");

@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use super::axis::{Axis, number};
+use super::axis::{Axis, number, plain_end};
 use super::drawing::{
     self, BORDER_PX, GREY, GRID, INK, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, paragraph, path_data, rect,
     text,
@@ -125,6 +125,7 @@ impl FailureMap {
         let shares: Vec<Share> = (0..self.samples.len()).map(|cell| self.share(cell)).collect();
         let known = |s: &Share| if let Share::Known { share, .. } = s { Some(*share) } else { None };
         let largest = shares.iter().filter_map(known).fold(0.0, f64::max);
+        let largest = if largest > 0.0 { plain_end(largest).min(1.0) } else { 0.0 };
 
         let y = paragraph(&mut scene, (BORDER_PX, y + 14.0), &self.y.label(), LABEL, RIGHT_PX - BORDER_PX);
         let ratio = self.y.cells() as f64 / self.x.cells() as f64;
@@ -140,10 +141,10 @@ impl FailureMap {
         let mut below = x.draw_below(&mut scene, (top, bottom), 8, false);
         colour_bar(&mut scene, (top, bottom), largest);
         for line in LABEL.wrap(&self.x.label(), RIGHT_PX - LEFT_PX) {
-            text(&mut scene, ((LEFT_PX + RIGHT_PX) / 2.0, below + 16.0), &line, LABEL, TextAnchor::Middle);
+            text(&mut scene, ((LEFT_PX + RIGHT_PX) / 2.0, below + 19.0), &line, LABEL, TextAnchor::Middle);
             below += LABEL.line_px();
         }
-        let below = key(&mut scene, &shares, below + 16.0);
+        let below = key(&mut scene, &shares, below + 20.0);
         let below = drawing::notes(&mut scene, "Notes:", &self.notes(&shares), below + 10.0);
         drawing::document(scene, below)
     }
@@ -153,27 +154,34 @@ impl FailureMap {
             let edges: Vec<f64> = edges.edges.iter().map(|e| axis.at(*e)).collect();
             edges
         });
-        // Without smoothing no white seams between neighbours.
-        group(scene, "shape-rendering=\"crispEdges\"", None);
-        for (cell, share) in shares.iter().enumerate() {
+        let corners = |cell: usize| {
             let (i, j) = (cell % self.x.cells(), cell / self.x.cells());
-            let corners = ((across[i], up[j]), (across[i + 1], up[j + 1]));
-            if let Share::Known { share, few } = share {
-                let class = if *few { "class=\"cell few\"" } else { "class=\"cell\"" };
-                group(scene, class, Some(self.tip(cell, *share)));
-                square(scene, corners, share_colour(*share, largest), *few);
+            ((across[i], up[j]), (across[i + 1], up[j + 1]))
+        };
+        // Whole cells without smoothing, so that no white seams part neighbours; the rims of small squares need it.
+        for few_now in [false, true] {
+            let whole = "shape-rendering=\"crispEdges\"";
+            group(scene, if few_now { "class=\"rarely-sampled\"" } else { whole }, None);
+            for (cell, share) in shares.iter().enumerate() {
+                let Share::Known { share, few } = *share else { continue };
+                if few != few_now {
+                    continue;
+                }
+                let class = if few { "class=\"cell few\"" } else { "class=\"cell\"" };
+                group(scene, class, Some(self.tip(cell, share)));
+                square(scene, corners(cell), share_colour(share, largest), few);
                 scene.elements.push(Primitive::GroupEnd);
             }
+            scene.elements.push(Primitive::GroupEnd);
         }
-        scene.elements.push(Primitive::GroupEnd);
         let mut strokes = Vec::new();
         for (cell, share) in shares.iter().enumerate() {
-            let (i, j) = (cell % self.x.cells(), cell / self.x.cells());
+            let ((left, lower), (right, upper)) = corners(cell);
             if matches!(share, Share::Empty | Share::Wrong) {
-                strokes.push(path_data(&[(across[i], up[j]), (across[i + 1], up[j + 1])], false));
+                strokes.push(path_data(&[(left, lower), (right, upper)], false));
             }
             if *share == Share::Wrong {
-                strokes.push(path_data(&[(across[i + 1], up[j]), (across[i], up[j + 1])], false));
+                strokes.push(path_data(&[(left, upper), (right, lower)], false));
             }
         }
         hatch(scene, &strokes);
@@ -197,7 +205,10 @@ impl FailureMap {
         }
         let wrong = shares.iter().filter(|s| **s == Share::Wrong).count();
         if wrong > 0 {
-            lines.push(format!("{wrong} cells count more failures than samples and are crossed out."));
+            lines.push(format!(
+                "Crossed out, because failures are more than samples: {wrong} of {} cells.",
+                shares.len()
+            ));
         }
         lines
     }
@@ -232,7 +243,9 @@ fn square(scene: &mut Scene, (a, b): Corners, fill: Color, few: bool) {
     }
     let inner = |from: f64, to: f64| (from + 0.22 * (to - from), to - 0.22 * (to - from));
     let ((x1, x2), (y1, y2)) = (inner(a.0, b.0), inner(a.1, b.1));
-    rect(scene, (x1, y1), (x2, y2), fill, Some((HATCH, 0.8)));
+    // In small cells the rim must not outweigh the colour.
+    let rim_px = (0.08 * (x2 - x1).abs().min((y2 - y1).abs())).min(0.8);
+    rect(scene, (x1, y1), (x2, y2), fill, Some((HATCH, rim_px)));
 }
 
 fn hatch(scene: &mut Scene, strokes: &[String]) {
@@ -259,7 +272,7 @@ fn scale_colour(place: f64) -> Color {
     Color::Rgb(mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
 }
 
-/// The scale from zero to the largest share, at the right of the map; without any failure there is none.
+/// The scale from zero to `largest`, a plain number at or above every share, at the right of the map; without any failure there is none.
 fn colour_bar(scene: &mut Scene, (top, bottom): (f64, f64), largest: f64) {
     if largest <= 0.0 {
         return;
@@ -380,7 +393,7 @@ mod tests {
         let expected = "x_lower,x_upper,y_lower,y_upper,samples,failures,share\n\
                         10,15,10,15,8,2,0.25\n15,20,10,15,0,0,\n10,15,15,20,4,5,\n15,20,15,20,3,1,0.3333333333333333\n";
         assert_eq!(map.csv(), expected);
-        assert!(words(&map.svg()).contains("1 cells count more failures than samples"));
+        assert!(words(&map.svg()).contains("failures are more than samples: 1 of 4 cells"));
     }
 
     #[test]

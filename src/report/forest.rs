@@ -132,11 +132,11 @@ impl ForestFigure {
             rect(&mut scene, (PLOT_PX.0, top), (PLOT_PX.1, bottom), Color::None, Some((GREY, 1.0)));
             below = axis.draw_below(&mut scene, (top, bottom), MOST_NUMBERS, false);
             for words in NAME.wrap(&self.axis, TEXT_WIDTH_PX - NAME_WIDTH_PX) {
-                text(&mut scene, ((PLOT_PX.0 + PLOT_PX.1) / 2.0, below + 16.0), &words, NAME, TextAnchor::Middle);
+                text(&mut scene, ((PLOT_PX.0 + PLOT_PX.1) / 2.0, below + 20.0), &words, NAME, TextAnchor::Middle);
                 below += NAME.line_px();
             }
         }
-        let y = paragraph(&mut scene, (BORDER_PX, below + 14.0), &self.caption(), NOTE, TEXT_WIDTH_PX);
+        let y = paragraph(&mut scene, (BORDER_PX, below + 18.0), &self.caption(), NOTE, TEXT_WIDTH_PX);
         drawing::document(scene, y)
     }
 
@@ -242,9 +242,13 @@ impl ForestFigure {
         if drawn.iter().any(|d| d.below) {
             words.push_str(" Arrow: the estimate is zero; the bar is the interval's upper end.");
         }
-        let cut = |d: &Drawn| !d.below && d.estimate.is_some() && d.interval.is_some_and(|(lower, _)| lower <= 0.0);
+        let cut = |d: &Drawn| {
+            !d.below
+                && d.estimate.is_some()
+                && d.interval.is_some_and(|(lower, _)| lower < d.estimate.unwrap_or(0.0) / 10.0)
+        };
         if self.scale == AxisScale::Logarithmic && drawn.iter().any(cut) {
-            words.push_str(" A line that reaches the left edge goes on to zero.");
+            words.push_str(" A line that reaches the left edge goes on beyond it.");
         }
         words
     }
