@@ -177,11 +177,13 @@ impl FailureMap {
         let mut strokes = Vec::new();
         for (cell, share) in shares.iter().enumerate() {
             let ((left, lower), (right, upper)) = corners(cell);
-            if matches!(share, Share::Empty | Share::Wrong) {
-                strokes.push(path_data(&[(left, lower), (right, upper)], false));
-            }
-            if *share == Share::Wrong {
-                strokes.push(path_data(&[(left, upper), (right, lower)], false));
+            match share {
+                Share::Empty => strokes.extend(hatching(corners(cell))),
+                Share::Wrong => {
+                    strokes.push(path_data(&[(left, lower), (right, upper)], false));
+                    strokes.push(path_data(&[(left, upper), (right, lower)], false));
+                }
+                Share::Known { .. } => {}
             }
         }
         hatch(scene, &strokes);
@@ -246,6 +248,19 @@ fn square(scene: &mut Scene, (a, b): Corners, fill: Color, few: bool) {
     // In small cells the rim must not outweigh the colour.
     let rim_px = (0.08 * (x2 - x1).abs().min((y2 - y1).abs())).min(0.8);
     rect(scene, (x1, y1), (x2, y2), fill, Some((HATCH, rim_px)));
+}
+
+/// Lines along the diagonal of a cell, about 12 px apart; in small cells the diagonal alone.
+fn hatching(((left, lower), (right, upper)): Corners) -> Vec<String> {
+    let size_px = (right - left).abs().min((upper - lower).abs());
+    let lines = (size_px / 12.0).clamp(1.0, 100.0) as i32;
+    let at = |x: f64, y: f64| (left + x * (right - left), lower + y * (upper - lower));
+    let line = |k: i32| {
+        let shift = f64::from(k) / f64::from(lines);
+        let (from, to) = ((-shift).max(0.0), (1.0 - shift).min(1.0));
+        path_data(&[at(from, from + shift), at(to, to + shift)], false)
+    };
+    (1 - lines..lines).map(line).collect()
 }
 
 fn hatch(scene: &mut Scene, strokes: &[String]) {
@@ -322,7 +337,7 @@ fn key(scene: &mut Scene, shares: &[Share], top: f64) -> f64 {
     if is(|s| matches!(s, Share::Empty)) {
         let (a, b) = entry(scene, "no samples");
         rect(scene, a, b, Color::None, Some((GRID, 0.8)));
-        hatch(scene, &[path_data(&[a, b], false)]);
+        hatch(scene, &hatching((a, b)));
         any = true;
     }
     if any { top + 22.0 } else { top }
