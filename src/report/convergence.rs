@@ -191,7 +191,7 @@ impl Axes {
             let outline: Vec<_> = upper.chain(run.iter().rev().map(|p| self.at(p.samples, p.lower))).collect();
             match run.len() {
                 0 => {}
-                1 => scene.add(look.line(path_data(&outline, false))),
+                1 => scene.add(Look { dash: None, line_px: 1.2, ..look.clone() }.line(path_data(&outline, false))),
                 _ => area(scene, &outline, look.colour.clone(), 0.15),
             }
         }
