@@ -17,6 +17,7 @@ pub mod radar;
 pub mod reference;
 pub mod run_record;
 pub mod sampling;
+pub mod sampling_figures;
 pub mod study;
 pub mod tables;
 pub mod verification;

@@ -11,7 +11,7 @@ use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
 use crate::profile::Profile;
-use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, MapCounts, RiskRate, SampleTally, WorstSample};
+use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, RiskRate, SampleTally, WorstSample};
 use crate::sweep::generated::ATTEMPTS;
 use crate::sweep::{Headway, LanePlan, Outcome};
 use crate::{Error, Result};
@@ -471,35 +471,6 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
         table.push(fields);
     }
     super::csv::text(table)
-}
-
-/// A failure map of one model as CSV.
-///
-/// # Errors
-/// None for what this program made.
-pub fn map_csv(map: &MapCounts, model: usize) -> Result<Vec<u8>> {
-    let (x, y) = (map.axes.x.edges(), map.axes.y.edges());
-    let header = [
-        format!("{}_low", map.axes.x.name),
-        format!("{}_high", map.axes.x.name),
-        format!("{}_low", map.axes.y.name),
-        format!("{}_high", map.axes.y.name),
-        "lanes".to_owned(),
-        "failures".to_owned(),
-    ];
-    let mut rows = vec![header.to_vec()];
-    for (at, lanes) in map.lanes.iter().enumerate() {
-        let (row, column) = (at / (x.len() - 1), at % (x.len() - 1));
-        rows.push(vec![
-            x[column].to_string(),
-            x[column + 1].to_string(),
-            y[row].to_string(),
-            y[row + 1].to_string(),
-            lanes.to_string(),
-            map.failures[model][at].to_string(),
-        ]);
-    }
-    super::csv::text(rows)
 }
 
 fn number(value: Option<f64>) -> String {
