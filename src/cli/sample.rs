@@ -158,6 +158,9 @@ impl EstimatorFlag {
     }
 }
 
+/// Draws that the valid share of each of several proposals is counted on.
+const VALIDITY_DRAWS: u64 = 1_000_000;
+
 /// Everything that a run was given, read and checked.
 struct Run<'a> {
     flags: &'a Sample,
@@ -523,8 +526,13 @@ impl Run<'_> {
             EstimatorFlag::Mc | EstimatorFlag::Is => {
                 let read = |path: &PathBuf| read_proposal(path, &self.density);
                 let mixtures: Vec<Mixture> = flags.proposal.iter().map(read).collect::<Result<_>>()?;
-                let proposals: Vec<Defended> =
-                    mixtures.into_iter().map(|m| defended(m, nominal, flags.defence)).collect::<Result<_>>()?;
+                let is_one = mixtures.len() == 1;
+                let prepared = |mixture| {
+                    let proposal = defended(mixture, nominal, flags.defence)?;
+                    // One proposal's valid share comes out of its own draws.
+                    Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed, VALIDITY_DRAWS) })
+                };
+                let proposals: Vec<Defended> = mixtures.into_iter().map(prepared).collect::<Result<_>>()?;
                 let estimate = match &proposals[..] {
                     [one] => importance(nominal, one, &lanes, &importance_options)?,
                     several => {
