@@ -95,25 +95,27 @@ fn estimates(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f
     all
 }
 
-/// A headway at which the probability is between these.
-fn headway(density: &DensityModel, profile: &Profile, model: ModelId, least: f64, most: f64) -> Option<(f64, f64)> {
-    (1..=20).rev().map(|k| f64::from(k) / 10.0).find_map(|thw_s| {
-        let p = crude(density, profile, model, thw_s, 200_000, LEVEL).probability;
-        (least..most).contains(&p).then_some((thw_s, p))
+/// A model and a headway at which the probability is between these.
+fn rare(density: &DensityModel, profile: &Profile, least: f64, most: f64) -> Option<(ModelId, f64)> {
+    let models = [ModelId::Fsm, ModelId::Rss, ModelId::Cchdm, ModelId::Reg157];
+    let headways = (1..=40).rev().map(|k| f64::from(k) / 10.0);
+    headways.flat_map(|thw_s| models.map(|model| (model, thw_s))).find(|&(model, thw_s)| {
+        (least..most).contains(&crude(density, profile, model, thw_s, 100_000, LEVEL).probability)
     })
 }
 
-fn compare(name: &str, scenarios: &[Scenario], key: &str, model: ModelId, samples: u64, n: u64) {
+fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, samples: u64, n: u64) {
     let profile = Profile::load("paper").unwrap();
-    let id = ParameterizationId::find(Category::CutIn, key).unwrap();
+    let id = ParameterizationId::find(category, key).unwrap();
     let density = density(id, scenarios);
     let kernels = density.kde.points().len();
-    let Some((thw_s, _)) = headway(&density, &profile, model, 2e-4, 2e-2) else {
+    let Some((model, thw_s)) = rare(&density, &profile, 2e-4, 2e-2) else {
         panic!("{name}: no headway with a rare but measurable failure");
     };
     let truth = crude(&density, &profile, model, thw_s, samples, 0.95);
     println!(
-        "{name}, cut-in {key} ({kernels} scenarios, P_valid {:.4}), {} collides at THW {thw_s} s: {:.4e} ± {:.1} % ({} of {} lanes)",
+        "{name}, {} {key} ({kernels} scenarios, P_valid {:.4}), {} collides at THW {thw_s} s: {:.4e} ± {:.1} % ({} of {} lanes)",
+        category.label(),
         density.valid.estimate,
         model.name(),
         truth.probability,
@@ -145,7 +147,7 @@ fn default_data() -> Vec<Scenario> {
 
 #[test]
 fn estimators_agree_with_crude_monte_carlo_on_lanes() {
-    compare("default data", &default_data(), "1", ModelId::Fsm, 1_000_000, 20_000);
+    compare("default data", &default_data(), Category::CutIn, "1", 1_000_000, 20_000);
 }
 
 #[test]
@@ -153,12 +155,12 @@ fn estimators_agree_with_crude_monte_carlo_on_lanes() {
 fn every_estimator_holds_what_a_hundred_million_lanes_resolve() {
     let mined = |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), || ()).unwrap().scenarios;
     let samples = 100_000_000;
-    compare("default data", &default_data(), "2", ModelId::Fsm, samples, 100_000);
+    compare("default data", &default_data(), Category::CutIn, "2", samples, 100_000);
     if let Some(dir) = common::sumo_recordings() {
-        compare("SUMO", &mined(dir), "1", ModelId::Fsm, samples, 100_000);
+        compare("SUMO", &mined(dir), Category::Lvd, "i", samples, 100_000);
     }
     match std::env::var_os("LANESWEEP_DLR_HT") {
-        Some(dir) => compare("DLR-HT", &mined(dir.into()), "2", ModelId::Fsm, samples, 100_000),
+        Some(dir) => compare("DLR-HT", &mined(dir.into()), Category::CutIn, "2", samples, 100_000),
         None => eprintln!("SKIPPED: needs LANESWEEP_DLR_HT, a folder of DLR-HT recordings in highD's format"),
     }
 }

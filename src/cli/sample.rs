@@ -34,6 +34,7 @@ use crate::{Error, Place, Result};
 /// the probability of failure with its interval: by crude Monte Carlo, importance sampling, cross-entropy or subset
 /// simulation. Each estimate says when it should not be trusted. A table goes to stdout, files to --out.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut_in_2.json --samples 1000000\n  lanesweep \
                         sample cut_in_1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \

@@ -1,0 +1,238 @@
+//! Sampling runs: the same counts and the same worst lanes however a run is cut up, and what the command line makes
+//! of good and bad input.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use assert_cmd::Command;
+use lanesweep::criterion::Criterion;
+use lanesweep::density::{DataFacts, DensityModel, FitOptions, read_density, write_density};
+use lanesweep::driver::ModelId;
+use lanesweep::gpu::{GpuBackend, GpuOptions};
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::parameterization::ParameterizationId;
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{
+    MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
+};
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::sweep::{Backend, CpuBackend, Headway, LanePlan, Wanted};
+use lanesweep::trajectory::generator::GeneratorOptions;
+
+fn scenarios() -> &'static [Scenario] {
+    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
+    MINED.get_or_init(|| {
+        mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios
+    })
+}
+
+fn density(category: Category, key: &str) -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    DensityModel::fit(ParameterizationId::find(category, key).unwrap(), scenarios(), &facts, &options).unwrap().model
+}
+
+/// A folder with a density file in it.
+fn folder() -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("density.json");
+    write_density(&path, &density(Category::CutIn, "2")).unwrap();
+    (dir, path)
+}
+
+fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
+    let options = SamplePlanOptions {
+        samples,
+        seed: 5,
+        source: SampleSource::Random,
+        models: ModelId::ALL.to_vec(),
+        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]),
+    };
+    plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap()
+}
+
+/// Counts in chunks that end at these samples, joined in the order given.
+fn tally(plan: &LanePlan, backend: &dyn Backend, ranges: &[(u64, u64)], options: &TallyOptions) -> SampleTally {
+    let mut session = backend.prepare(plan).unwrap();
+    ranges.iter().fold(SampleTally::empty(plan, options), |all, &(from, to)| {
+        let chunk = session.run(from..to, Wanted::Outcomes).unwrap();
+        all.merge(SampleTally::of_chunk(plan, &chunk, options).unwrap()).unwrap()
+    })
+}
+
+#[test]
+fn counts_and_worst_lanes_are_the_same_however_a_run_is_cut_up() {
+    let profile = Profile::load("paper").unwrap();
+    for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "f"), (Category::Lvd, "ii")] {
+        let density = density(category, key);
+        let n = 3700;
+        let plan = plan(&density, n, &profile);
+        let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
+        let map = Some(MapAxes::of(&density, names[0], names[1]).unwrap());
+        let options = TallyOptions { worst: 12, criterion: Criterion::Collision, map };
+        let cpu = CpuBackend::lane_arithmetic();
+        let whole = tally(&plan, &cpu, &[(0, n)], &options);
+        assert!(whole.failures.iter().sum::<u64>() > 0 && whole.worst.iter().all(|w| w.len() == 12));
+        let of_37: Vec<(u64, u64)> = (0..37).map(|k| (100 * k, 100 * (k + 1))).collect();
+        let mut backwards = of_37.clone();
+        backwards.reverse();
+        for ranges in [&of_37, &backwards, &vec![(1234, n), (0, 1), (1, 1234)]] {
+            assert!(whole == tally(&plan, &cpu, ranges, &options), "{key}: {} chunks", ranges.len());
+        }
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(whole == pool.install(|| tally(&plan, &cpu, &of_37, &options)), "{key}: {threads} threads");
+        }
+        if let Some((adapters, index)) = common::device::software_device() {
+            let device = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+            assert!(whole == tally(&plan, &device, &[(2000, n), (0, 2000)], &options), "{key}: device");
+        }
+    }
+}
+
+#[test]
+fn parts_of_different_runs_and_doubled_parts_do_not_join() {
+    let profile = Profile::load("paper").unwrap();
+    let density = density(Category::CutIn, "2");
+    let (one, other) = (plan(&density, 500, &profile), plan(&density, 501, &profile));
+    let options = TallyOptions { worst: 2, criterion: Criterion::Ttc, map: None };
+    let cpu = CpuBackend::lane_arithmetic();
+    let part = |plan: &LanePlan, from, to| tally(plan, &cpu, &[(from, to)], &options);
+    assert!(part(&one, 0, 100).merge(part(&other, 100, 200)).is_err(), "two runs");
+    let error = part(&one, 0, 100).merge(part(&one, 99, 200)).unwrap_err().to_string();
+    assert!(error.contains("samples 99 to 99 are in both"), "{error}");
+}
+
+#[test]
+fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
+    let (dir, _) = folder();
+    let run = |args: &[&str]| {
+        let (code, out, err) = lanesweep(dir.path(), &[&["-q", "sample"], args].concat());
+        assert_eq!(code, 0, "{args:?}: {err}");
+        out
+    };
+    let base = ["density.json", "--samples", "3000", "--thw", "0.6,0.3", "--seed", "9", "--backend", "cpu"];
+    run(&[&base[..], &["--out", "whole", "--rows", "rows.csv"]].concat());
+    run(&[&base[..], &["--out", "a", "--lanes", "0..1111"]].concat());
+    run(&[&base[..], &["--out", "b", "--lanes", "1111..3000"]].concat());
+    run(&["--join", "b", "a", "--out", "joined"]);
+    let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
+    for file in ["estimates.csv", "worst.csv", "map-FSM.csv", "map-Reg157.svg", "density.json"] {
+        assert!(read(&format!("whole/{file}")) == read(&format!("joined/{file}")), "{file}");
+    }
+    let (code, _, err) = lanesweep(dir.path(), &["sample", "--join", "a", "--out", "half"]);
+    assert_eq!(code, 4, "{err}");
+    assert!(err.contains("1889 of 3000 samples are in no part"), "{err}");
+    let (code, _, err) = lanesweep(dir.path(), &["sample", "--join", "a", "a", "--out", "twice"]);
+    assert_eq!(code, 3, "{err}");
+    assert_eq!(read("rows.csv").lines().count(), 1 + 3000 * 2 * 4);
+    // The worst lanes say how to run them again, and it is the same lane.
+    let mut reader = csv::Reader::from_reader(std::fs::File::open(dir.path().join("whole/worst.csv")).unwrap());
+    let rows: Vec<std::collections::HashMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
+    assert_eq!(rows.len(), 80);
+    for row in rows.iter().step_by(9) {
+        let (code, trace, summary) = lanesweep(dir.path(), &["simulate", "--from", "whole", "--lane", &row["lane"]]);
+        assert_eq!(code, 0, "{summary}");
+        assert!(trace.starts_with("t_s,"));
+        let verdict = |name: &str, key: &str| {
+            let word = if row[key] == "1" { "FAIL" } else { "pass" };
+            assert!(summary.contains(&format!("{name} {word}")), "{}: {summary}", row["lane"]);
+        };
+        verdict("Collision", "collision");
+        verdict("TTC", "ttc");
+        verdict("BTN", "btn");
+        let speed: f64 = row["impact_speed_mps"].parse().unwrap();
+        assert!(speed == 0.0 || summary.contains(&format!(" {speed} m/s")), "{}: {summary}", row["lane"]);
+    }
+}
+
+#[test]
+fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
+    let (dir, _) = folder();
+    let base = ["-q", "sample", "density.json", "--thw", "0.3", "--models", "FSM", "--backend", "cpu"];
+    let run = |args: &[&str]| {
+        let (code, _, err) = lanesweep(dir.path(), &[&base[..], args].concat());
+        assert_eq!(code, 0, "{args:?}: {err}");
+    };
+    run(&["--samples", "60000", "--out", "mc"]);
+    run(&["--estimator", "is", "--samples", "20000", "--out", "is"]);
+    run(&["--estimator", "ce", "--samples", "20000", "--out", "ce"]);
+    run(&["--estimator", "subset", "--out", "subset"]);
+    let (is, ce) = ("is/proposal-FSM.json", "ce/proposal-FSM.json");
+    run(&["--estimator", "is", "--proposal", ce, "--samples", "20000", "--out", "again"]);
+    let both = ["--proposal", is, "--proposal", ce];
+    run(&[&["--estimator", "is", "--samples", "20000", "--out", "balance"], &both[..]].concat());
+    let estimate = |folder: &str| -> serde_json::Value {
+        let text = std::fs::read(dir.path().join(folder).join("estimate.json")).unwrap();
+        let file: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        file["estimates"][0]["estimate"].clone()
+    };
+    let truth = estimate("mc")["probability"].as_f64().unwrap();
+    for folder in ["is", "ce", "subset", "again", "balance"] {
+        let found = estimate(folder);
+        let p = found["probability"].as_f64().unwrap();
+        let error = found["coefficient_of_variation"].as_f64().unwrap();
+        assert!((p / truth - 1.0).abs() < 5.0 * error + 0.05, "{folder}: {p} beside {truth}");
+    }
+}
+
+#[test]
+fn bad_input_is_told_with_its_place_and_what_to_do() {
+    let (dir, path) = folder();
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(dir.path().join("newer.json"), text.replace("\"lanesweep_density\": 1", "\"lanesweep_density\": 2"))
+        .unwrap();
+    std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
+    std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
+    let d = "density.json";
+    let cases: [(&[&str], i32, &str); 22] = [
+        (&[d, "--samples", "0"], 2, "0 samples"),
+        (&[d, "--samples", "9223372036854775808"], 2, "2^63"),
+        (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),
+        (&[d, "--samples", "-1"], 2, "--samples"),
+        (&[d, "--models", "Reg158"], 2, "no driver model `Reg158`"),
+        (&[d, "--criterion", "crash"], 2, "no criterion `crash`"),
+        (&[d, "--map", "v_ego_mps,v_egg_mps"], 2, "did you mean `v_ego_mps`"),
+        (&[d, "--map", "v_ego_mps,v_ego_mps"], 2, "twice"),
+        (&[d, "--thw", "-1"], 2, "no time headway"),
+        (&[d, "--thw", "sampled"], 2, "--with-thw"),
+        (&[d, "--estimator", "subset"], 2, "one headway at a time"),
+        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "only crude Monte Carlo can be split"),
+        (&[d, "--lanes", "5..5"], 2, "no interval"),
+        (&[d, "--lanes", "0..10", "--samples", "9"], 2, "no interval"),
+        (&[d, "--level", "1"], 2, "no share"),
+        (&[d, "--points", "sobol", "--samples", "5000000000"], 2, "4294967296"),
+        (&["absent.json"], 6, "absent.json"),
+        (&["newer.json"], 3, "version 2"),
+        (&["cut.json"], 3, "cut.json"),
+        (&["edited.json"], 3, "edited.json"),
+        (&[d, "--estimator", "is", "--thw", "1", "--proposal", d], 3, "no proposal"),
+        (&["--join", "."], 6, "estimate.json"),
+    ];
+    for (args, code, said) in cases {
+        let (found, out, err) = lanesweep(dir.path(), &[&["sample"], args].concat());
+        assert_eq!(found, code, "{args:?}: {err}");
+        let flat = err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(flat.contains(said), "{args:?}: {err}");
+        assert!(out.is_empty() && !err.contains("panicked"), "{args:?}");
+    }
+    assert!(read_density(&path).is_ok());
+}
+
+#[test]
+fn a_cut_out_that_begins_at_the_exposure_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    write_density(&dir.path().join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();
+    let (code, _, err) = lanesweep(dir.path(), &["sample", "cut-out.json", "--profile", "jrc-2021"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("exposure"), "{err}");
+}
