@@ -15,6 +15,7 @@ mod interval;
 mod monte_carlo;
 mod pilot;
 mod problem;
+mod ratio;
 mod stop;
 mod strata;
 mod subset;
@@ -34,6 +35,7 @@ pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
 pub use pilot::from_pilot_with_proposal;
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
+pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use strata::{Stratum, stratified};
 pub use subset::{Subset, SubsetLevel, SubsetRun, subset};

@@ -4,6 +4,7 @@
 //! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
 //! [`crate::score`]; text and files go to the user.
 
+pub mod compare;
 pub mod csv;
 pub mod density;
 pub mod files;
