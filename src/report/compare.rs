@@ -185,12 +185,13 @@ impl CompareFile {
         let text = format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval holds 1. > too high, < too low: it does not. ? undecided: fewer than {failures} failed lanes or \
-             {clusters} failing scenarios on one side, and the two intervals meet. Replayed is S', density is what is \
-             drawn. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
+             {clusters} failing scenarios on one side, and the two intervals meet. S' is replayed, density is drawn. \
+             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
-             says whether these scenarios are represented, not whether they are enough. Agreement with a wide \
-             interval is weak, and of cells that do agree 1 in 20 is marked otherwise by chance. Failures per hour and \
-             distance follow the same ratios: S and densities have the same exposure.",
+             says whether these scenarios are represented, not whether they are enough. A verdict says \
+             nothing of size: a ratio of 0.99 can be too low, agreement with a wide interval is weak. Of cells that do \
+             agree, 1 in 20 is marked otherwise by chance. Risks \
+             have the ratios of the rates: S and densities have the same exposure.",
             100.0 * self.level
         );
         wrap(&text, WIDTH)
@@ -210,7 +211,7 @@ impl CompareFile {
         rows.add_row(line("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect()));
         let risk = |r: RiskRate| format!("{} ± {}", short(r.estimate), short(r.standard_deviation));
         type Pick = fn(&RecordedCell) -> Option<RiskRate>;
-        let risks: [(&str, Pick); 2] = [("S per hour", |c| c.risk.per_hour), ("S per 1000 km", |c| c.risk.per_1000_km)];
+        let risks: [(&str, Pick); 2] = [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
         for (name, pick) in risks {
             let values: Option<Vec<String>> = recorded.iter().map(|c| pick(c).map(risk)).collect();
             values.into_iter().for_each(|values| {
@@ -221,7 +222,7 @@ impl CompareFile {
             let cells = || of.cells.iter().filter(|c| c.criterion == criterion);
             let replayed = cells().map(|c| cell(&c.replayed.rate, &c.replayed.ratio)).collect();
             let sampled = cells().map(|c| cell(&c.sampled.rate, &c.sampled.ratio)).collect();
-            rows.add_row(line(format!("{} replayed", of.key), replayed));
+            rows.add_row(line(format!("{} S'", of.key), replayed));
             rows.add_row(line(format!("{} density", of.key), sampled));
         }
         aligned(rows, 1) + "\n"
@@ -246,7 +247,7 @@ fn summary(category: &CategoryComparison) -> String {
         "cells of each verdict".to_owned(),
         "parameters".to_owned(),
         "mean F1 of labels".to_owned(),
-        format!("replayed{marks}"),
+        format!("S'{marks}"),
         format!("density{marks}"),
         "ratios of the density".to_owned(),
     ];
