@@ -8,7 +8,7 @@ use clap::Args;
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
 use super::source::{self, Source};
-use super::study::StudyConfig;
+use super::study::{How, StudyConfig, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
 use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
@@ -24,9 +24,7 @@ use crate::sampling::{
     ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
 };
 use crate::scenario::Scenario;
-use crate::sweep::{
-    Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepOptions, SweepSummary, Wanted, plan_study, sweep,
-};
+use crate::sweep::{Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepSummary, plan_study};
 use crate::{Error, Place, Result};
 
 /// Nominal level of every interval.
@@ -147,7 +145,10 @@ impl Compare {
             ));
         }
         make_folder(&self.out)?;
-        let (partial, mut swept) = recorded_lanes(plan, &opened, self.seed, verbosity)?;
+        tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
+        let recheck = opened.device().map(|_| Recheck::new(plan, self.seed, ONE_IN));
+        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+        let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
 
         let run = Run {
             flags: self,
@@ -259,27 +260,6 @@ impl Compare {
         }
         Ok(())
     }
-}
-
-/// S and every S', counted per scenario.
-fn recorded_lanes(
-    plan: &LanePlan,
-    opened: &Opened,
-    seed: u64,
-    verbosity: Verbosity,
-) -> Result<(Partial, SweepSummary)> {
-    tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
-    let recheck = opened.device().map(|_| Recheck::new(plan, seed, ONE_IN));
-    let how = SweepOptions { wanted: Wanted::Verdicts, fallback: opened.fallback(), recheck: recheck.as_ref() };
-    let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
-    let mut parts = Vec::new();
-    let summary = sweep(plan, 0..plan.unit_count(), opened.backend(), &how, |chunk| {
-        bar.inc(chunk.units.end - chunk.units.start);
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })?;
-    bar.finish_and_clear();
-    Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
 }
 
 impl Run<'_> {

@@ -11,6 +11,7 @@ use crate::density::Driven;
 use crate::driver::ModelId;
 use crate::estimate::{Enough, Ratio, RatioVerdict};
 use crate::sampling::{CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate};
+use crate::score::f1;
 use crate::{Error, Result};
 
 /// `compare.json`.
@@ -139,7 +140,7 @@ impl CompareFile {
         row.extend([s.rate.failures, s.rate.lanes, s.failing_scenarios].map(|n| n.to_string()));
         row.extend(rate(&replayed.rate));
         row.extend(ratio(&replayed.ratio));
-        row.push(number(replayed.f1));
+        row.push(number(f1(&replayed.labels)));
         row.extend(rate(&sampled.rate));
         row.extend(sampled.with_data.map(|v| v.to_string()));
         row.extend([sampled.rate.failures, sampled.rate.lanes].map(|n| n.to_string()));
@@ -257,7 +258,7 @@ fn summary(category: &CategoryComparison) -> String {
             let count = |v| of.cells.iter().filter(|c| pick(c).verdict == v).count();
             RatioVerdict::ALL.map(|v| format!("{:2}", count(v))).join(" ")
         };
-        let scores: Vec<f64> = of.cells.iter().filter_map(|c| c.replayed.f1).collect();
+        let scores: Vec<f64> = of.cells.iter().filter_map(|c| f1(&c.replayed.labels)).collect();
         let mean = scores.iter().sum::<f64>() / scores.len() as f64;
         let decided = of.cells.iter().map(|c| &c.sampled.ratio).filter(|r| r.verdict != RatioVerdict::Undecided);
         let mut ratios: Vec<f64> = decided.filter_map(|r| r.ratio).collect();

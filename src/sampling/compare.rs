@@ -23,7 +23,6 @@ use crate::estimate::{
     paired_ratio,
 };
 use crate::scenario::{Category, Scenario};
-use crate::score::f1;
 use crate::sweep::{Chunk, Confusion, LanePlan, Partial, SweepSummary};
 use crate::{Error, Result};
 
@@ -213,8 +212,8 @@ pub struct ReplayedCell {
     pub rate: RateRecord,
     /// S'/S.
     pub ratio: Ratio,
-    /// F1 of the labels; `None` where it is 0/0.
-    pub f1: Option<f64>,
+    /// Its labels against those of S, lane by lane.
+    pub labels: Confusion,
 }
 
 /// The same of a density's samples.
@@ -335,7 +334,7 @@ pub fn compare_cells(
         let replayed = ReplayedCell {
             rate: RateRecord::of(&clustered(&s_prime, cell, plan.headways.len(), level)),
             ratio: paired_ratio(s_prime.cell(cell), s.cell(cell), enough, level),
-            f1: f1(&labels[cell]),
+            labels: labels[cell],
         };
         let with_data = cluster_rate(sampled.counts.cell(cell), level).interval;
         let sampled = SampledCell {
