@@ -100,7 +100,7 @@ fn rare(density: &DensityModel, profile: &Profile, least: f64, most: f64) -> Opt
     let models = [ModelId::Fsm, ModelId::Rss, ModelId::Cchdm, ModelId::Reg157];
     let headways = (1..=40).rev().map(|k| f64::from(k) / 10.0);
     headways.flat_map(|thw_s| models.map(|model| (model, thw_s))).find(|&(model, thw_s)| {
-        (least..most).contains(&crude(density, profile, model, thw_s, 100_000, LEVEL).probability)
+        (least..most).contains(&crude(density, profile, model, thw_s, 20_000, LEVEL).probability)
     })
 }
 

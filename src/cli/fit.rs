@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::Exit;
 use super::console::{self, Verbosity};
+use super::lists;
 use super::source::{self, Source};
 use super::study::StudyConfig;
 use super::synth::GeneratorFlags;
@@ -15,7 +16,7 @@ use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFil
 use crate::mining::Collection;
 use crate::parameterization::ParameterizationId;
 use crate::report::{density, files::make_folder};
-use crate::scenario::{Category, write_scenarios_to};
+use crate::scenario::write_scenarios_to;
 use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
@@ -116,7 +117,7 @@ impl Fit {
         tracing::info!("{}", source.describe());
         let collection = source.load(&config.mining, verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
-        let facts = self.facts(&source, &collection, typed)?;
+        let facts = facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
         }
@@ -156,25 +157,7 @@ impl Fit {
 
     /// What is fitted, in the registry's order.
     fn ids(&self) -> Result<Vec<ParameterizationId>> {
-        let categories = source::categories(&self.category, "--category")?;
-        let of_categories = || ParameterizationId::ALL.into_iter().filter(|p| categories.contains(&p.category));
-        let wanted: Vec<&str> = self.parameterization.iter().map(|key| key.trim()).collect();
-        if wanted.is_empty() || wanted.contains(&"all") {
-            return Ok(of_categories().collect());
-        }
-        if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
-            let of = |c: &Category| {
-                let keys: Vec<&str> = ParameterizationId::of(*c).map(|p| p.key).collect();
-                format!("{}: {}", c.label(), keys.join(" "))
-            };
-            let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
-            return Err(Error::usage(
-                Place::item("--parameterization"),
-                format!("there is no parameterization `{unknown}` of {}", names.join(", ")),
-                format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
-            ));
-        }
-        Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
+        lists::parameterizations(&source::categories(&self.category, "--category")?, &self.parameterization)
     }
 
     /// One file per density, none of them an input.
@@ -200,39 +183,6 @@ impl Fit {
         Ok(files)
     }
 
-    /// Label, checksum and exposure of the data.
-    fn facts(&self, source: &Source, collection: &Collection, typed: Driven) -> Result<DataFacts> {
-        let scenarios_sha256 = match source {
-            Source::Scenarios(path) => source::checksum(path)?,
-            Source::Folder(_) | Source::Generated(_) => {
-                // That of the file that `mine` would write: the same scenarios have the same checksum.
-                let mut digest = Hashing(Sha256::new());
-                write_scenarios_to(&mut digest, &collection.scenarios)?;
-                crate::sweep::hex(&digest.0.finalize())
-            }
-        };
-        let mut facts = DataFacts {
-            data: source.describe(),
-            synthetic: source.is_synthetic(),
-            scenarios_sha256,
-            driven: Driven::of(collection),
-        };
-        if let Source::Scenarios(path) = source
-            && let Some(beside) = ExposureFile::read_beside(path, &facts.scenarios_sha256)?
-        {
-            facts.driven = Some(beside.driven);
-            facts.synthetic = beside.synthetic;
-            if beside.synthetic {
-                facts.data = beside.data;
-            }
-        }
-        if typed.hours.is_some() || typed.kilometres.is_some() {
-            // What was typed counts; hours typed for one set do not mix with kilometres of another.
-            facts.driven = Some(typed);
-        }
-        Ok(facts)
-    }
-
     fn write(&self, fitted: &[(PathBuf, DensityModel)]) -> Result<()> {
         for (path, model) in fitted {
             if let Some(dir) = path.parent().filter(|dir| *dir != Path::new("")) {
@@ -242,6 +192,39 @@ impl Fit {
         }
         Ok(())
     }
+}
+
+/// Label, checksum and exposure of the data.
+pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> Result<DataFacts> {
+    let scenarios_sha256 = match source {
+        Source::Scenarios(path) => source::checksum(path)?,
+        Source::Folder(_) | Source::Generated(_) => {
+            // That of the file that `mine` would write: the same scenarios have the same checksum.
+            let mut digest = Hashing(Sha256::new());
+            write_scenarios_to(&mut digest, &collection.scenarios)?;
+            crate::sweep::hex(&digest.0.finalize())
+        }
+    };
+    let mut facts = DataFacts {
+        data: source.describe(),
+        synthetic: source.is_synthetic(),
+        scenarios_sha256,
+        driven: Driven::of(collection),
+    };
+    if let Source::Scenarios(path) = source
+        && let Some(beside) = ExposureFile::read_beside(path, &facts.scenarios_sha256)?
+    {
+        facts.driven = Some(beside.driven);
+        facts.synthetic = beside.synthetic;
+        if beside.synthetic {
+            facts.data = beside.data;
+        }
+    }
+    if typed.hours.is_some() || typed.kilometres.is_some() {
+        // What was typed counts; hours typed for one set do not mix with kilometres of another.
+        facts.driven = Some(typed);
+    }
+    Ok(facts)
 }
 
 fn text(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> String {

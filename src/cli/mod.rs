@@ -3,12 +3,14 @@
 
 mod backend_flags;
 mod case_flags;
+mod compare;
 mod conformance;
 mod console;
 mod devices;
 mod environment;
 mod exit;
 mod fit;
+mod lists;
 mod mine;
 mod rerun;
 mod sample;
@@ -79,6 +81,7 @@ enum Verb {
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
+    Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
     Conformance(conformance::Conformance),
@@ -156,6 +159,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Mine(verb) => verb.run(cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(cli.common.verbosity()),
         Verb::Sample(verb) => verb.run(cli.common.verbosity()),
+        Verb::Compare(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
+use super::lists;
 use super::sample_join as join;
 use super::sample_lanes;
 use super::{Exit, ProfileFlags};
@@ -277,20 +278,7 @@ impl Sample {
     }
 
     fn models(&self) -> Result<Vec<ModelId>> {
-        if self.models.is_empty() {
-            return Ok(ModelId::ALL.to_vec());
-        }
-        let parse = |text: &String| {
-            ModelId::parse(text.trim()).ok_or_else(|| {
-                let names: Vec<&str> = ModelId::ALL.iter().map(|m| m.name()).collect();
-                let problem = format!("there is no driver model `{text}`");
-                Error::usage(Place::item("--models"), problem, format!("use {}", names.join(", ")))
-            })
-        };
-        let mut models = self.models.iter().map(parse).collect::<Result<Vec<_>>>()?;
-        models.sort();
-        models.dedup();
-        Ok(models)
+        lists::models(&self.models)
     }
 
     fn criterion(&self) -> Result<Criterion> {
@@ -305,17 +293,7 @@ impl Sample {
             Some("sampled") => Ok(SampleHeadways::Sampled),
             None if density.space.has_thw() => Ok(SampleHeadways::Sampled),
             None | Some("paper") => Ok(SampleHeadways::Each(Headway::paper())),
-            Some(list) => {
-                let parse = |text: &str| {
-                    let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
-                    value.map(Headway::ThwS).ok_or_else(|| {
-                        let problem = format!("`{text}` is no time headway");
-                        let help = "give seconds above 0, separated by commas, or `paper`, or `sampled`";
-                        Error::usage(Place::item("--thw"), problem, help)
-                    })
-                };
-                Ok(SampleHeadways::Each(list.split(',').map(parse).collect::<Result<_>>()?))
-            }
+            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `sampled`")?)),
         }
     }
 

@@ -200,10 +200,10 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 }
 
 /// Who computes the lanes, who stands in, who checks.
-struct How<'a> {
-    backend: &'a dyn Backend,
-    fallback: Option<&'a dyn Backend>,
-    recheck: Option<&'a Recheck<'a>>,
+pub(super) struct How<'a> {
+    pub backend: &'a dyn Backend,
+    pub fallback: Option<&'a dyn Backend>,
+    pub recheck: Option<&'a Recheck<'a>>,
 }
 
 impl How<'_> {
@@ -212,7 +212,8 @@ impl How<'_> {
     }
 }
 
-fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
+/// Every lane of a plan, counted.
+pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
     let summary = sweep(plan, 0..plan.unit_count(), how.backend, &how.options(Wanted::Verdicts), |chunk| {

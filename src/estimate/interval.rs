@@ -104,7 +104,7 @@ pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_fr
 }
 
 /// Quantile of Student's t. Above 1,000 degrees of freedom it is the normal one to 0.2 %.
-fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
+pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom > 1000.0 {
         return quantile(p);
     }

@@ -14,6 +14,7 @@ mod importance;
 mod interval;
 mod monte_carlo;
 mod problem;
+mod ratio;
 mod stop;
 mod strata;
 mod subset;
@@ -32,6 +33,7 @@ pub use importance::{
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
+pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use strata::{Stratum, stratified};
 pub use subset::{Subset, SubsetLevel, SubsetRun, subset};

@@ -5,6 +5,7 @@
 //! [`crate::score`]; text and files go to the user.
 
 pub mod axis;
+pub mod compare;
 pub mod convergence;
 pub mod csv;
 pub mod density;

@@ -120,7 +120,7 @@ fn resampled(density: &DensityModel, seed: u64, replicate: u32) -> Result<Densit
     let stream = Stream { seed, purpose: RESAMPLING.wrapping_add(replicate) };
     let n = points.len() as u32;
     let drawn = (0..n).map(|k| points[choose(stream.words(u64::from(k), 0)[0], n) as usize].clone()).collect();
-    let kde = Kde::from_parts(drawn, density.kde.scale().to_vec(), density.kde.bandwidth().clone())?;
+    let kde = Kde::from_parts(drawn, density.kde.scale().to_vec(), *density.kde.bandwidth())?;
     Ok(DensityModel { kde, ..density.clone() })
 }
 

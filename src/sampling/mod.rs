@@ -4,6 +4,7 @@
 //! about estimators. Densities come from [`crate::density`], lanes run in [`crate::sweep`].
 
 mod bootstrap;
+mod compare;
 mod crude;
 mod generator;
 mod lanes;
@@ -17,6 +18,10 @@ mod rows;
 mod tally;
 
 pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
+pub use compare::{
+    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
+    SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
+};
 pub use crude::{Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, sample_crude};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use lanes::{LaneLimitState, truncated};

@@ -76,6 +76,22 @@ impl Points {
         Drawn { values: [0.0; MOST_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
+    /// The component that a random draw comes from: that of draw `tries` (from 1) of an index. `None` for other
+    /// sources.
+    pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
+        let PointSource::Random(stream) = &self.source else { return None };
+        let words = stream.words(index, tries.checked_sub(1)? * BLOCKS);
+        Some(self.chosen(words[0], words[1]))
+    }
+
+    #[inline]
+    fn chosen(&self, word_a: u32, word_b: u32) -> u32 {
+        match &self.weights {
+            Some(table) => table.pick(word_a, word_b),
+            None => choose(word_a, self.components()),
+        }
+    }
+
     /// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
     #[inline]
     fn candidate(&self, index: u64, attempt: u32) -> [f32; MOST_PARAMETERS] {
@@ -101,10 +117,7 @@ impl Points {
                 return values;
             }
         }
-        let component = match &self.weights {
-            Some(table) => table.pick(words[0], words[1]),
-            None => choose(words[0], self.components()),
-        } as usize;
+        let component = self.chosen(words[0], words[1]) as usize;
         let factor = &self.factors[self.factor_of[component] as usize * d * d..][..d * d];
         let mean = &self.means[component * d..][..d];
         let mut deviates = [0.0; MOST_PARAMETERS];

@@ -1,0 +1,323 @@
+//! `lanesweep compare`: scenarios in, rates of failure of S, S' and densities beside one another out.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::backend_flags::{BackendFlags, Opened};
+use super::console::{self, Verbosity};
+use super::source::{self, Source};
+use super::study::{How, StudyConfig, run_plan};
+use super::synth::GeneratorFlags;
+use super::{Exit, ProfileFlags, fit, lists};
+use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
+use crate::driver::ModelId;
+use crate::estimate::Enough;
+use crate::parameterization::ParameterizationId;
+use crate::profile::Profile;
+use crate::report::compare::CompareFile;
+use crate::report::files::{make_folder, write_atomically};
+use crate::report::sampling::HostRecord;
+use crate::sampling::{
+    CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
+    ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
+};
+use crate::scenario::Scenario;
+use crate::sweep::{Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepSummary, plan_study};
+use crate::{Error, Place, Result};
+
+/// Nominal level of every interval.
+const LEVEL: f64 = 0.95;
+
+/// Which parameterizations give the right risk, not only the right labels?
+///
+/// Simulates the recorded scenarios (S) and their parameterized replays (S'), fits a density per parameterization on
+/// the same scenarios, draws --samples scenarios from each, and sets the rates of failure beside one another: per
+/// category, driver model and criterion, with the ratio to S and its interval. A ratio whose interval holds 1
+/// agrees. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "Examples:\n  lanesweep compare\n  lanesweep compare recordings --categories cut-in --samples \
+                        1000000\n  lanesweep compare --scenarios scenarios.jsonl --parameterization i,iii --models \
+                        FSM,RSS --thw 0.6,1.0")]
+pub struct Compare {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    dir: Option<PathBuf>,
+    /// Scenario file (JSON Lines) instead of recordings
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Folder for compare.csv, compare.json and compare.txt
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-compare")]
+    out: PathBuf,
+    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    categories: Vec<String>,
+    /// Parameterizations, separated by commas: 1…7, a…g, i…v, or all [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    parameterization: Vec<String>,
+    /// Driver models, separated by commas [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    models: Vec<String>,
+    /// Time headways in seconds, separated by commas, or `paper` (2.0, 1.8, … 0.2)
+    #[arg(long, value_name = "LIST|paper", default_value = "paper")]
+    thw: String,
+    /// Samples of each density; every sample runs from every headway
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    samples: u64,
+    /// Seed of the draws
+    #[arg(long, value_name = "N", default_value_t = 157)]
+    seed: u64,
+    /// Hours driven for the scenarios, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "H")]
+    hours: Option<f64>,
+    /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "KM")]
+    km: Option<f64>,
+    /// Study options (TOML): tables `mining`, `parameterization`, `score`
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    backend: BackendFlags,
+    #[command(flatten)]
+    profile: ProfileFlags,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+/// Everything that a run was given, read and checked, with the lanes of its study.
+struct Run<'a> {
+    flags: &'a Compare,
+    scenarios: &'a [Scenario],
+    facts: &'a DataFacts,
+    fit: FitOptions,
+    profile: &'a Profile,
+    models: Vec<ModelId>,
+    headways: Vec<Headway>,
+    enough: Enough,
+    opened: &'a Opened,
+    study: &'a LanePlan,
+    partial: &'a Partial,
+}
+
+impl Compare {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let started = Instant::now();
+        let config = StudyConfig::read(self.config.as_deref())?;
+        let categories = source::categories(&self.categories, "--categories")?;
+        let ids = lists::parameterizations(&categories, &self.parameterization)?;
+        let models = lists::models(&self.models)?;
+        let headways = self.headways()?;
+        self.check_samples()?;
+        let typed = Driven { hours: self.hours, kilometres: self.km };
+        typed.validate()?;
+        let profile = self.profile.load()?;
+        let source = match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(self.generator.options()?),
+        };
+        self.guard_inputs()?;
+        let opened = self.backend.open()?;
+        tracing::info!("{}", source.describe());
+        let collection = source.load(&config.mining, verbosity)?;
+        tracing::info!("{}", source::counts(&collection.scenarios));
+        let facts = fit::facts(&source, &collection, typed)?;
+        if facts.driven.is_none() {
+            tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
+        }
+
+        let options = StudyOptions {
+            // Categories without a wanted parameterization have nothing to be compared with.
+            categories: categories.into_iter().filter(|c| ids.iter().any(|id| id.category == *c)).collect(),
+            models: models.clone(),
+            headways: headways.clone(),
+            parameterization: config.parameterization.clone(),
+        };
+        let planned = plan_study(&collection.scenarios, &profile, &options)?;
+        let plan = &planned.plan;
+        if plan.unit_count() == 0 {
+            return Err(Error::input(
+                Place::item(source.describe()),
+                format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
+                "use more recordings, or relax the filters in the study file (--config)",
+            ));
+        }
+        make_folder(&self.out)?;
+        tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
+        let recheck = opened.device().map(|_| Recheck::new(plan, self.seed, ONE_IN));
+        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+        let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
+
+        let run = Run {
+            flags: self,
+            scenarios: &collection.scenarios,
+            facts: &facts,
+            fit: FitOptions {
+                parameterization: config.parameterization.clone(),
+                with_thw: false,
+                rule: BandwidthRule::Reduction,
+                representativeness: false,
+                ..FitOptions::default()
+            },
+            profile: &profile,
+            models: models.clone(),
+            headways: headways.clone(),
+            enough: Enough { failures: config.score.least_failures.into(), ..Enough::default() },
+            opened: &opened,
+            study: plan,
+            partial: &partial,
+        };
+        let mut compared: Vec<CategoryComparison> =
+            (0..plan.blocks.len()).map(|block| run.recorded(block)).collect::<Result<_>>()?;
+        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
+        let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
+        for id in &ids {
+            match run.parameterization(*id, &mut swept, |n| bar.inc(n)) {
+                Ok((cells, left_out)) => {
+                    complete &= left_out.is_empty();
+                    for error in &left_out {
+                        bar.suspend(|| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
+                    }
+                    let of = compared.iter_mut().find(|c| c.category == id.category);
+                    of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
+                }
+                // A profile whose cut-outs cannot be sampled is a usage error of that category alone.
+                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => failed.push(error),
+                Err(error) => return Err(error),
+            }
+        }
+        bar.finish_and_clear();
+        if compared.iter().all(|c| c.parameterizations.is_empty()) && !failed.is_empty() {
+            return Err(failed.swap_remove(0));
+        }
+        for error in &failed {
+            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
+        }
+
+        let file = CompareFile {
+            lanesweep_comparison: 1,
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            data: facts.data.clone(),
+            synthetic: facts.synthetic,
+            scenarios_sha256: facts.scenarios_sha256.clone(),
+            driven: facts.driven,
+            profile: profile.name.clone(),
+            models,
+            headways: headways.iter().map(Headway::to_string).collect(),
+            samples: self.samples,
+            seed: self.seed,
+            level: LEVEL,
+            enough: run.enough,
+            study_plan_sha256: plan.hash().to_owned(),
+            left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
+            categories: compared,
+            host: HostRecord {
+                backend: opened.backend().describe(),
+                device: opened.device(),
+                rechecked_lanes: swept.rechecked_lanes,
+                seconds: started.elapsed().as_secs_f64(),
+                threads: rayon::current_num_threads(),
+            },
+        };
+        self.write(&file)?;
+        Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
+    }
+
+    /// Tables and record; the record comes last. A figure of the ratios belongs here.
+    fn write(&self, file: &CompareFile) -> Result<()> {
+        let text = file.text();
+        write_atomically(&self.out.join("compare.csv"), &file.csv()?)?;
+        write_atomically(&self.out.join("compare.txt"), text.as_bytes())?;
+        write_atomically(&self.out.join("compare.json"), &file.to_json()?)?;
+        console::print(&text)?;
+        tracing::info!("results written to {}", self.out.display());
+        Ok(())
+    }
+
+    fn headways(&self) -> Result<Vec<Headway>> {
+        match self.thw.trim() {
+            "paper" => Ok(Headway::paper()),
+            list => lists::headways(list, "`paper`"),
+        }
+    }
+
+    fn check_samples(&self) -> Result<()> {
+        let problem = match self.samples {
+            0 => "0 samples estimate nothing",
+            n if n >= 1 << 48 => "2^48 samples and more cannot be counted",
+            _ => return Ok(()),
+        };
+        Err(Error::usage(Place::item("--samples"), problem, "give 20000, for instance"))
+    }
+
+    /// Results must not replace an input.
+    fn guard_inputs(&self) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(&self.config).cloned().collect();
+        for name in ["compare.csv", "compare.txt", "compare.json"] {
+            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
+        }
+        Ok(())
+    }
+}
+
+impl Run<'_> {
+    /// S of one category.
+    fn recorded(&self, block: usize) -> Result<CategoryComparison> {
+        let of = &self.study.blocks[block];
+        let exposure = self.facts.driven.map(|driven| Exposure::new(of.units.len(), driven));
+        let counts = ScenarioCounts::of_variant(self.study, self.partial, block, 0)?;
+        Ok(CategoryComparison {
+            category: of.category,
+            scenarios: of.units.len(),
+            exposure,
+            recorded: recorded_cells(self.study, &counts, exposure.as_ref(), LEVEL),
+            parameterizations: Vec::new(),
+        })
+    }
+
+    /// One parameterization, with the scenarios that its density leaves out.
+    fn parameterization(
+        &self,
+        id: ParameterizationId,
+        swept: &mut SweepSummary,
+        progress: impl FnMut(u64),
+    ) -> Result<(ComparedParameterization, Vec<Error>)> {
+        let fitted = DensityModel::fit(id, self.scenarios, self.facts, &self.fit)?;
+        let density = fitted.model;
+        let find = |(at, block): (usize, &crate::sweep::Block)| {
+            let variant = block.variants.iter().position(|v| v == id.key)?;
+            (block.category == id.category).then_some((at, variant))
+        };
+        let Some((block, variant)) = self.study.blocks.iter().enumerate().find_map(find) else {
+            return Err(Error::Internal(format!("{} {} has a density but no lanes", id.category.label(), id.key)));
+        };
+        let options = SamplePlanOptions {
+            samples: self.flags.samples,
+            seed: self.flags.seed,
+            source: SampleSource::Random,
+            models: self.models.clone(),
+            headways: SampleHeadways::Each(self.headways.clone()),
+        };
+        let plan = plan_samples(&density, &density.mixture()?, self.profile, &options)?;
+        let recheck = self.opened.device().map(|_| Recheck::new(&plan, self.flags.seed, ONE_IN));
+        let lanes =
+            Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: recheck.as_ref() };
+        let kernels = kernel_scenarios(&density, self.scenarios)?;
+        let scenarios = self.study.blocks[block].units.len() as usize;
+        let exposure = density.exposure.as_ref();
+        let sampled = sample_by_scenario(&plan, &kernels, scenarios, &lanes, exposure, LEVEL, progress)?;
+        swept.add(&sampled.summary);
+        let compared = ComparedParameterization {
+            key: id.key,
+            parameters: id.parameters,
+            density_sha256: density.content_sha256()?,
+            kernels: kernels.len(),
+            plan_sha256: plan.hash().to_owned(),
+            voids: sampled.tally.voids,
+            cells: compare_cells(self.study, self.partial, block, variant, &sampled, self.enough, LEVEL)?,
+        };
+        Ok((compared, fitted.left_out))
+    }
+}

@@ -1,0 +1,302 @@
+//! A comparison of rates of failure as text and as files.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::sampling::HostRecord;
+use super::tables::{WIDTH, aligned, table, wrap};
+use crate::criterion::Criterion;
+use crate::density::Driven;
+use crate::driver::ModelId;
+use crate::estimate::{Enough, Ratio, RatioVerdict};
+use crate::sampling::{CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate};
+use crate::score::f1;
+use crate::{Error, Result};
+
+/// `compare.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct CompareFile {
+    /// Version of this file.
+    pub lanesweep_comparison: u64,
+    /// Program and version.
+    pub program: String,
+    /// The data in one line; synthetic data say so.
+    pub data: String,
+    /// Nothing here was measured on real traffic.
+    pub synthetic: bool,
+    /// SHA-256 of the scenarios as a scenario file.
+    pub scenarios_sha256: String,
+    /// What was driven, where it is known.
+    pub driven: Option<Driven>,
+    /// Profile.
+    pub profile: String,
+    /// Models.
+    pub models: Vec<ModelId>,
+    /// Headways.
+    pub headways: Vec<String>,
+    /// Samples of each density.
+    pub samples: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+    /// Level of the intervals.
+    pub level: f64,
+    /// Failures that a paired ratio needs on each side.
+    pub enough: Enough,
+    /// Hash of the plan of S and S'.
+    pub study_plan_sha256: String,
+    /// Recordings and parameterizations that were left out, and why.
+    pub left_out: Vec<String>,
+    /// Per category.
+    pub categories: Vec<CategoryComparison>,
+    /// The machine.
+    pub host: HostRecord,
+}
+
+impl CompareFile {
+    /// As JSON. What is not finite is null.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn to_json(&self) -> Result<Vec<u8>> {
+        let mut text = serde_json::to_vec_pretty(self)
+            .map_err(|e| Error::Internal(format!("a comparison cannot be written: {e}")))?;
+        text.push(b'\n');
+        Ok(text)
+    }
+
+    /// `compare.csv`: one row per category, parameterization, model and criterion.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn csv(&self) -> Result<Vec<u8>> {
+        let header = [
+            "category",
+            "parameterization",
+            "parameters",
+            "model",
+            "criterion",
+            "s_rate",
+            "s_low",
+            "s_high",
+            "s_failures",
+            "s_lanes",
+            "s_failing_scenarios",
+            "s_prime_rate",
+            "s_prime_low",
+            "s_prime_high",
+            "s_prime_ratio",
+            "s_prime_ratio_low",
+            "s_prime_ratio_high",
+            "s_prime_verdict",
+            "f1",
+            "density_rate",
+            "density_low",
+            "density_high",
+            "density_low_with_data",
+            "density_high_with_data",
+            "density_failures",
+            "density_lanes",
+            "ratio",
+            "ratio_low",
+            "ratio_high",
+            "verdict",
+            "s_per_hour",
+            "s_per_hour_sd",
+            "s_per_1000_km",
+            "s_per_1000_km_sd",
+            "density_per_hour",
+            "density_per_hour_sd",
+            "density_per_1000_km",
+            "density_per_1000_km_sd",
+            "data",
+        ];
+        let mut rows = vec![header.map(str::to_owned).to_vec()];
+        for category in &self.categories {
+            for of in &category.parameterizations {
+                for (s, cell) in category.recorded.iter().zip(&of.cells) {
+                    rows.push(self.csv_row(category, of, s, cell));
+                }
+            }
+        }
+        super::csv::text(rows)
+    }
+
+    fn csv_row(
+        &self,
+        category: &CategoryComparison,
+        of: &ComparedParameterization,
+        s: &RecordedCell,
+        cell: &ComparedCell,
+    ) -> Vec<String> {
+        let rate = |r: &RateRecord| [r.rate, r.low, r.high].map(|v| v.to_string());
+        let number = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+        let ratio = |r: &Ratio| [number(r.ratio), number(r.low), number(r.high), r.verdict.text().to_owned()];
+        let risk = |r: Option<RiskRate>| [number(r.map(|r| r.estimate)), number(r.map(|r| r.standard_deviation))];
+        let (replayed, sampled) = (&cell.replayed, &cell.sampled);
+        let mut row: Vec<String> = [category.category.key(), of.key].map(str::to_owned).to_vec();
+        row.extend([of.parameters.to_string(), s.model.name().to_owned(), s.criterion.key().to_owned()]);
+        row.extend(rate(&s.rate));
+        row.extend([s.rate.failures, s.rate.lanes, s.failing_scenarios].map(|n| n.to_string()));
+        row.extend(rate(&replayed.rate));
+        row.extend(ratio(&replayed.ratio));
+        row.push(number(f1(&replayed.labels)));
+        row.extend(rate(&sampled.rate));
+        row.extend(sampled.with_data.map(|v| v.to_string()));
+        row.extend([sampled.rate.failures, sampled.rate.lanes].map(|n| n.to_string()));
+        row.extend(ratio(&sampled.ratio));
+        for r in [s.risk, sampled.risk] {
+            row.extend(risk(r.per_hour));
+            row.extend(risk(r.per_1000_km));
+        }
+        row.push(self.data.clone());
+        row
+    }
+
+    /// The tables for the terminal, 120 columns wide at most; only an unbroken word of the data's description (a path)
+    /// can be longer.
+    pub fn text(&self) -> String {
+        let mut text = format!("{}\n\n{}\n", wrap(&self.data, WIDTH), self.rule());
+        for category in &self.categories {
+            let _ = writeln!(
+                text,
+                "\n{}: {} scenarios from {} headways (S); {} samples of each density from the same",
+                category.category.label(),
+                category.scenarios,
+                self.headways.len(),
+                self.samples
+            );
+            for criterion in Criterion::ALL {
+                text.push_str(&self.block(category, criterion));
+            }
+            text.push_str(&summary(category));
+        }
+        for reason in &self.left_out {
+            let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));
+        }
+        if self.synthetic {
+            text.push_str("\nSYNTHETIC DATA: no number above is a statement about real traffic\n");
+        }
+        text
+    }
+
+    /// How to read a cell.
+    fn rule(&self) -> String {
+        let Enough { failures, clusters } = self.enough;
+        let text = format!(
+            "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
+             interval holds 1. > too high, < too low: it does not. ? undecided: fewer than {failures} failed lanes or \
+             {clusters} failing scenarios on one side, and the two intervals meet. S' is replayed, density is drawn. \
+             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
+             so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
+             says whether these scenarios are represented, not whether they are enough. A verdict says \
+             nothing of size: a ratio of 0.99 can be too low, agreement with a wide interval is weak. Of cells that do \
+             agree, 1 in 20 is marked otherwise by chance. Risks \
+             have the ratios of the rates: S and densities have the same exposure.",
+            100.0 * self.level
+        );
+        wrap(&text, WIDTH)
+    }
+
+    /// One criterion: a row for S, its risk, and two per parameterization; a column per model.
+    fn block(&self, category: &CategoryComparison, criterion: Criterion) -> String {
+        let mut header = vec![criterion.label().to_owned()];
+        header.extend(self.models.iter().map(|m| m.name().to_owned()));
+        let mut rows = table(header);
+        let recorded: Vec<&RecordedCell> = category.recorded.iter().filter(|c| c.criterion == criterion).collect();
+        let line = |name: String, cells: Vec<String>| std::iter::once(name).chain(cells).collect::<Vec<_>>();
+        let rate = |r: &RateRecord| {
+            let range = if r.failures == 0 { format!("≤ {}", short(r.high)) } else { range(r.low, r.high) };
+            format!("{} {range}", short(r.rate))
+        };
+        rows.add_row(line("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect()));
+        let risk = |r: RiskRate| format!("{} ± {}", short(r.estimate), short(r.standard_deviation));
+        type Pick = fn(&RecordedCell) -> Option<RiskRate>;
+        let risks: [(&str, Pick); 2] = [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
+        for (name, pick) in risks {
+            let values: Option<Vec<String>> = recorded.iter().map(|c| pick(c).map(risk)).collect();
+            values.into_iter().for_each(|values| {
+                rows.add_row(line(name.to_owned(), values));
+            });
+        }
+        for of in &category.parameterizations {
+            let cells = || of.cells.iter().filter(|c| c.criterion == criterion);
+            let replayed = cells().map(|c| cell(&c.replayed.rate, &c.replayed.ratio)).collect();
+            let sampled = cells().map(|c| cell(&c.sampled.rate, &c.sampled.ratio)).collect();
+            rows.add_row(line(format!("{} S'", of.key), replayed));
+            rows.add_row(line(format!("{} density", of.key), sampled));
+        }
+        aligned(rows, 1) + "\n"
+    }
+}
+
+fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
+    let mark = ratio.verdict.mark();
+    let Some(value) = ratio.ratio else { return format!("{} {mark}", short(rate.rate)) };
+    let ends = match (ratio.low, ratio.high) {
+        (Some(low), Some(high)) => format!("{}…{}", factor(low), factor(high)),
+        (Some(low), None) => format!("{}…", factor(low)),
+        _ => String::new(),
+    };
+    format!("{} {} {ends} {mark}", short(rate.rate), factor(value))
+}
+
+/// Per parameterization: labels (F1) beside verdicts on the rate.
+fn summary(category: &CategoryComparison) -> String {
+    let marks: String = RatioVerdict::ALL.iter().map(|v| format!(" {}", v.mark())).collect();
+    let header = [
+        "cells of each verdict".to_owned(),
+        "parameters".to_owned(),
+        "mean F1 of labels".to_owned(),
+        format!("S'{marks}"),
+        format!("density{marks}"),
+        "ratios of the density".to_owned(),
+    ];
+    let mut rows = table(header.to_vec());
+    for of in &category.parameterizations {
+        let verdicts = |pick: fn(&ComparedCell) -> &Ratio| {
+            let count = |v| of.cells.iter().filter(|c| pick(c).verdict == v).count();
+            RatioVerdict::ALL.map(|v| format!("{:2}", count(v))).join(" ")
+        };
+        let scores: Vec<f64> = of.cells.iter().filter_map(|c| f1(&c.replayed.labels)).collect();
+        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        let decided = of.cells.iter().map(|c| &c.sampled.ratio).filter(|r| r.verdict != RatioVerdict::Undecided);
+        let mut ratios: Vec<f64> = decided.filter_map(|r| r.ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        let ends = ratios.first().zip(ratios.last());
+        rows.add_row([
+            of.key.to_owned(),
+            of.parameters.to_string(),
+            if scores.is_empty() { "-".to_owned() } else { format!("{mean:.3}") },
+            verdicts(|c| &c.replayed.ratio),
+            verdicts(|c| &c.sampled.ratio),
+            ends.map_or("-".to_owned(), |(low, high)| range(*low, *high)),
+        ]);
+    }
+    aligned(rows, 1)
+}
+
+fn range(low: f64, high: f64) -> String {
+    format!("{}…{}", short(low), short(high))
+}
+
+/// A rate in six characters or so.
+fn short(value: f64) -> String {
+    match value {
+        0.0 => "0".to_owned(),
+        v if v.abs() >= 100.0 => format!("{v:.0}"),
+        v if v.abs() >= 10.0 => format!("{v:.1}"),
+        v if v.abs() >= 1.0 => format!("{v:.2}"),
+        v if v.abs() >= 1e-3 => format!("{v:.4}"),
+        v => format!("{v:.1e}"),
+    }
+}
+
+/// A factor in four characters.
+fn factor(value: f64) -> String {
+    match value {
+        v if v >= 99.5 => ">99".to_owned(),
+        v if v >= 9.95 => format!("{v:.1}"),
+        v => format!("{v:.2}"),
+    }
+}
