@@ -9,12 +9,13 @@ use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
 use lanesweep::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
-use lanesweep::driver::{MODELS, ModelId};
-use lanesweep::gpu::shader::{self, RANDOM, SHARED, driver_shader};
-use lanesweep::gpu::{Checks, Launch, OutcomeRecord, StartRecord, exact_spirv};
+use lanesweep::driver::{AttentionRule, MODELS, ModelId, NEVER};
+use lanesweep::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
+use lanesweep::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::profile::Profile;
 use lanesweep::random::SOBOL_ROW;
 use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
+use lanesweep::sweep::generated::{self, ATTEMPTS, MOST_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
 use lanesweep::sweep::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
 use wgsl::{Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments};
 
@@ -64,6 +65,31 @@ fn records() -> Vec<Record> {
     ]
 }
 
+/// The records of the generator's pipeline beside those of lanes.
+fn generator_records() -> Vec<Record> {
+    vec![
+        record!("AttentionRule", AttentionRule<f32>, {
+            kind: u32, delay_steps: u32, with_ahead: u32, threshold: f32, travel: f32,
+        }),
+        record!("ReducedColumns", ReducedColumns, {
+            width: u32, instants: u32, coefficients: u32, lateral: u32, speed: u32, lead_speed: u32, ego_speed: u32,
+            lead_gap: u32, duration: u32,
+        }),
+        record!("Recipe", Recipe, {
+            path: u32, lateral: u32, dimensions: u32, pair: u32, decelerates: u32, unlimited: u32, judged: u32,
+            step_cap: u32, slots: [u32; 11], columns: ReducedColumns, lower: [f32; 14], upper: [f32; 14],
+            least_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
+            half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32,
+            attention: [AttentionRule<f32>; MODELS],
+        }),
+        record!("Generation", Generation, {
+            index_low: u32, index_high: u32, count: u32, source: u32, seed_low: u32, seed_high: u32, purpose: u32,
+            components: u32, weighted: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
+            speed_stride: u32, lateral_stride: u32,
+        }),
+    ]
+}
+
 /// Every built-in profile with every category: all the constants that a pipeline may get.
 fn resolved() -> Vec<(String, Constants<f32>)> {
     let of = |name: &'static str, category| {
@@ -108,6 +134,44 @@ fn every_record_has_the_layout_of_its_rust_twin() {
             assert_eq!(ours.len(), theirs.len(), "{name}: number of fields");
         }
     }
+}
+
+#[test]
+fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twins() {
+    let (module, info) = parse(&shader::assemble_generator());
+    for (name, size, ours) in records().into_iter().take(3).chain(generator_records()) {
+        let (stride, theirs) = fields(&module, name);
+        assert_eq!((stride, ours), (size, theirs), "{name}");
+    }
+    for (name, value) in [
+        ("MOST_PARAMETERS", MOST_PARAMETERS as u32),
+        ("ATTEMPTS", ATTEMPTS),
+        ("NO_SLOT", NO_SLOT),
+        ("TARGET_SPEED", Quantity::TargetSpeed as u32),
+        ("LATERAL_SPEED", Quantity::LateralSpeed as u32),
+        ("EGO_SPEED", Quantity::EgoSpeed as u32),
+        ("TARGET_ACCELERATION", Quantity::TargetAcceleration as u32),
+        ("LEAD_SPEED", Quantity::LeadSpeed as u32),
+        ("LEAD_ACCELERATION", Quantity::LeadAcceleration as u32),
+        ("LEAD_GAP", Quantity::LeadGap as u32),
+        ("DURATION", Quantity::Duration as u32),
+        ("FINAL_SPEED", Quantity::FinalSpeed as u32),
+        ("MEAN_DECELERATION", Quantity::MeanDeceleration as u32),
+        ("TIME_HEADWAY", Quantity::TimeHeadway as u32),
+        ("QUANTITIES", Quantity::TimeHeadway as u32 + 1),
+        ("PATH_SINUSOID", generated::Path::Sinusoid as u32),
+        ("PATH_REDUCED", generated::Path::Reduced as u32),
+        ("LATERAL_ENTERING", generated::Lateral::Entering as u32),
+        ("LATERAL_LEAVING", generated::Lateral::Leaving as u32),
+        ("LATERAL_GONE", generated::Lateral::Gone as u32),
+        ("NEVER", NEVER),
+    ] {
+        assert_eq!(constant(&module, name), value, "{name}");
+    }
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
+    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &[], Checks::Checked);
+    assert!(words.is_ok_and(|w| !w.is_empty()));
 }
 
 #[test]
@@ -327,7 +391,7 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
 
 #[test]
 fn every_shader_file_is_part_of_a_pipeline() {
-    let parts = SHARED.into_iter().chain(RANDOM).chain(ModelId::ALL.map(driver_shader));
+    let parts = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader));
     let known: BTreeSet<String> = parts.map(|(name, _)| name.to_owned()).collect();
     let mut found = BTreeSet::new();
     for folder in ["", "shared/"] {
@@ -341,10 +405,10 @@ fn every_shader_file_is_part_of_a_pipeline() {
 
 #[test]
 fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
-    for (name, text) in SHARED.into_iter().chain(RANDOM).chain(ModelId::ALL.map(driver_shader)) {
+    for (name, text) in SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader)) {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
         let code = without_comments(text);
-        if name != "lane.wgsl" {
+        if !["lane.wgsl", "generate.wgsl"].contains(&name) {
             for word in ["@group", "@binding", "@compute", "var<"] {
                 assert!(!code.contains(word), "{name} has {word}");
             }

@@ -96,9 +96,9 @@ fn no_two_random_cases_are_equal() {
 fn the_key_of_a_random_lane_says_how_to_make_it_again() {
     let plan = random("paper", 42, 400);
     let key = plan.blocks[1].units.name(9);
-    let unit = RandomUnit::parse(key).unwrap();
+    let unit = RandomUnit::parse(&key).unwrap();
     assert_eq!(unit, RandomUnit { category: Category::CutOut, seed: 42, unit: 9 });
-    assert_eq!(&unit.to_string(), key);
+    assert_eq!(unit.to_string(), key);
     assert_eq!(RandomUnit::parse("random-cut-in-seedx-0000001"), None);
     let lane = plan.first_lane_of(plan.blocks[1].first_unit + 9) + 77;
     let text = plan.key_text(&plan.key(lane).unwrap());

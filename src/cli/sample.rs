@@ -9,21 +9,22 @@ use clap::{Args, ValueEnum};
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
 use super::lists;
+use super::sample_join as join;
 use super::sample_lanes;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::density::{BandwidthRule, DensityModel, Kde, Mixture, read_density, write_density};
 use crate::driver::ModelId;
 use crate::estimate::{
-    BinomialInterval, Checkpoints, CrossEntropy, Defended, Density, Estimate, Importance, StopReason, StopRule, Subset,
+    BinomialInterval, Checkpoints, CrossEntropy, Defended, Density, Estimate, Importance, Pilot, StopRule, Subset,
     Technique, balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, importance, subset,
 };
 use crate::profile::Profile;
 use crate::report::files::make_folder;
-use crate::report::sampling::{DensityRecord, EstimateFile, HostRecord, Levels};
+use crate::report::sampling::{EstimateFile, HostRecord, Levels, RunFacts};
 use crate::sampling::{
     EstimateRow, LaneLimitState, Lanes, MapAxes, Risk, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions,
-    bootstrap, headway_name, plan_points, plan_samples, read_proposal, truncated, write_proposal,
+    bootstrap, plan_points, plan_samples, read_proposal, truncated, write_proposal,
 };
 use crate::sweep::{Headway, ONE_IN, Recheck};
 use crate::{Error, Place, Result};
@@ -41,8 +42,11 @@ use crate::{Error, Place, Result};
 )]
 pub struct Sample {
     /// Density file
-    #[arg(value_name = "DENSITY")]
-    density: PathBuf,
+    #[arg(value_name = "DENSITY", required_unless_present = "join")]
+    density: Option<PathBuf>,
+    /// Join the parts of a run, made with --lanes, instead of sampling: their folders
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "density")]
+    join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
     #[arg(long, value_enum, default_value_t)]
     estimator: EstimatorFlag,
@@ -92,6 +96,9 @@ pub struct Sample {
     /// Share of the pilot's worst points that the proposal of is is fitted to
     #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
     worst_share: f64,
+    /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+    broad: f64,
     /// Share of the density in the proposals of is and ce; 0 is the published form
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     defence: f64,
@@ -152,6 +159,9 @@ impl EstimatorFlag {
     }
 }
 
+/// Draws that the valid share of each of several proposals is counted on.
+const VALIDITY_DRAWS: u64 = 1_000_000;
+
 /// Everything that a run was given, read and checked.
 struct Run<'a> {
     flags: &'a Sample,
@@ -168,7 +178,10 @@ struct Run<'a> {
 impl Sample {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         self.check()?;
-        let density = read_density(&self.density)?;
+        let Some(density) = &self.density else {
+            return join::run(&self.join, &self.out, self.binomial(), self.level);
+        };
+        let density = read_density(density)?;
         let profile = self.profile.load()?;
         let models = self.models()?;
         let criterion = self.criterion()?;
@@ -216,6 +229,7 @@ impl Sample {
         share("--level", self.level, false)?;
         share("--worst-share", self.worst_share, false)?;
         share("--defence", self.defence, true)?;
+        share("--broad", self.broad, true)?;
         if self.until.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
             return Err(Error::usage(Place::item("--until"), "no half-width", "give a number above 0, such as 0.05"));
         }
@@ -253,6 +267,13 @@ impl Sample {
             ));
         }
         Ok(())
+    }
+
+    fn binomial(&self) -> BinomialInterval {
+        match self.interval {
+            IntervalFlag::Wilson => BinomialInterval::Wilson,
+            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
+        }
     }
 
     fn models(&self) -> Result<Vec<ModelId>> {
@@ -310,29 +331,20 @@ impl Run<'_> {
     }
 
     /// The parts of `estimate.json` that all estimators share.
-    fn file(&self, samples: u64, headways: Vec<String>, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
-        let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
-        let stopped = stopped.unwrap_or(StopReason::Samples);
-        Ok(EstimateFile {
-            lanesweep_estimate: 1,
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+    fn file(&self, samples: u64, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
+        let facts = RunFacts {
             estimator: self.flags.estimator.key(),
-            density: DensityRecord::of(&self.density)?,
-            profile: self.profile.name.clone(),
+            profile: self.profile.clone(),
             models: self.models.clone(),
-            headways,
+            headways: match &self.headways {
+                SampleHeadways::Each(list) => list.clone(),
+                SampleHeadways::Sampled => Vec::new(),
+            },
             points: if self.flags.points == PointsFlag::Sobol { "sobol" } else { "random" },
             samples,
             seed: self.flags.seed,
-            plan_sha256: None,
-            draws: None,
-            stopped,
-            reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
-            estimates,
-            levels: Vec::new(),
-            bootstrap: None,
-            host: self.host(0),
-        })
+        };
+        EstimateFile::new(&self.density, facts, estimates, self.host(0))
     }
 
     fn crude(&self) -> Result<EstimateFile> {
@@ -360,10 +372,7 @@ impl Run<'_> {
         let counting = TallyOptions { worst: flags.worst, criterion: self.criterion, map: self.map()? };
         let crude = crate::sampling::CrudeOptions {
             stop: self.stop(samples),
-            interval: match flags.interval {
-                IntervalFlag::Wilson => BinomialInterval::Wilson,
-                IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
-            },
+            interval: flags.binomial(),
             level: flags.level,
             exposure: self.density.exposure.as_ref(),
             is_sampled_headway: self.density.space.has_thw(),
@@ -371,9 +380,8 @@ impl Run<'_> {
         tracing::info!("{} samples on {}", range.end - range.start, lanes.backend.describe());
         let crude_run =
             sample_lanes::run(&plan, range, &lanes, &counting, &crude, flags.rows.as_deref(), self.verbosity)?;
-        let names = (0..plan.headways.len()).map(|h| headway_name(&plan, h, crude.is_sampled_headway)).collect();
-        sample_lanes::write(&flags.out, &plan, &self.density, &crude_run, &counting)?;
-        let mut file = self.file(samples, names, crude_run.rows)?;
+        sample_lanes::write(&flags.out, &plan, &self.density, &crude_run, &counting, flags.lanes.is_some())?;
+        let mut file = self.file(samples, crude_run.rows)?;
         file.plan_sha256 = Some(plan.hash().to_owned());
         file.draws = Some(crate::report::sampling::DrawRecord::of(&crude_run.tally, &plan));
         if flags.bootstrap > 0 {
@@ -439,7 +447,7 @@ impl Run<'_> {
             rows.push(EstimateRow { model, criterion: self.criterion, headway: headway.clone(), estimate, risk });
             levels.extend(level);
         }
-        let mut file = self.file(samples, vec![headway], rows)?;
+        let mut file = self.file(samples, rows)?;
         file.levels = levels;
         Ok(file)
     }
@@ -482,9 +490,12 @@ impl Run<'_> {
                     nominal,
                     &lanes,
                     &fit,
-                    flags.pilot,
-                    flags.worst_share,
-                    flags.defence,
+                    &Pilot {
+                        worst: flags.worst_share,
+                        broad: flags.broad,
+                        defence: flags.defence,
+                        ..Pilot::guarded(flags.pilot)
+                    },
                     &importance_options,
                 )?;
                 write_proposal(&proposal_file, &self.density, &proposal)?;
@@ -493,8 +504,13 @@ impl Run<'_> {
             EstimatorFlag::Mc | EstimatorFlag::Is => {
                 let read = |path: &PathBuf| read_proposal(path, &self.density);
                 let mixtures: Vec<Mixture> = flags.proposal.iter().map(read).collect::<Result<_>>()?;
-                let proposals: Vec<Defended> =
-                    mixtures.into_iter().map(|m| defended(m, nominal, flags.defence)).collect::<Result<_>>()?;
+                let is_one = mixtures.len() == 1;
+                let prepared = |mixture| {
+                    let proposal = defended(mixture, nominal, flags.defence)?;
+                    // One proposal's valid share comes out of its own draws.
+                    Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed, VALIDITY_DRAWS) })
+                };
+                let proposals: Vec<Defended> = mixtures.into_iter().map(prepared).collect::<Result<_>>()?;
                 let estimate = match &proposals[..] {
                     [one] => importance(nominal, one, &lanes, &importance_options)?,
                     several => {

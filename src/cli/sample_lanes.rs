@@ -7,9 +7,10 @@ use std::path::Path;
 use super::console::{self, Verbosity};
 use crate::density::DensityModel;
 use crate::report::files::{write_atomically, write_atomically_with};
-use crate::report::sampling::{WorstRow, convergence_csv, map_csv, worst_csv};
+use crate::report::sampling::{WorstRow, convergence_csv, worst_csv};
+use crate::report::sampling_figures;
 use crate::report::{lanes, lanes::Digits};
-use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
+use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude, write_part};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
 use crate::{Error, Result};
 
@@ -58,14 +59,14 @@ pub(super) fn write(
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
+    is_part: bool,
 ) -> Result<()> {
-    let is_part = run.convergence.is_empty();
     if is_part {
-        let text =
-            serde_json::to_vec(&run.tally).map_err(|e| Error::Internal(format!("a part cannot be written: {e}")))?;
-        write_atomically(&out.join("part.json"), &text)?;
-    } else {
+        write_part(&out.join("part.json"), counting.criterion, &run.tally)?;
+    } else if !run.convergence.is_empty() {
         write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
+        let figure = sampling_figures::convergence(density, &run.convergence);
+        write_atomically(&out.join("convergence.svg"), figure.svg().as_bytes())?;
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
     if counting.worst > 0 {
@@ -105,7 +106,9 @@ pub(super) fn write(
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
-            write_atomically(&out.join(format!("map-{}.csv", id.name())), &map_csv(map, model)?)?;
+            let figure = sampling_figures::failure_map(density, map, model, *id, counting.criterion);
+            write_atomically(&out.join(format!("map-{}.csv", id.name())), figure.csv().as_bytes())?;
+            write_atomically(&out.join(format!("map-{}.svg", id.name())), figure.svg().as_bytes())?;
         }
     }
     Ok(())

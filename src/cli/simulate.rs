@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::case_flags::{CaseFlags, from_csv, from_toml};
+use super::rerun::plan_of;
 use super::{Exit, ProfileFlags, console};
 use crate::criterion::Criterion;
-use crate::driver::ModelId;
+use crate::driver::{ModelId, View};
 use crate::parameterization::ParameterizationOptions;
 use crate::profile::Profile;
+use crate::scalar::Real;
 use crate::scenario::{Category, Tables, read_scenarios};
 use crate::sweep::{Constants, EndReason, Headway, LaneCase, NO_STEP, Outcome, Start, Step, StudyOptions, plan_study};
 use crate::{Error, Place, Result};
@@ -40,8 +42,11 @@ pub struct Simulate {
     /// Scenario file (JSON Lines) for --lane
     #[arg(long, value_name = "FILE", requires = "lane")]
     scenarios: Option<PathBuf>,
+    /// Folder (--out) of a `lanesweep sample` run, for --lane: reruns that lane, bit for bit
+    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table"])]
+    from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model, as errors and tables print it
-    #[arg(long, value_name = "KEY", requires = "scenarios")]
+    #[arg(long, value_name = "KEY")]
     lane: Option<String>,
     #[command(flatten)]
     profile: ProfileFlags,
@@ -49,9 +54,13 @@ pub struct Simulate {
 
 impl Simulate {
     pub fn run(&self) -> Result<Exit> {
+        if self.lane.is_some() && self.scenarios.is_none() && self.from.is_none() {
+            let help = "add --scenarios FILE for a study's lane, or --from DIR for a sampled one";
+            return Err(Error::usage(Place::item("--lane"), "a key alone does not say what it is of", help));
+        }
         let profile = self.profile.load()?;
         let (text, summary) = match (&self.scenarios, &self.lane) {
-            (Some(_), Some(_)) if self.case != CaseFlags::default() => {
+            (_, Some(_)) if self.case != CaseFlags::default() => {
                 return Err(Error::usage(
                     Place::item("--lane"),
                     "the lane is a whole case: the other flags would not be heeded",
@@ -59,6 +68,7 @@ impl Simulate {
                 ));
             }
             (Some(scenarios), Some(lane)) => run_lane_of_study(&profile, scenarios, lane)?,
+            (None, Some(lane)) => run_sampled_lane(self.from.as_deref().unwrap_or(Path::new(".")), lane)?,
             _ => {
                 let flags = self.flags()?;
                 let mut tables = Tables::default();
@@ -108,16 +118,40 @@ fn run_lane_of_study(profile: &Profile, scenarios: &Path, lane: &str) -> Result<
     Ok(trace(profile, category, &case, plan.tables(), plan.headways[key.headway], plan.models[key.model]))
 }
 
+/// Reruns exactly one lane of a sampling run, in the lane arithmetic.
+fn run_sampled_lane(dir: &Path, lane: &str) -> Result<(String, String)> {
+    let plan = plan_of(dir)?;
+    let (Some(key), Some(generator)) = (plan.parse_key(lane), plan.generator()) else {
+        return Err(Error::usage(
+            Place::item("--lane"),
+            format!("there is no lane `{lane}` in {}", dir.display()),
+            "a key is #sample/parameterization/headway/model, as worst.csv has it",
+        ));
+    };
+    if generator.draw(key.unit).is_void() {
+        return Err(Error::usage(
+            Place::item("--lane"),
+            "this sample is void",
+            "no draw of it was valid: take another",
+        ));
+    }
+    let mut tables = Tables::<f32>::default();
+    let case = generator.case(key.unit, &mut tables);
+    let category = plan.blocks[key.block].category;
+    Ok(trace(&plan.profile, category, &case, &tables, plan.headways[key.headway], plan.models[key.model]))
+}
+
 /// The time series as CSV and the outcome in words.
-fn trace(
+fn trace<R: Real>(
     profile: &Profile,
     category: Category,
-    case: &LaneCase<f64>,
-    tables: &Tables<f64>,
+    case: &LaneCase<R>,
+    tables: &Tables<R>,
     headway: Headway,
     model: ModelId,
 ) -> (String, String) {
     let constants = Constants::<f64>::resolve(profile, category);
+    let lane = Constants::<R>::resolve(profile, category);
     let dt = profile.frame.dt_s;
     let vehicles = if case.pair != 0 { 2 } else { 1 };
     let mut text = "t_s,x_ego_m,v_ego_mps,a_ego_mps2,unsafe,demand_mps2".to_owned();
@@ -129,23 +163,24 @@ fn trace(
     text.push('\n');
     let mut x_ego = 0.0;
     let mut v_before = None;
-    let mut row = |step: &Step<f64>| {
-        if let Some(v) = v_before.replace(step.v_ego) {
+    let mut row = |step: &Step<R>| {
+        let v_ego = step.v_ego.to_f64();
+        if let Some(v) = v_before.replace(v_ego) {
             let _: f64 = v;
-            x_ego += step.v_ego * dt;
+            x_ego += v_ego * dt;
         }
         let hazard = step.hazard;
-        let demand = if hazard.is_unsafe { hazard.demand.to_string() } else { String::new() };
+        let demand = if hazard.is_unsafe { hazard.demand.to_f64().to_string() } else { String::new() };
         let _ = write!(
             text,
             "{},{x_ego},{},{},{},{demand}",
             round(f64::from(step.index) * dt),
-            step.v_ego,
-            step.seen[0].view.a_ego,
+            v_ego,
+            step.seen[0].view.a_ego.to_f64(),
             u8::from(hazard.is_unsafe)
         );
         for seen in &step.seen[..vehicles] {
-            let view = seen.view;
+            let view = widened(&seen.view);
             let closing = view.closing();
             let x = x_ego + view.gap + view.half_lengths;
             let ttc = if closing > 0.0 { (view.gap.max(0.0) / closing).to_string() } else { "inf".to_owned() };
@@ -157,17 +192,33 @@ fn trace(
             let _ = write!(
                 text,
                 ",{x},{},{},{},{},{ttc},{btn},{pfs},{cfs}",
-                seen.lateral, view.v_other, view.gap, view.lateral_gap
+                seen.lateral.to_f64(),
+                view.v_other,
+                view.gap,
+                view.lateral_gap
             );
         }
         text.push('\n');
     };
-    let outcome = constants.run(model, case, tables, headway.start::<f64>(), &mut row);
+    let outcome = lane.run(model, case, tables, headway.start::<R>(), &mut row).widen();
     let gap = match headway.start::<f64>() {
-        Start::Headway(thw) => thw * case.ego_speed,
+        Start::Headway(thw) => thw * case.ego_speed.to_f64(),
         Start::Gap(gap) => gap,
-    };
+    } + case.others[0].gap_offset.to_f64();
     (text, summary(category, model, gap, &outcome, dt))
+}
+
+/// What the driver sees, exactly, for columns that are worked out beside the lane.
+fn widened<R: Real>(view: &View<R>) -> View<f64> {
+    View {
+        v_ego: view.v_ego.to_f64(),
+        a_ego: view.a_ego.to_f64(),
+        v_other: view.v_other.to_f64(),
+        gap: view.gap.to_f64(),
+        lateral_gap: view.lateral_gap.to_f64(),
+        lateral_towards: view.lateral_towards.to_f64(),
+        half_lengths: view.half_lengths.to_f64(),
+    }
 }
 
 /// Times as people write them: without the rounding error of i·dt.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::covariance::{colour, whiten};
+use super::covariance::{cholesky, colour, whiten};
 use super::standard_normal::{normal, uniform};
 use crate::random::Stream;
 use crate::{Error, Place, Result};
@@ -176,6 +176,34 @@ impl Mixture {
         &self.factors[self.factor_of[component]]
     }
 
+    /// The same mixture with `covariance` (row by row) times `share` added to every component's: a copy that reaches
+    /// further wherever the component is narrower than that covariance.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where the sum has no triangular factor.
+    pub fn widened(&self, covariance: &[f64], share: f64) -> Result<Mixture> {
+        let d = self.dimensions;
+        let widen = |factor: &Vec<f64>| {
+            let mut sum: Vec<f64> = covariance.iter().map(|c| share * c).collect();
+            for i in 0..d {
+                for j in 0..d {
+                    sum[i * d + j] += (0..=i.min(j)).map(|k| factor[i * d + k] * factor[j * d + k]).sum::<f64>();
+                }
+            }
+            cholesky(&sum, d)
+        };
+        let factors = self.factors.iter().map(widen).collect::<Option<Vec<_>>>().ok_or_else(|| {
+            Error::usage(Place::item("mixture"), "it cannot be widened", "give a covariance, d × d, row by row")
+        })?;
+        Ok(Mixture::prepared(
+            self.dimensions,
+            self.weights.clone(),
+            self.means.clone(),
+            factors,
+            self.factor_of.clone(),
+        ))
+    }
+
     /// ln of the density at a point [1 / product of the units]; −∞ where a coordinate is not finite.
     pub fn log_density(&self, point: &[f64]) -> f64 {
         let mut parts = Vec::new();
@@ -310,6 +338,16 @@ mod tests {
             let x = nominal.draw(&STREAM, i, 0);
             assert!(nominal.log_density(&x) - defensive.log_density(&x) <= libm::log(10.0) + 1e-12);
         }
+    }
+
+    #[test]
+    fn a_widened_component_has_the_sum_of_the_covariances() {
+        let wide = two_humps().widened(&[2.0, 0.5, 0.5, 1.0], 0.5).unwrap();
+        let l = wide.factor(0);
+        // Own covariance: 1, 0.5; 0.5, 4.25.
+        assert!((l[0] * l[0] - 2.0).abs() < 1e-14 && (l[0] * l[2] - 0.75).abs() < 1e-14);
+        assert!((l[2] * l[2] + l[3] * l[3] - 4.75).abs() < 1e-14);
+        assert!(two_humps().widened(&[-9.0, 0.0, 0.0, -9.0], 1.0).is_err());
     }
 
     #[test]

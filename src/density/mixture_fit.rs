@@ -19,7 +19,7 @@ const JITTER: f64 = 1e-6;
 pub struct FitOptions {
     /// Most components, ≥ 1; fewer where the points do not carry them.
     pub components: usize,
-    /// Try 1 … `components` and keep the number with the lowest Bayesian information criterion, in which the
+    /// Try 1, 2, … `components` as long as each lowers the Bayesian information criterion, in which the
     /// effective sample size (Σw)²/Σw² stands for the number of points. Otherwise exactly `components`.
     pub choose: bool,
     /// Most iterations for each number of components.
@@ -69,9 +69,10 @@ impl Mixture {
             let (mixture, log_likelihood) = sample.expectation_maximisation(components, options)?;
             let parameters = mixture.weights().len() * (1 + d + d * (d + 1) / 2) - 1;
             let bic = parameters as f64 * libm::log(sample.effective) - 2.0 * sample.effective * log_likelihood;
-            if best.as_ref().is_none_or(|(lowest, _)| bic < *lowest) {
-                best = Some((bic, mixture));
+            if best.as_ref().is_some_and(|(lowest, _)| bic >= *lowest) {
+                break; // one more did not pay
             }
+            best = Some((bic, mixture));
         }
         best.map(|(_, mixture)| mixture).ok_or_else(|| Error::Internal("no mixture was fitted".to_owned()))
     }

@@ -12,8 +12,15 @@ use super::stop::StopRule;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
+use crate::density::covariance::moments;
 use crate::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::random::Stream;
+
+/// Share of the density's covariance added to the widened copies of a fit's components, and their share of the
+/// mixture. Beyond the limit the failures thin out exponentially, a Gaussian fitted to them faster: without wider
+/// copies the weights have no variance, and intervals do not hold.
+const WIDENING: f64 = 0.25;
+const WIDENED_SHARE: f64 = 0.5;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
 const LEAST_WEIGHT: f64 = 0.02;
@@ -96,6 +103,7 @@ pub fn cross_entropy(
     let mut proposal: Option<Mixture> = None;
     let mut runs = 0;
     let mut reached = f64::INFINITY;
+    let mut nominal_covariance = Vec::new();
     for level in 0..options.levels.max(1) {
         let stream = Stream { seed: options.seed, purpose: purpose::CROSS_ENTROPY + level as u32 };
         let indices = 0..options.samples_per_level;
@@ -106,6 +114,10 @@ pub fn cross_entropy(
             return Err(no_valid_point("level of cross-entropy"));
         }
         runs += sample.points.len() as u64;
+        if level == 0 {
+            let equal = sample.points.iter().map(|p| (p.as_slice(), 1.0));
+            nominal_covariance = moments(equal, nominal.dimensions()).1;
+        }
         let mut sorted = sample.values.clone();
         sorted.sort_by(f64::total_cmp);
         let at = ((options.quantile * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1;
@@ -121,7 +133,9 @@ pub fn cross_entropy(
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|l| libm::exp(l - top)).collect();
         let fit = FitOptions { components: options.components, seed: options.seed, ..FitOptions::default() };
-        let fitted = Mixture::fit(&points, &weights, &fit)?;
+        let narrow = Mixture::fit(&points, &weights, &fit)?;
+        let wide = narrow.widened(&nominal_covariance, WIDENING)?;
+        let fitted = Mixture::join(&[(1.0 - WIDENED_SHARE, &narrow), (WIDENED_SHARE, &wide)])?;
         let next = match &proposal {
             Some(last) => smoothed(&fitted, last, options.smoothing)?,
             None => fitted,

@@ -16,8 +16,9 @@ use super::stop::{StopReason, StopRule};
 use super::summary::Estimate;
 use super::trust::Warning;
 use super::weights::{WeightSums, WeightedDraw};
-use crate::density::Mixture;
+use crate::density::covariance::moments;
 use crate::density::standard_normal::uniform;
+use crate::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::random::Stream;
 use crate::{Error, Place, Result};
 
@@ -41,6 +42,7 @@ pub struct Defended<'a> {
     nominal: &'a dyn Density,
     proposal: Mixture,
     share: f64,
+    validity: f64,
 }
 
 /// Mixes a share δ in [0, 1] of the density into a proposal; with 0 it only inherits what is valid.
@@ -59,10 +61,21 @@ pub fn defended(proposal: Mixture, nominal: &dyn Density, share: f64) -> Result<
             "give a share from 0 to 1 and two densities over the same parameters",
         ));
     }
-    Ok(Defended { nominal, proposal, share })
+    Ok(Defended { nominal, proposal, share, validity: 1.0 })
 }
 
 impl Defended<'_> {
+    /// The same with its valid share counted over `draws` draws: what the balance heuristic needs where points can be
+    /// invalid. Its relative error √((1 − P)/(P·draws)) is in no interval.
+    pub fn with_counted_validity(mut self, seed: u64, draws: u64) -> Self {
+        let stream = Stream { seed, purpose: purpose::VALIDITY };
+        let is_valid = |index: &u64| self.is_valid(&self.attempt(&stream, *index, 0));
+        let valid = (0..draws).into_par_iter().filter(is_valid).count();
+        // A proposal without a valid draw is found out when it is sampled.
+        self.validity = (valid as f64 / draws.max(1) as f64).max(f64::MIN_POSITIVE);
+        self
+    }
+
     /// The proposal alone.
     pub fn proposal(&self) -> &Mixture {
         &self.proposal
@@ -70,6 +83,10 @@ impl Defended<'_> {
 }
 
 impl Density for Defended<'_> {
+    fn validity_share(&self) -> f64 {
+        self.validity
+    }
+
     fn dimensions(&self) -> usize {
         self.proposal.dimensions()
     }
@@ -266,32 +283,80 @@ pub fn worst_share(points: &[Vec<f64>], values: &[f64], share: f64) -> Vec<Vec<f
     order.into_iter().take(count).map(|i| points[i].clone()).collect()
 }
 
-/// The author's form: a pilot of `pilot_runs` draws of the density, its worst share (2 %) fitted, a defensive share
-/// (0.1; 0 gives the author's own), then importance sampling. The estimate is checked against the pilot.
+/// How a pilot makes a proposal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pilot {
+    /// Draws of the density.
+    pub runs: u64,
+    /// Share of them, the worst, that the proposal is fitted to.
+    pub worst: f64,
+    /// Share of one broad Gaussian in the proposal: the worst points' covariance plus a quarter of the pilot's.
+    /// Kernels are narrow across the limit, where the failures thin out more slowly than a kernel does; without it
+    /// rare large weights make intervals too short.
+    pub broad: f64,
+    /// Share δ of the density itself in the proposal.
+    pub defence: f64,
+}
+
+impl Pilot {
+    /// The author's own: the worst 2 % and neither safeguard.
+    pub fn author(runs: u64) -> Pilot {
+        Pilot { runs, worst: 0.02, broad: 0.0, defence: 0.0 }
+    }
+
+    /// The worst 2 %, a broad share of 0.2, a defensive share of 0.1.
+    pub fn guarded(runs: u64) -> Pilot {
+        Pilot { runs, worst: 0.02, broad: 0.2, defence: 0.1 }
+    }
+}
+
+/// The author's form: a pilot drawn from the density, its worst share fitted, then importance sampling. The estimate
+/// is checked against the pilot.
 ///
 /// # Errors
-/// The limit state's and the fit's; [`Error::Usage`] where the pilot has no valid point.
+/// The limit state's and the fit's; [`Error::Usage`] where the pilot has no valid point or a share is outside [0, 1].
 pub fn from_pilot(
     nominal: &dyn Density,
     limit_state: &dyn LimitState,
     fit: &dyn FitProposal,
-    pilot_runs: u64,
-    worst: f64,
-    defence: f64,
+    pilot: &Pilot,
     options: &Importance,
 ) -> Result<Estimate> {
+    Ok(from_pilot_with_proposal(nominal, limit_state, fit, pilot, options)?.0)
+}
+
+/// [`from_pilot`] with the proposal that it found, without its defensive share, so that others can sample it again.
+///
+/// # Errors
+/// As [`from_pilot`].
+pub fn from_pilot_with_proposal(
+    nominal: &dyn Density,
+    limit_state: &dyn LimitState,
+    fit: &dyn FitProposal,
+    pilot: &Pilot,
+    options: &Importance,
+) -> Result<(Estimate, Mixture)> {
     let stream = Stream { seed: options.seed, purpose: purpose::NOMINAL };
-    let pilot = judged(nominal, limit_state, stream, 0..pilot_runs)?;
-    if pilot.points.is_empty() {
+    let first = judged(nominal, limit_state, stream, 0..pilot.runs)?;
+    if first.points.is_empty() {
         return Err(no_valid_point("pilot"));
     }
-    let proposal = defended(fit.fit(&worst_share(&pilot.points, &pilot.values, worst))?, nominal, defence)?;
+    let worst = worst_share(&first.points, &first.values, pilot.worst);
+    let mut fitted = fit.fit(&worst)?;
+    if pilot.broad > 0.0 {
+        let one = FitOptions { components: 1, choose: false, ..FitOptions::default() };
+        let equal = first.points.iter().map(|p| (p.as_slice(), 1.0));
+        let covariance = moments(equal, nominal.dimensions()).1;
+        let broad = Mixture::fit(&worst, &vec![1.0; worst.len()], &one)?.widened(&covariance, 0.25)?;
+        fitted = Mixture::join(&[(1.0 - pilot.broad, &fitted), (pilot.broad, &broad)])?;
+    }
+    let proposal = defended(fitted, nominal, pilot.defence)?;
     let mut estimate = importance(nominal, &proposal, limit_state, options)?;
-    let runs = pilot.points.len() as u64;
-    let failures = pilot.values.iter().filter(|v| **v <= 0.0).count() as u64;
+    let runs = first.points.len() as u64;
+    let failures = first.values.iter().filter(|v| **v <= 0.0).count() as u64;
     estimate.set_runs(estimate.runs + runs);
     PilotCheck { runs, failures }.check(&mut estimate);
-    Ok(estimate)
+    Ok((estimate, proposal.proposal().clone()))
 }
 
 /// The error where no draw is valid.

@@ -13,7 +13,6 @@ mod draws;
 mod importance;
 mod interval;
 mod monte_carlo;
-mod pilot;
 mod problem;
 mod ratio;
 mod stop;
@@ -28,12 +27,11 @@ pub use blocks::{BLOCK, BlockSums, Join};
 pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
-    Defended, FitProposal, Importance, PilotCheck, defended, from_pilot, from_weight_sums, importance, importance_sums,
-    worst_share,
+    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_pilot_with_proposal,
+    from_weight_sums, importance, importance_sums, worst_share,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
-pub use pilot::from_pilot_with_proposal;
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use stop::{Checkpoints, StopReason, StopRule};

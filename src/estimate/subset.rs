@@ -16,7 +16,7 @@ use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::density::covariance::{cholesky, colour, moments};
+use crate::density::covariance::{cholesky, colour, moments, whiten};
 use crate::density::standard_normal::uniform;
 use crate::random::Stream;
 
@@ -96,7 +96,7 @@ pub fn subset(density: &dyn Density, limit_state: &dyn LimitState, options: &Sub
         let log_density = density.log_density(&point);
         states.push(State { point, log_density, value, chain: i as u32, root: i as u32 });
     }
-    let mut walk = Walk::new(density, options.seed);
+    let mut walk = Walk::new(density, options.seed, &states);
     let mut runs = states.len() as u64;
     let mut levels: Vec<SubsetLevel> = Vec::new();
     let mut influence: BTreeMap<u32, f64> = BTreeMap::new();
@@ -205,18 +205,35 @@ fn chain_variation(states: &[State], threshold: f64, share: f64) -> f64 {
     chains.values().map(|d| d * d).sum::<f64>().sqrt() / (states.len() as f64 * share)
 }
 
-/// The moves of the chains.
+/// The moves of the chains. Two kinds take turns, each exact by itself: two steps of the autoregressive move
+/// x' = m + √(1 − s²)(x − m) + s L z, reversible for the Gaussian with the density's own mean and covariance and
+/// corrected by Metropolis and Hastings to the density (preconditioned Crank-Nicolson with a reference), which crosses
+/// a level in few steps however many parameters there are; then one random walk with the seeds' spread, which does
+/// not stick where the density is far from that Gaussian. For the standard normal density the first kind needs no
+/// correction and is used alone.
 struct Walk<'a> {
     density: &'a dyn Density,
     seed: u64,
-    /// Step size in units of the seeds' spread; for the standard normal density the share of the new direction.
-    scale: f64,
+    /// Mean of the reference.
+    mean: Vec<f64>,
+    /// L of the reference.
+    factor: Vec<f64>,
+    /// Share s of the new direction in an autoregressive move.
+    turn: f64,
+    /// Step of the random walk in units of the seeds' spread.
+    stride: f64,
 }
 
+/// Every third step is a random walk.
+const KINDS: u64 = 3;
+
 impl<'a> Walk<'a> {
-    fn new(density: &'a dyn Density, seed: u64) -> Self {
-        let scale = if density.is_standard_normal() { 0.7 } else { 2.0 / (density.dimensions() as f64).sqrt() };
-        Walk { density, seed, scale }
+    /// The reference is taken from draws of the density.
+    fn new(density: &'a dyn Density, seed: u64, draws: &[State]) -> Self {
+        let d = density.dimensions();
+        let stride = 2.0 / (d as f64).sqrt();
+        let (mean, factor) = spread(draws, d);
+        Walk { density, seed, mean, factor, turn: 0.6, stride }
     }
 
     /// The next level: chains from the states at or below the threshold, as many states as before, the seeds being
@@ -234,77 +251,111 @@ impl<'a> Walk<'a> {
     ) -> Result<(Vec<State>, u64, f64)> {
         let mut chains: Vec<State> = states.iter().filter(|s| s.value <= threshold).cloned().collect();
         chains.iter_mut().enumerate().for_each(|(i, state)| state.chain = i as u32);
-        let factor = self.spread(&chains);
+        let (_, seeds) = spread(&chains, self.density.dimensions());
         let stream = Stream { seed: self.seed, purpose: purpose::CHAIN + level };
         let mut next = chains.clone();
-        let (mut runs, mut moves, mut steps) = (0_u64, 0_u64, 0_u64);
+        let mut runs = 0_u64;
+        // Per kind of move: autoregressive, random walk.
+        let (mut moves, mut steps) = ([0_u64; 2], [0_u64; 2]);
         let mut step = 0_u64;
         while next.len() < states.len() {
             step += 1;
+            let walks = !self.density.is_standard_normal() && step.is_multiple_of(KINDS);
+            let kind = usize::from(walks);
             chains.truncate(states.len() - next.len());
             let candidates: Vec<Option<(Vec<f64>, f64)>> = chains
                 .par_iter()
-                .map(|state| self.candidate(state, &factor, &stream, (step << 32) | u64::from(state.chain)))
+                .map(|state| {
+                    let index = (step << 32) | u64::from(state.chain);
+                    if walks { self.walked(state, &seeds, &stream, index) } else { self.turned(state, &stream, index) }
+                })
                 .collect();
             let points: Vec<Vec<f64>> = candidates.iter().flatten().map(|(point, _)| point.clone()).collect();
             let mut values = judge(limit_state, &points)?.into_iter();
             runs += points.len() as u64;
-            steps += chains.len() as u64;
+            steps[kind] += chains.len() as u64;
             for (state, candidate) in chains.iter_mut().zip(candidates) {
                 let Some((point, log_density)) = candidate else { continue };
                 let Some(value) = values.next() else { continue };
                 if value <= threshold {
                     (state.point, state.log_density, state.value) = (point, log_density, value);
-                    moves += 1;
+                    moves[kind] += 1;
                 }
             }
             next.extend(chains.iter().cloned());
         }
-        let acceptance = if steps > 0 { moves as f64 / steps as f64 } else { 1.0 };
-        self.scale *= libm::exp((acceptance - GOAL_ACCEPTANCE).clamp(-1.0, 1.0) * 1.5);
-        self.scale = if self.density.is_standard_normal() { self.scale.clamp(0.05, 0.95) } else { self.scale };
-        Ok((next, runs, acceptance))
+        let share = |moves: u64, steps: u64| if steps > 0 { moves as f64 / steps as f64 } else { GOAL_ACCEPTANCE };
+        let steer = |kind: usize| libm::exp(1.5 * (share(moves[kind], steps[kind]) - GOAL_ACCEPTANCE));
+        self.turn = (self.turn * steer(0)).clamp(0.05, 0.95);
+        self.stride *= steer(1);
+        Ok((next, runs, share(moves[0] + moves[1], steps[0] + steps[1])))
     }
 
-    /// L of the seeds' covariance, drawn a little towards its diagonal.
-    fn spread(&self, seeds: &[State]) -> Vec<f64> {
-        let d = self.density.dimensions();
-        let (mean, mut covariance) = moments(seeds.iter().map(|s| (s.point.as_slice(), 1.0)), d);
-        let keep = seeds.len() as f64 / (seeds.len() as f64 + d as f64 + 1.0);
-        for i in 0..d {
-            for j in 0..d {
-                if i != j {
-                    covariance[i * d + j] *= keep;
-                }
-            }
-            covariance[i * d + i] += (1e-9 * (1.0 + mean[i].abs())).powi(2);
-        }
-        cholesky(&covariance, d).unwrap_or_else(|| {
-            let mut diagonal = vec![0.0; d * d];
-            (0..d).for_each(|j| diagonal[j * d + j] = covariance[j * d + j].sqrt());
-            diagonal
-        })
-    }
-
-    /// A proposed state, or `None` where the density refuses it: no run is spent on it.
-    fn candidate(&self, state: &State, factor: &[f64], stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
+    /// An autoregressive move, or `None` where the density refuses it: no run is spent on it.
+    fn turned(&self, state: &State, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
         let d = self.density.dimensions();
         let z = normals(stream, index, 1, d);
+        let keep = (1.0 - self.turn * self.turn).sqrt();
         if self.density.is_standard_normal() {
-            // Preconditioned Crank-Nicolson: reversible for the standard normal density by itself.
-            let keep = (1.0 - self.scale * self.scale).sqrt();
-            let point: Vec<f64> = state.point.iter().zip(&z).map(|(x, z)| keep * x + self.scale * z).collect();
+            let point: Vec<f64> = state.point.iter().zip(&z).map(|(x, z)| keep * x + self.turn * z).collect();
             let log_density = self.density.log_density(&point);
             return Some((point, log_density));
         }
-        let step = colour(factor, &z);
-        let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.scale * s).collect();
+        let step = colour(&self.factor, &z);
+        let point: Vec<f64> =
+            (0..d).map(|j| self.mean[j] + keep * (state.point[j] - self.mean[j]) + self.turn * step[j]).collect();
+        // The correction: ln reference, up to its constant, at the point left and at the point proposed.
+        let gain = self.log_reference(&state.point) - self.log_reference(&point);
+        self.judged_by_density(state, point, gain, stream, index)
+    }
+
+    /// A step of a random walk, or `None` where the density refuses it.
+    fn walked(&self, state: &State, seeds: &[f64], stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
+        let step = colour(seeds, &normals(stream, index, 1, self.density.dimensions()));
+        let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.stride * s).collect();
+        self.judged_by_density(state, point, 0.0, stream, index)
+    }
+
+    fn log_reference(&self, point: &[f64]) -> f64 {
+        let from_mean: Vec<f64> = point.iter().zip(&self.mean).map(|(x, m)| x - m).collect();
+        let mut z = vec![0.0; from_mean.len()];
+        whiten(&self.factor, &from_mean, &mut z);
+        -0.5 * z.iter().map(|z| z * z).sum::<f64>()
+    }
+
+    fn judged_by_density(
+        &self,
+        state: &State,
+        point: Vec<f64>,
+        gain: f64,
+        stream: &Stream,
+        index: u64,
+    ) -> Option<(Vec<f64>, f64)> {
         if !self.density.is_valid(&point) {
             return None;
         }
         let log_density = self.density.log_density(&point);
-        let words = stream.words(index, 0);
-        let chance = libm::log(uniform(words[0]));
-        (chance <= log_density - state.log_density).then_some((point, log_density))
+        let chance = libm::log(uniform(stream.words(index, 0)[0]));
+        (chance <= log_density - state.log_density + gain).then_some((point, log_density))
     }
+}
+
+/// Mean of states and L of their covariance, drawn a little towards its diagonal.
+fn spread(states: &[State], d: usize) -> (Vec<f64>, Vec<f64>) {
+    let (mean, mut covariance) = moments(states.iter().map(|s| (s.point.as_slice(), 1.0)), d);
+    let keep = states.len() as f64 / (states.len() as f64 + d as f64 + 1.0);
+    for i in 0..d {
+        for j in 0..d {
+            if i != j {
+                covariance[i * d + j] *= keep;
+            }
+        }
+        covariance[i * d + i] += (1e-9 * (1.0 + mean[i].abs())).powi(2);
+    }
+    let factor = cholesky(&covariance, d).unwrap_or_else(|| {
+        let mut diagonal = vec![0.0; d * d];
+        (0..d).for_each(|j| diagonal[j * d + j] = covariance[j * d + j].sqrt());
+        diagonal
+    });
+    (mean, factor)
 }

@@ -1,18 +1,24 @@
 //! Reports: what a person or another program reads of a study.
 //!
-//! Here live the terminal tables, the CSV files, the radar figures, `run.json` and the one way files are
+//! Here live the terminal tables, the CSV files, the figures (SVG), `run.json` and the one way files are
 //! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
 //! [`crate::score`]; text and files go to the user.
 
+pub mod axis;
 pub mod compare;
+pub mod convergence;
 pub mod csv;
 pub mod density;
+mod drawing;
+pub mod failure_map;
 pub mod files;
+pub mod forest;
 pub mod lanes;
 pub mod radar;
 pub mod reference;
 pub mod run_record;
 pub mod sampling;
+pub mod sampling_figures;
 pub mod study;
 pub mod tables;
 pub mod verification;

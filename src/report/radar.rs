@@ -1,16 +1,19 @@
 //! The radar chart of the paper: one spoke per (driver model, criterion), one polygon per parameterization,
 //! radius = F1.
 //!
-//! `kuva` supplies the scene and the SVG writer (number format, XML escapes). Its own radar plot is not used: it
+//! The radar plot of `kuva` is not used: it
 //! needs a number on every spoke, and an undefined F1 (0/0) drawn as a number would be a false measurement. Here
 //! the line of a series is *broken* at an undefined spoke and the spoke is named in a note below the chart.
 //!
 //! Several series often share a value (F1 = 1 above all). So the lines are drawn from thick to thin and the markers
 //! from large to small: what lies below stays visible.
 
-use kuva::backend::svg::SvgBackend;
+use super::drawing::{
+    self, BORDER_PX, GREY, GRID, Look, NAME, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, on_circle, paragraph,
+    path_data, plain, text,
+};
 use kuva::render::color::Color;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
+use kuva::render::render::{Primitive, Scene, TextAnchor};
 use std::f64::consts::TAU;
 
 /// One polygon: the scores of one parameterization.
@@ -37,138 +40,13 @@ pub struct RadarChart {
     pub series: Vec<RadarSeries>,
 }
 
-/// Width of the picture and of its empty border, in SVG user units (px).
-const WIDTH_PX: f64 = 1000.0;
-const BORDER_PX: f64 = 36.0;
-const TEXT_WIDTH_PX: f64 = WIDTH_PX - 2.0 * BORDER_PX;
 /// Radius of the ring F1 = 1.
 const RADIUS_PX: f64 = 285.0;
 /// Distance of a spoke's name from the outer ring.
 const NAME_GAP_PX: f64 = 20.0;
 /// Widest line of a spoke's name; a name at three o'clock still fits between ring and border.
 const NAME_WIDTH_PX: f64 = WIDTH_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
-/// Length of the line sample in the legend, and where the text behind it starts.
-const SAMPLE_PX: f64 = 56.0;
-const SAMPLE_TEXT_PX: f64 = 68.0;
-
-const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
-const INK: &str = "#1a1a1a";
-const GREY: &str = "#5f5f5f";
-const GRID: &str = "#bdbdbd";
-
-/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, too pale as a line on white.
-const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9"];
-/// Line styles (SVG dash arrays); the empty one is solid.
-const DASHES: [&str; 7] = ["", "10,4", "3,3", "12,3,3,3", "18,5", "7,3,2,3,2,3", "5,6"];
-/// Corners of the markers on the unit circle: number, and whether a corner is on top. 0 is a circle.
-const MARKERS: [(u32, bool); 7] = [(0, true), (4, false), (3, true), (4, true), (3, false), (5, true), (6, true)];
-
-/// How a text is set.
-#[derive(Clone, Copy)]
-struct Type {
-    size_px: u32,
-    bold: bool,
-    colour: &'static str,
-}
-
-const TITLE: Type = Type { size_px: 24, bold: true, colour: INK };
-const SUBTITLE: Type = Type { size_px: 16, bold: false, colour: INK };
-const NAME: Type = Type { size_px: 16, bold: false, colour: INK };
 const NAME_UNDEFINED: Type = Type { colour: GREY, ..NAME };
-const RING: Type = Type { size_px: 13, bold: false, colour: GREY };
-const LEGEND: Type = Type { size_px: 16, bold: false, colour: INK };
-const NOTE: Type = Type { size_px: 14, bold: false, colour: INK };
-const NOTE_HEAD: Type = Type { bold: true, ..NOTE };
-
-impl Type {
-    fn line_px(self) -> f64 {
-        f64::from(self.size_px) * 1.3
-    }
-
-    /// Upper estimate of a character's width. The reader's font is unknown, so this is the wide DejaVu Sans.
-    fn char_px(self, c: char) -> f64 {
-        let em = match c {
-            ' ' | '.' | ',' | ':' | ';' | '\'' | '|' | 'i' | 'l' | 'j' | 'I' | '!' => 0.35,
-            'm' | 'w' | 'M' | 'W' | '%' | '@' => 1.0,
-            'A'..='Z' => 0.74,
-            _ if c.is_ascii() => 0.63,
-            _ => 1.0,
-        };
-        em * f64::from(self.size_px) * if self.bold { 1.13 } else { 1.0 }
-    }
-
-    fn text_px(self, text: &str) -> f64 {
-        text.chars().map(|c| self.char_px(c)).sum()
-    }
-
-    /// `text` in lines no wider than `width_px`: broken at blanks, and inside a word only if it alone is too wide.
-    fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
-        let mut lines = Vec::new();
-        let mut line = String::new();
-        for word in text.split_whitespace() {
-            if !line.is_empty() && self.text_px(&line) + self.char_px(' ') + self.text_px(word) > width_px {
-                lines.push(std::mem::take(&mut line));
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            for c in word.chars() {
-                if !line.is_empty() && self.text_px(&line) + self.char_px(c) > width_px {
-                    lines.push(std::mem::take(&mut line));
-                }
-                line.push(c);
-            }
-        }
-        if !line.is_empty() {
-            lines.push(line);
-        }
-        lines
-    }
-}
-
-/// How one series looks.
-struct Look {
-    colour: Color,
-    dash: Option<String>,
-    line_px: f64,
-    corners: (u32, bool),
-    marker_px: f64,
-}
-
-impl Look {
-    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so no pair repeats
-    /// before 49 series.
-    fn of(index: usize, count: usize) -> Self {
-        let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 1.0 };
-        let dash = DASHES[(index + index / COLOURS.len()) % DASHES.len()];
-        Self {
-            colour: Color::from(COLOURS[index % COLOURS.len()]),
-            dash: (!dash.is_empty()).then(|| dash.to_string()),
-            line_px: 4.2 - 2.4 * depth,
-            corners: MARKERS[index % MARKERS.len()],
-            marker_px: 9.5 - 5.0 * depth,
-        }
-    }
-
-    fn line(&self, d: String) -> Primitive {
-        path(d, None, self.colour.clone(), self.line_px, self.dash.clone())
-    }
-
-    /// The marker around a point, with a white rim that parts it from the markers below.
-    fn marker(&self, (x, y): (f64, f64)) -> Primitive {
-        let (corners, on_top) = self.corners;
-        let (fill, rim) = (self.colour.clone(), Color::from("#ffffff"));
-        if corners == 0 {
-            let (r, stroke, stroke_width) = (self.marker_px * 0.9, Some(rim), Some(1.0));
-            return Primitive::Circle { cx: x, cy: y, r, fill, fill_opacity: None, stroke, stroke_width };
-        }
-        let step = TAU / f64::from(corners);
-        let first = if on_top { 0.0 } else { step / 2.0 };
-        let outline: Vec<_> =
-            (0..corners).map(|k| on_circle((x, y), self.marker_px * 1.1, first + step * f64::from(k))).collect();
-        path(path_data(&outline, true), Some(fill), rim, 1.0, None)
-    }
-}
 
 /// The chart as a complete SVG document, 1000 px wide and as high as its texts need.
 ///
@@ -177,23 +55,18 @@ impl Look {
 /// The same chart gives the same bytes. Nothing fails: without spokes or series only the texts remain.
 pub fn radar_svg(chart: &RadarChart) -> String {
     let scores: Vec<Vec<Option<f64>>> = chart.series.iter().map(|s| scores(s, chart.spokes.len())).collect();
-    let mut scene = Scene::new(WIDTH_PX, 0.0);
-    scene.font_family = Some(FONTS.to_string());
-    scene.text_color = Some(INK.to_string());
-
-    let mut y = paragraph(&mut scene, (BORDER_PX, 24.0), &chart.title, TITLE, TEXT_WIDTH_PX);
-    if let Some(subtitle) = &chart.subtitle {
-        y = paragraph(&mut scene, (BORDER_PX, y + 4.0), subtitle, SUBTITLE, TEXT_WIDTH_PX);
-    }
+    let (mut scene, mut y) = drawing::page(&chart.title, chart.subtitle.as_deref());
     if !chart.spokes.is_empty() {
         y = web(&mut scene, chart, &scores, y + 14.0);
         let caption = "Radius: F1 score, 0 at the centre, 1 at the outer ring.";
         y = paragraph(&mut scene, (BORDER_PX, y + 12.0), caption, NOTE, TEXT_WIDTH_PX);
     }
-    y = legend(&mut scene, chart, y + 10.0);
+    let count = chart.series.len();
+    let names = chart.series.iter().map(|s| s.name.as_str()).enumerate();
+    let legend: Vec<(&str, Look)> = names.map(|(s, name)| (name, Look::of(s, count))).collect();
+    y = drawing::legend(&mut scene, &legend, y + 10.0);
     y = notes(&mut scene, chart, &scores, y + 10.0);
-    scene.height = (y + 20.0).ceil();
-    SvgBackend::new().with_pretty(true).render_scene(&scene)
+    drawing::document(scene, y)
 }
 
 /// One score per spoke; whatever is no number in 0..=1 is undefined.
@@ -284,7 +157,7 @@ fn ring_labels(scene: &mut Scene, centre: (f64, f64), turn: f64) {
             opacity: Some(0.8),
         });
         let label = format!("{:.1}", f64::from(ring) / 5.0);
-        text(scene, (x, y + 5.0), &label, RING, TextAnchor::Middle);
+        text(scene, (x, y + 5.0), &label, TICK, TextAnchor::Middle);
     }
 }
 
@@ -305,32 +178,6 @@ fn spoke_name(scene: &mut Scene, lines: &[String], centre: (f64, f64), turn: f64
     }
 }
 
-/// Sample and name of each series, in two columns read downwards (one, if a name is too long for half the width);
-/// returns the y below.
-fn legend(scene: &mut Scene, chart: &RadarChart, top: f64) -> f64 {
-    let half_px = TEXT_WIDTH_PX / 2.0;
-    let fits = chart.series.iter().all(|s| LEGEND.text_px(&s.name) <= half_px - SAMPLE_TEXT_PX - 12.0);
-    let columns = if fits { 2 } else { 1 };
-    let rows = chart.series.len().div_ceil(columns);
-    let width_px = TEXT_WIDTH_PX / columns as f64 - SAMPLE_TEXT_PX;
-    let mut bottom = top;
-    let mut y = top;
-    for (s, series) in chart.series.iter().enumerate() {
-        let column = s / rows.max(1);
-        if s % rows.max(1) == 0 {
-            y = top;
-        }
-        let x = BORDER_PX + half_px * column as f64;
-        let look = Look::of(s, chart.series.len());
-        let middle = y + LEGEND.line_px() / 2.0;
-        scene.add(look.line(path_data(&[(x, middle), (x + SAMPLE_PX, middle)], false)));
-        scene.add(look.marker((x + SAMPLE_PX / 2.0, middle)));
-        y = paragraph(scene, (x + SAMPLE_TEXT_PX, y), &series.name, LEGEND, width_px).max(y + LEGEND.line_px()) + 5.0;
-        bottom = bottom.max(y);
-    }
-    bottom
-}
-
 /// Which scores are undefined, if any; returns the y below.
 fn notes(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
     let everywhere = |i: &usize| undefined_everywhere(scores, *i);
@@ -347,15 +194,7 @@ fn notes(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top
             lines.push(format!("{} — {}", series.name, gaps.join(", ")));
         }
     }
-    if lines.is_empty() {
-        return top;
-    }
-    let head = "Undefined F1 (0/0): no point is drawn and the line is broken there.";
-    let mut y = paragraph(scene, (BORDER_PX, top), head, NOTE_HEAD, TEXT_WIDTH_PX);
-    for line in lines {
-        y = paragraph(scene, (BORDER_PX, y + 3.0), &line, NOTE, TEXT_WIDTH_PX);
-    }
-    y
+    drawing::notes(scene, "Undefined F1 (0/0): no point is drawn and the line is broken there.", &lines, top)
 }
 
 /// The pieces of a series' line, and whether the piece closes: the whole polygon, or what lies between the gaps
@@ -369,63 +208,9 @@ fn runs(points: &[Option<(f64, f64)>]) -> Vec<(Vec<(f64, f64)>, bool)> {
     pieces.map(|run| (run.iter().copied().flatten().collect(), false)).collect()
 }
 
-/// The point at `turn` (radians, clockwise from the top) on a circle.
-fn on_circle((x, y): (f64, f64), radius: f64, turn: f64) -> (f64, f64) {
-    (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
-}
-
-fn path_data(points: &[(f64, f64)], closed: bool) -> String {
-    let corners: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
-    format!("M{}{}", corners.join(" L"), if closed { " Z" } else { "" })
-}
-
-fn path(
-    d: String,
-    fill: Option<Color>,
-    stroke: Color,
-    stroke_width: f64,
-    stroke_dasharray: Option<String>,
-) -> Primitive {
-    Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity: None, stroke_dasharray }))
-}
-
-/// Opens a group; `tip` is what a browser shows over it. `Scene::add` would bring hover styles along, so past it.
-fn group(scene: &mut Scene, attributes: &str, tip: Option<String>) {
-    let extra_attrs = Some(attributes.to_string());
-    scene.elements.push(Primitive::GroupStart { transform: None, title: tip, extra_attrs });
-}
-
-/// A wrapped text with its top at `y`; returns the y below it.
-fn paragraph(scene: &mut Scene, (x, y): (f64, f64), words: &str, set: Type, width_px: f64) -> f64 {
-    let lines = set.wrap(words, width_px);
-    for (k, line) in lines.iter().enumerate() {
-        text(scene, (x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, TextAnchor::Start);
-    }
-    y + lines.len() as f64 * set.line_px()
-}
-
-fn text(scene: &mut Scene, (x, y): (f64, f64), line: &str, set: Type, anchor: TextAnchor) {
-    scene.add(Primitive::Text {
-        x,
-        y,
-        // kuva would read `$…$` as a formula; `\$` is its plain dollar.
-        content: plain(line).replace('$', "\\$"),
-        size: set.size_px,
-        anchor,
-        rotate: None,
-        bold: set.bold,
-        color: Some(Color::from(set.colour)),
-    });
-}
-
-/// Without the characters that XML 1.0 allows in no form, not even escaped.
-fn plain(line: &str) -> String {
-    let allowed = |c: char| !c.is_control() && !matches!(c, '\u{FFFE}' | '\u{FFFF}');
-    line.chars().map(|c| if allowed(c) { c } else { '\u{FFFD}' }).collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::drawing::tests::words;
     use super::*;
 
     fn chart(series: usize, gaps: &[(usize, usize)]) -> RadarChart {
@@ -443,28 +228,6 @@ mod tests {
             .map(|s| RadarSeries { name: name(s), values: (0..spokes.len()).map(|i| score(s, i)).collect() })
             .collect();
         RadarChart { title: "Cut-in".into(), subtitle: Some("SYNTHETIC DATA: test".into()), spokes, series }
-    }
-
-    /// The words of the document's texts, lines joined, and a check that its tags nest.
-    fn words(svg: &str) -> String {
-        let (mut open, mut words) = (Vec::new(), Vec::new());
-        for part in svg.split('<').skip(1).filter(|part| !part.starts_with("!--")) {
-            let (tag, after) = part.split_once('>').expect("every tag ends");
-            assert!(!after.contains('>'), "bare > in {after}");
-            for entity in after.split('&').skip(1) {
-                assert!(["amp;", "lt;", "gt;", "quot;", "apos;"].iter().any(|e| entity.starts_with(e)), "bare &");
-            }
-            match tag.strip_prefix('/') {
-                Some(name) => assert_eq!(open.pop().as_deref(), Some(name)),
-                None if tag.ends_with('/') => {}
-                None => open.push(tag.split_whitespace().next().unwrap_or("").to_string()),
-            }
-            if tag.starts_with("text ") {
-                words.extend(after.split_whitespace().map(str::to_string));
-            }
-        }
-        assert!(open.is_empty(), "open tags {open:?}");
-        words.join(" ")
     }
 
     #[test]
@@ -541,14 +304,5 @@ mod tests {
         long.subtitle = Some("SYNTHETIC DATA: ".repeat(40));
         long.series[0].name = "x".repeat(300);
         words(&radar_svg(&long));
-        for line in SUBTITLE.wrap(&"SYNTHETIC DATA: ".repeat(40), TEXT_WIDTH_PX) {
-            assert!(SUBTITLE.text_px(&line) <= TEXT_WIDTH_PX);
-        }
-    }
-
-    #[test]
-    fn no_two_series_look_alike() {
-        let looks: std::collections::BTreeSet<_> = (0..49).map(|i| (i % COLOURS.len(), Look::of(i, 49).dash)).collect();
-        assert_eq!(looks.len(), 49);
     }
 }

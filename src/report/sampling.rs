@@ -10,9 +10,10 @@ use crate::criterion::Criterion;
 use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
-use crate::sampling::{Checkpoint, EstimateRow, MapCounts, RiskRate, SampleTally, WorstSample};
+use crate::profile::Profile;
+use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, RiskRate, SampleTally, WorstSample};
 use crate::sweep::generated::ATTEMPTS;
-use crate::sweep::{LanePlan, Outcome};
+use crate::sweep::{Headway, LanePlan, Outcome};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -109,6 +110,25 @@ pub struct HostRecord {
     pub threads: usize,
 }
 
+/// What a run was asked for.
+#[derive(Debug, Clone)]
+pub struct RunFacts {
+    /// Estimator: `mc`, `is`, `ce`, `subset`.
+    pub estimator: &'static str,
+    /// Profile, with its time step.
+    pub profile: Profile,
+    /// Models.
+    pub models: Vec<ModelId>,
+    /// Headways of the plan; none where the density draws them.
+    pub headways: Vec<Headway>,
+    /// Kind of points: `random`, `sobol`.
+    pub points: &'static str,
+    /// Samples asked for.
+    pub samples: u64,
+    /// Seed.
+    pub seed: u64,
+}
+
 /// `estimate.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct EstimateFile {
@@ -120,12 +140,14 @@ pub struct EstimateFile {
     pub estimator: &'static str,
     /// The density sampled.
     pub density: DensityRecord,
-    /// Profile.
-    pub profile: String,
+    /// Profile, with its time step.
+    pub profile: Profile,
     /// Models.
     pub models: Vec<ModelId>,
-    /// Headways.
+    /// Headways, by name.
     pub headways: Vec<String>,
+    /// The same as the plan has them.
+    pub plan_headways: Vec<Headway>,
     /// Kind of points: `random`, `sobol`.
     pub points: &'static str,
     /// Samples asked for.
@@ -145,12 +167,47 @@ pub struct EstimateFile {
     /// Levels of the adaptive estimators, one per model.
     pub levels: Vec<Levels>,
     /// The share of the data in the uncertainty, where asked for.
-    pub bootstrap: Option<crate::sampling::BootstrapRecord>,
+    pub bootstrap: Option<BootstrapRecord>,
     /// The machine.
     pub host: HostRecord,
 }
 
 impl EstimateFile {
+    /// What every run says of itself; draws, levels and replicates are added by those that have them.
+    ///
+    /// # Errors
+    /// As [`DensityModel::content_sha256`].
+    pub fn new(
+        density: &DensityModel,
+        facts: RunFacts,
+        estimates: Vec<EstimateRow>,
+        host: HostRecord,
+    ) -> Result<EstimateFile> {
+        let names = facts.headways.iter().map(Headway::to_string);
+        let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
+        Ok(EstimateFile {
+            lanesweep_estimate: 1,
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            estimator: facts.estimator,
+            density: DensityRecord::of(density)?,
+            profile: facts.profile,
+            models: facts.models,
+            headways: if density.space.has_thw() { vec!["sampled".to_owned()] } else { names.collect() },
+            plan_headways: facts.headways,
+            points: facts.points,
+            samples: facts.samples,
+            seed: facts.seed,
+            plan_sha256: None,
+            draws: None,
+            stopped: stopped.unwrap_or(StopReason::Samples),
+            reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
+            estimates,
+            levels: Vec::new(),
+            bootstrap: None,
+            host,
+        })
+    }
+
     /// As JSON. What is not finite is null.
     ///
     /// # Errors
@@ -190,53 +247,47 @@ impl EstimateFile {
                 },
             );
         }
-        let header = [
-            "model",
-            "criterion",
-            "THW",
-            "failures",
-            "runs",
-            "P",
-            "interval",
-            "±",
-            "per hour",
-            "per 1000 km",
-            "verdict",
-        ];
-        let mut rows = table(header.map(str::to_owned).to_vec());
-        for row in &self.estimates {
+        let has_hours = self.estimates.iter().any(|r| r.risk.per_hour.is_some());
+        let has_kilometres = self.estimates.iter().any(|r| r.risk.per_1000_km.is_some());
+        let mut header = ["model", "criterion", "THW", "failures", "P", "interval", "±"].map(str::to_owned).to_vec();
+        header.extend(has_hours.then(|| "per hour".to_owned()));
+        header.extend(has_kilometres.then(|| "per 1000 km".to_owned()));
+        header.push("verdict".to_owned());
+        let mut rows = table(header);
+        for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
             let e = &row.estimate;
-            rows.add_row(vec![
+            let is_wide = !e.relative_half_width.is_finite();
+            let mut fields = vec![
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
                 row.headway.clone(),
                 e.failures.to_string(),
-                e.runs.to_string(),
                 short(e.probability),
                 interval_text(e.interval.low, e.interval.high, e.interval.kind),
-                if e.relative_half_width.is_finite() {
-                    format!("{:.1} %", 100.0 * e.relative_half_width)
-                } else {
-                    "–".to_owned()
-                },
-                rate_text(row.risk.per_hour),
-                rate_text(row.risk.per_1000_km),
-                e.trust.verdict().to_string(),
-            ]);
+                if is_wide { "–".to_owned() } else { format!("{:.1} %", 100.0 * e.relative_half_width) },
+            ];
+            fields.extend(has_hours.then(|| rate_text(row.risk.per_hour)));
+            fields.extend(has_kilometres.then(|| rate_text(row.risk.per_1000_km)));
+            fields.push(e.trust.verdict().to_string());
+            rows.add_row(fields);
         }
         text.push_str(&aligned(rows, 3));
-        for row in self
-            .estimates
-            .iter()
-            .filter(|r| !r.estimate.trust.warnings.is_empty() && r.headway_is_shown(&self.estimates))
-        {
+        for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
             for warning in &row.estimate.trust.warnings {
                 let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
             }
         }
-        if let Some(weighted) = self.estimates.iter().find_map(|r| r.estimate.weights.as_ref().map(|_| ())) {
-            let () = weighted;
+        if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
             text.push_str(&self.weights_text());
+        }
+        if self.estimates.iter().any(|r| r.headway == "all") {
+            text.push_str("Means over all headways; every headway of its own is in estimates.csv\n");
+        }
+        if let Some(record) = &self.bootstrap {
+            text.push_str(&bootstrap_text(record));
+        }
+        if self.density.provenance.synthetic {
+            text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
     }
@@ -333,8 +384,8 @@ impl EstimateFile {
 }
 
 impl EstimateRow {
-    /// Warnings are told once: over all headways where there are several.
-    fn headway_is_shown(&self, all: &[EstimateRow]) -> bool {
+    /// Over all headways, where there are several.
+    fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
 }
@@ -422,49 +473,35 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
     super::csv::text(table)
 }
 
-/// A failure map of one model as CSV.
-///
-/// # Errors
-/// None for what this program made.
-pub fn map_csv(map: &MapCounts, model: usize) -> Result<Vec<u8>> {
-    let (x, y) = (map.axes.x.edges(), map.axes.y.edges());
-    let header = [
-        format!("{}_low", map.axes.x.name),
-        format!("{}_high", map.axes.x.name),
-        format!("{}_low", map.axes.y.name),
-        format!("{}_high", map.axes.y.name),
-        "lanes".to_owned(),
-        "failures".to_owned(),
-    ];
-    let mut rows = vec![header.to_vec()];
-    for (at, lanes) in map.lanes.iter().enumerate() {
-        let (row, column) = (at / (x.len() - 1), at % (x.len() - 1));
-        rows.push(vec![
-            x[column].to_string(),
-            x[column + 1].to_string(),
-            y[row].to_string(),
-            y[row + 1].to_string(),
-            lanes.to_string(),
-            map.failures[model][at].to_string(),
-        ]);
-    }
-    super::csv::text(rows)
-}
-
 fn number(value: Option<f64>) -> String {
     value.filter(|v| v.is_finite()).map_or(String::new(), |v| v.to_string())
 }
 
-/// Three digits, in powers of ten where it is small.
+/// The data's share of the uncertainty.
+fn bootstrap_text(record: &BootstrapRecord) -> String {
+    let header = ["model", "criterion", "P over resampled scenarios", "per hour", "per 1000 km"];
+    let mut rows = table(header.map(str::to_owned).to_vec());
+    let ends = |e: Option<[f64; 2]>| e.map_or("unknown".to_owned(), |[a, b]| format!("{} … {}", short(a), short(b)));
+    for row in &record.rows {
+        let names = [row.model.name().to_owned(), row.criterion.label().to_owned()];
+        let values = [Some(row.probability), row.per_hour, row.per_1000_km];
+        rows.add_row(names.into_iter().chain(values.map(ends)).collect::<Vec<_>>());
+    }
+    let how = format!("95 % of {} replicates of {} samples each:\n", record.replicates, record.samples);
+    how + &aligned(rows, 2)
+}
+
+/// Three digits, in powers of ten where it is small or large.
 fn short(value: f64) -> String {
     if !value.is_finite() {
-        "–".to_owned()
-    } else if value == 0.0 {
-        "0".to_owned()
-    } else if (1e-3..1e4).contains(&value.abs()) {
-        format!("{value:.4}")
-    } else {
-        format!("{value:.2e}")
+        return "–".to_owned();
+    }
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        v if !(1e-3..1e4).contains(&v) => format!("{value:.2e}"),
+        v if v >= 100.0 => format!("{value:.0}"),
+        v if v >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.4}"),
     }
 }
 

@@ -10,6 +10,7 @@ mod generator;
 mod lanes;
 mod limit_state;
 mod map;
+mod part_file;
 mod plan;
 mod proposal_file;
 mod risk;
@@ -26,6 +27,7 @@ pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_poi
 pub use lanes::{LaneLimitState, truncated};
 pub use limit_state::limit_state;
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
+pub use part_file::{read_part, write_part};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
 pub use proposal_file::{read_proposal, write_proposal};
 pub use risk::{Risk, RiskRate};

@@ -214,6 +214,11 @@ impl SampleTally {
         Ok(self)
     }
 
+    /// Worst lanes kept per model.
+    pub fn worst_limit(&self) -> usize {
+        self.worst_limit
+    }
+
     /// Hash of the plan.
     pub fn plan_sha256(&self) -> &str {
         &self.plan_sha256

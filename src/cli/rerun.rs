@@ -1,0 +1,79 @@
+//! One lane of a finished run again: from the run's folder and the lane's key, in the run's own arithmetic.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::density::{DensityModel, read_density};
+use crate::driver::ModelId;
+use crate::profile::Profile;
+use crate::report::sampling::RunFacts;
+use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
+use crate::sweep::{Headway, LanePlan};
+use crate::{Error, Place, Result};
+
+/// What `estimate.json` must say of a run.
+#[derive(Deserialize)]
+struct Recorded {
+    lanesweep_estimate: u64,
+    estimator: String,
+    samples: u64,
+    seed: u64,
+    points: String,
+    models: Vec<ModelId>,
+    plan_headways: Vec<Headway>,
+    profile: Profile,
+    plan_sha256: Option<String>,
+}
+
+/// The plan of the sampling run that wrote this folder.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Input`] where the folder does not hold a run of crude Monte Carlo, whole and unchanged.
+pub(super) fn plan_of(dir: &Path) -> Result<LanePlan> {
+    Ok(run_of(dir)?.1)
+}
+
+/// The same with what the run was asked for and its density.
+///
+/// # Errors
+/// As [`plan_of`].
+pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
+    let path = dir.join("estimate.json");
+    let wrong = |problem: String| {
+        let help = "give the folder (--out) of a `lanesweep sample` run of crude Monte Carlo by this version";
+        Error::input(Place::file(&path), problem, help)
+    };
+    let text = std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
+    let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
+    if run.lanesweep_estimate != 1 || run.estimator != "mc" {
+        return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", run.estimator)));
+    }
+    let density = read_density(&dir.join("density.json"))?;
+    let is_sobol = run.points == "sobol";
+    let facts = RunFacts {
+        estimator: "mc",
+        profile: run.profile,
+        models: run.models,
+        headways: run.plan_headways,
+        points: if is_sobol { "sobol" } else { "random" },
+        samples: run.samples,
+        seed: run.seed,
+    };
+    let options = SamplePlanOptions {
+        samples: facts.samples,
+        seed: facts.seed,
+        source: if is_sobol { SampleSource::Sobol } else { SampleSource::Random },
+        models: facts.models.clone(),
+        headways: if density.space.has_thw() {
+            SampleHeadways::Sampled
+        } else {
+            SampleHeadways::Each(facts.headways.clone())
+        },
+    };
+    let plan = plan_samples(&density, &density.mixture()?, &facts.profile, &options)?;
+    match run.plan_sha256 {
+        Some(hash) if hash == plan.hash() => Ok((facts, plan, density)),
+        _ => Err(wrong("its plan is not the one that the density and the profile beside it make".to_owned())),
+    }
+}

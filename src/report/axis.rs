@@ -1,0 +1,351 @@
+//! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
+
+use super::drawing::{GREY, GRID, TICK, line, text};
+use kuva::render::render::{Scene, TextAnchor};
+
+/// How an axis places its values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisScale {
+    /// Equal differences are equally far apart.
+    Linear,
+    /// Equal ratios are equally far apart; zero and what lies below it have no place.
+    Logarithmic,
+}
+
+impl AxisScale {
+    /// Whether the axis has a place for `value`. Beyond 1e±300 widths and ratios would leave the range of `f64`.
+    pub(super) fn shows(self, value: f64) -> bool {
+        match self {
+            Self::Linear => value.abs() <= 1e300,
+            Self::Logarithmic => (1e-300..=1e300).contains(&value),
+        }
+    }
+
+    /// The value in the units in which the axis is even.
+    fn place(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Logarithmic => libm::log10(value),
+        }
+    }
+}
+
+/// An axis between two ends, both at a plain number.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Axis {
+    scale: AxisScale,
+    /// Ends, as [`AxisScale::place`] gives them.
+    low: f64,
+    high: f64,
+    from_px: f64,
+    to_px: f64,
+}
+
+/// A place on the axis that is marked, and the number beside it, if there is room for one.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tick {
+    pub at_px: f64,
+    pub label: Option<String>,
+}
+
+impl Axis {
+    /// The axis that has a place for all `values` it can show, its ends rounded outwards. `None` without any such
+    /// value. If all are equal, the axis reaches a little to both sides.
+    pub fn around(scale: AxisScale, values: &[f64], (from_px, to_px): (f64, f64)) -> Option<Self> {
+        let shown = || values.iter().copied().filter(|v| scale.shows(*v));
+        let (min, max) = (shown().reduce(f64::min)?, shown().reduce(f64::max)?);
+        let (low, high) = match scale {
+            AxisScale::Linear => {
+                // Equal but for rounding counts as equal: a step between such ends would be lost in the values.
+                let size = min.abs().max(max.abs());
+                let margin = if max - min > 1e-9 * size { 0.0 } else { 0.1 * if size == 0.0 { 1.0 } else { size } };
+                let (min, max) = (min - margin, max + margin);
+                let step = plain_step((max - min) / 8.0);
+                ((min / step).floor() * step, (max / step).ceil() * step)
+            }
+            AxisScale::Logarithmic => {
+                let (mut below, mut above) = (one_two_five(min), one_two_five(max));
+                if place(above) < libm::log10(max) - 1e-12 {
+                    above = next(above, 1);
+                }
+                if below == above {
+                    (below, above) = (next(below, -1), next(above, 1));
+                }
+                (place(below), place(above))
+            }
+        };
+        Some(Self { scale, low, high, from_px, to_px })
+    }
+
+    /// The axis that ends exactly at `low` and `high` (finite, `low < high`), linear.
+    pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
+        Self { scale: AxisScale::Linear, low, high, from_px, to_px }
+    }
+
+    /// Where `value` is; at the nearer end if the axis has no place for it.
+    pub fn at(&self, value: f64) -> f64 {
+        let place = match self.scale {
+            AxisScale::Logarithmic if value <= 0.0 => self.low,
+            scale => scale.place(value).clamp(self.low, self.high),
+        };
+        let share = (place - self.low) / (self.high - self.low);
+        self.from_px + share * (self.to_px - self.from_px)
+    }
+
+    /// The ticks, with about `most` numbers at most.
+    pub fn ticks(&self, most: usize) -> Vec<Tick> {
+        match self.scale {
+            AxisScale::Linear => self.linear_ticks(most),
+            AxisScale::Logarithmic => self.decade_ticks(most),
+        }
+    }
+
+    fn tick(&self, place: f64, label: Option<String>) -> Tick {
+        let share = (place - self.low) / (self.high - self.low);
+        Tick { at_px: self.from_px + share * (self.to_px - self.from_px), label }
+    }
+
+    fn linear_ticks(&self, most: usize) -> Vec<Tick> {
+        let step = plain_step((self.high - self.low) / most.max(1) as f64);
+        let (first, last) = ((self.low / step - 1e-9).ceil(), (self.high / step + 1e-9).floor());
+        // Neighbours must differ in their numbers, however far from zero they are.
+        let largest = self.low.abs().max(self.high.abs()) / step;
+        let digits = 2 + libm::log10(largest.max(1.0)).ceil() as usize;
+        let count = (last - first).max(0.0) as u32;
+        let tick = |k: u32| {
+            let value = (first + f64::from(k)) * step;
+            self.tick(value.clamp(self.low, self.high), Some(digits_text(value, digits.min(15))))
+        };
+        (0..=count.min(100)).map(tick).collect()
+    }
+
+    /// Within two decades 1, 2 and 5 are named, else the decades, and only every other or fewer if they are many.
+    fn decade_ticks(&self, most: usize) -> Vec<Tick> {
+        let decades = self.high - self.low;
+        let every = (decades / most.max(1) as f64).ceil().max(1.0) as i32;
+        let mut ticks = Vec::new();
+        for exponent in self.low.floor() as i32..=self.high.ceil() as i32 {
+            for digit in 1..=9_u8 {
+                let at = place((digit, exponent));
+                if at < self.low - 1e-9 || at > self.high + 1e-9 || (digit > 1 && decades > 10.0) {
+                    continue;
+                }
+                let named = match digit {
+                    1 => exponent.rem_euclid(every) == 0,
+                    2 | 5 => decades <= 2.0 && 3.0 * decades <= most as f64,
+                    _ => false,
+                } || (decades <= 1.0 && matches!(digit, 2 | 5));
+                let label = named.then(|| power_text(f64::from(digit), exponent, 0));
+                ticks.push(self.tick(at, label));
+            }
+        }
+        ticks
+    }
+
+    /// The axis below a plot that reaches from `top` to `bottom`: grid, numbers. Returns the y below the numbers.
+    pub fn draw_below(&self, scene: &mut Scene, (top, bottom): (f64, f64), most: usize, grid: bool) -> f64 {
+        for tick in self.ticks(most) {
+            let Some(label) = &tick.label else {
+                line(scene, (tick.at_px, bottom), (tick.at_px, bottom + 3.0), GREY, 0.8);
+                continue;
+            };
+            if grid {
+                line(scene, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
+            }
+            line(scene, (tick.at_px, bottom), (tick.at_px, bottom + 6.0), GREY, 1.0);
+            text(scene, (tick.at_px, bottom + 20.0), label, TICK, TextAnchor::Middle);
+        }
+        bottom + 24.0
+    }
+
+    /// The axis at the left of a plot that reaches from `left` to `right`: grid, numbers.
+    pub fn draw_left(&self, scene: &mut Scene, (left, right): (f64, f64), most: usize, grid: bool) {
+        for tick in self.ticks(most) {
+            let Some(label) = &tick.label else {
+                line(scene, (left - 3.0, tick.at_px), (left, tick.at_px), GREY, 0.8);
+                continue;
+            };
+            if grid {
+                line(scene, (left, tick.at_px), (right, tick.at_px), GRID, 0.8);
+            }
+            line(scene, (left - 6.0, tick.at_px), (left, tick.at_px), GREY, 1.0);
+            text(scene, (left - 9.0, tick.at_px + 4.5), label, TICK, TextAnchor::End);
+        }
+    }
+}
+
+/// The values a logarithmic axis must have room for, of estimates and their intervals (estimate, lower, upper).
+///
+/// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than one decade
+/// below the smallest estimate or, where that is zero, upper end. Below an upper end that stands for a zero estimate
+/// there is room for an arrow.
+pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
+    let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
+    let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
+    let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
+    let lows = intervals.iter().map(|(_, l, _)| *l).filter(shown).map(|l| l.max(smallest / 10.0));
+    middles.iter().copied().chain(intervals.iter().map(|(_, _, u)| *u)).chain(lows).filter(shown).collect()
+}
+
+/// A number with three digits in plain short form: `0.012`, `250`, `1.5e-6`; not finite in words.
+pub(super) fn number(value: f64) -> String {
+    digits_text(value, 3)
+}
+
+/// A number with so many significant digits, without zeros at the end; from 1e5 on and below 0.001 as a power.
+fn digits_text(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return if value.is_nan() { "not a number" } else { "infinite" }.to_string();
+    }
+    if value == 0.0 {
+        return "0".to_string();
+    }
+    let written = format!("{value:.*e}", digits.max(1) - 1);
+    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
+    let (mantissa, exponent) = (mantissa.parse().unwrap_or(value), exponent.parse().unwrap_or(0));
+    power_text(mantissa, exponent, digits as i32 - 1)
+}
+
+/// `mantissa` · 10^`exponent` with at most so many decimals of the mantissa.
+fn power_text(mantissa: f64, exponent: i32, decimals: i32) -> String {
+    let trimmed = |text: String| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+        false => text,
+    };
+    if !(-3..5).contains(&exponent) {
+        return format!("{}e{exponent}", trimmed(format!("{mantissa:.*}", decimals.max(0) as usize)));
+    }
+    // Divided, not multiplied by a negative power: 2/10 is 0.2.
+    let power = f64::from(10_u32.pow(exponent.unsigned_abs()));
+    let value = if exponent < 0 { mantissa / power } else { mantissa * power };
+    trimmed(format!("{value:.*}", (decimals - exponent).max(0) as usize))
+}
+
+/// 1, 2 or 5 times a power of ten, as digit and exponent.
+type OneTwoFive = (u8, i32);
+
+/// The largest 1, 2 or 5 times a power of ten that is not above `value` (positive, finite).
+fn one_two_five(value: f64) -> OneTwoFive {
+    // The shortest decimal text splits a float without rounding.
+    let written = format!("{value:e}");
+    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
+    let mantissa: f64 = mantissa.parse().unwrap_or(1.0);
+    let digit = if mantissa >= 5.0 {
+        5
+    } else if mantissa >= 2.0 {
+        2
+    } else {
+        1
+    };
+    (digit, exponent.parse().unwrap_or(0))
+}
+
+/// The neighbour above (`way` = 1) or below (-1).
+fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
+    match (digit, way > 0) {
+        (1, true) => (2, exponent),
+        (2, true) => (5, exponent),
+        (_, true) => (1, exponent + 1),
+        (1, false) => (5, exponent - 1),
+        (2, false) => (1, exponent),
+        (_, false) => (2, exponent),
+    }
+}
+
+/// The common logarithm of digit · 10^exponent.
+fn place((digit, exponent): OneTwoFive) -> f64 {
+    f64::from(exponent) + libm::log10(f64::from(digit))
+}
+
+/// A plain number not much above `value` (positive), at which an axis from zero can end.
+pub(super) fn plain_end(value: f64) -> f64 {
+    let step = plain_step(value / 8.0);
+    (value / step - 1e-9).ceil() * step
+}
+
+/// The smallest 1, 2 or 5 times a power of ten that is not below `step` (positive).
+fn plain_step(step: f64) -> f64 {
+    let step = step.max(f64::MIN_POSITIVE);
+    let (digit, exponent) = one_two_five(step);
+    let value = |(digit, exponent): OneTwoFive| format!("{digit}e{exponent}").parse().unwrap_or(step);
+    let below: f64 = value((digit, exponent));
+    if below >= step { below } else { value(next((digit, exponent), 1)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use AxisScale::{Linear, Logarithmic};
+
+    fn labels(scale: AxisScale, values: &[f64], most: usize) -> Vec<String> {
+        let axis = Axis::around(scale, values, (0.0, 100.0)).unwrap();
+        axis.ticks(most).into_iter().filter_map(|t| t.label).collect()
+    }
+
+    #[test]
+    fn numbers_are_short_and_powers_only_where_zeros_would_have_to_be_counted() {
+        let cases = [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1"),
+            (0.25, "0.25"),
+            (0.001, "0.001"),
+            (0.000_999_9, "0.001"),
+            (1.234e-4, "1.23e-4"),
+            (1e-6, "1e-6"),
+            (99_999.0, "1e5"),
+            (12_345.0, "12300"),
+            (100.0, "100"),
+            (-2.5e10, "-2.5e10"),
+            (f64::NAN, "not a number"),
+            (f64::INFINITY, "infinite"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn the_axis_has_a_place_for_every_value_and_its_ends_are_plain() {
+        for values in [vec![3e-6, 4e-2], vec![7.0], vec![1e-5], vec![0.02, 0.021], vec![1e-300, 1e300]] {
+            for scale in [Linear, Logarithmic] {
+                let axis = Axis::around(scale, &values, (10.0, 90.0)).unwrap();
+                for v in &values {
+                    assert!((10.0..=90.0).contains(&axis.at(*v)));
+                }
+                let ticks = axis.ticks(6);
+                assert!(ticks.iter().filter(|t| t.label.is_some()).count() >= 2, "{scale:?} {values:?} {ticks:?}");
+                assert!(ticks.iter().all(|t| (9.9..=90.1).contains(&t.at_px)), "{ticks:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn decades_are_named_and_within_two_of_them_also_two_and_five() {
+        assert_eq!(labels(Logarithmic, &[2e-7, 0.9], 8), ["1e-6", "1e-5", "1e-4", "0.001", "0.01", "0.1", "1"]);
+        assert_eq!(labels(Logarithmic, &[1e-6, 1e-5], 8), ["1e-6", "2e-6", "5e-6", "1e-5"]);
+        assert!(labels(Logarithmic, &[1e-300, 1e300], 8).len() <= 10);
+    }
+
+    #[test]
+    fn neighbouring_ticks_have_different_numbers_far_from_zero_too() {
+        let far = labels(Linear, &[1_000_000.0, 1_000_000.4], 6);
+        let distinct: std::collections::BTreeSet<_> = far.iter().collect();
+        assert_eq!(distinct.len(), far.len(), "{far:?}");
+        assert_eq!(labels(Linear, &[-0.1, 0.3], 5), ["-0.1", "0", "0.1", "0.2", "0.3"]);
+    }
+
+    #[test]
+    fn what_an_axis_cannot_show_does_not_stretch_it() {
+        assert!(Axis::around(Logarithmic, &[0.0, -1.0, f64::NAN], (0.0, 1.0)).is_none());
+        assert!(Axis::around(Linear, &[f64::NAN, f64::INFINITY], (0.0, 1.0)).is_none());
+        let axis = Axis::around(Logarithmic, &[0.0, 1e-3, 1e-2], (0.0, 1.0)).unwrap();
+        assert_eq!((axis.at(0.0), axis.at(1e-3), axis.at(1e-2)), (0.0, 0.0, 1.0));
+    }
+
+    #[test]
+    fn a_lower_end_near_zero_does_not_squeeze_the_estimates() {
+        let reach = logarithmic_reach(&[(1e-3, 1e-200, 1e-2), (0.0, 0.0, 3e-3)]);
+        assert!(reach.iter().all(|v| *v >= 1e-4), "{reach:?}");
+    }
+}
