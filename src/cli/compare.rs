@@ -11,12 +11,14 @@ use super::source::{self, Source};
 use super::study::{How, StudyConfig, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
+use crate::criterion::Criterion;
 use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
 use crate::driver::ModelId;
 use crate::estimate::Enough;
 use crate::parameterization::ParameterizationId;
 use crate::profile::Profile;
 use crate::report::compare::CompareFile;
+use crate::report::compare_figures;
 use crate::report::files::{make_folder, write_atomically};
 use crate::report::sampling::HostRecord;
 use crate::sampling::{
@@ -225,11 +227,18 @@ impl Compare {
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
-    /// Tables and record; the record comes last. A figure of the ratios belongs here.
+    /// Tables, figures and record; the record comes last.
     fn write(&self, file: &CompareFile) -> Result<()> {
         let text = file.text();
         write_atomically(&self.out.join("compare.csv"), &file.csv()?)?;
         write_atomically(&self.out.join("compare.txt"), text.as_bytes())?;
+        for comparison in &file.categories {
+            for criterion in Criterion::ALL {
+                let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
+                let figure = compare_figures::rates(file, comparison, criterion);
+                write_atomically(&self.out.join(name), figure.svg().as_bytes())?;
+            }
+        }
         write_atomically(&self.out.join("compare.json"), &file.to_json()?)?;
         console::print(&text)?;
         tracing::info!("results written to {}", self.out.display());

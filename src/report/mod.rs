@@ -6,6 +6,7 @@
 
 pub mod axis;
 pub mod compare;
+pub mod compare_figures;
 pub mod convergence;
 pub mod csv;
 pub mod density;
