@@ -11,8 +11,8 @@ use lanesweep::criterion::Criterion;
 use lanesweep::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
 use lanesweep::driver::ModelId;
 use lanesweep::estimate::{
-    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, balance_heuristic,
-    cross_entropy, defended, from_pilot_with_proposal, subset,
+    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
+    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset,
 };
 use lanesweep::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
@@ -137,7 +137,16 @@ fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, sa
             estimate.variance_reduction,
             estimate.trust.verdict()
         );
-        assert!(i.holds(truth.probability), "{name}: {estimator} does not hold {:e}", truth.probability);
+        // The published form has no defence: where its weights run away it may miss, but then it must say so.
+        let says_so = estimator == "importance, author's" && estimate.trust.verdict() == Verdict::Unusable;
+        let holds = i.holds(truth.probability);
+        if !holds {
+            println!(
+                "  {estimator:22} MISSES the truth{}",
+                if says_so { ", and says that it is unusable" } else { "" }
+            );
+        }
+        assert!(holds || says_so, "{name}: {estimator} does not hold {:e}", truth.probability);
     }
 }
 

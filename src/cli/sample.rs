@@ -37,16 +37,20 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(
-    after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut_in_2.json --samples 1000000\n  lanesweep \
-                        sample cut_in_1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
-                        cut_in_1.json --samples 100000000 --lanes 0..50000000 --out part-1"
+    after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
+                        sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
+                        cut-in-1.json --samples 100000000 --lanes 0..50000000 --out part-1"
 )]
 pub struct Sample {
     /// Density file
     #[arg(value_name = "DENSITY", required_unless_present = "join")]
     density: Option<PathBuf>,
-    /// Join the parts of a run, made with --lanes, instead of sampling: their folders
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "density")]
+    /// Join the parts of a run, made with --lanes, instead of sampling: their folders. The result is that of the whole
+    /// run, without its convergence
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = [
+        "density", "estimator", "samples", "models", "criterion", "thw", "points", "until", "time_limit", "worst", "map",
+        "rows", "lanes", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed",
+    ])]
     join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
     #[arg(long, value_enum, default_value_t)]
@@ -160,6 +164,8 @@ impl EstimatorFlag {
     }
 }
 
+/// Points that an adaptive estimator holds at once, at most.
+const MOST_HELD: u64 = 10_000_000;
 /// Draws that the valid share of each of several proposals is counted on.
 const VALIDITY_DRAWS: u64 = 1_000_000;
 
@@ -200,13 +206,19 @@ impl Sample {
             started: Instant::now(),
         };
         if let Some(rows) = &self.rows {
-            guard(rows, &self.out)?;
+            guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }
         make_folder(&self.out)?;
+        sample_lanes::check_writable(&self.out)?;
         tracing::info!("{}", run.density.provenance.data);
         let file = match self.estimator {
             EstimatorFlag::Mc if self.proposal.is_empty() => run.crude()?,
-            _ => run.adaptive()?,
+            _ => {
+                // A proposal in this folder may be an input: it is read and written on the way.
+                let file = run.adaptive()?;
+                sample_lanes::clear(&self.out, &["proposal-"])?;
+                file
+            }
         };
         let folder = |name: &str| self.out.join(name);
         write_density(&folder("density.json"), &run.density)?;
@@ -255,6 +267,27 @@ impl Sample {
         if let Some((flag, _)) = only_crude.iter().find(|(_, given)| *given && !is_crude) {
             let problem = "this belongs to crude Monte Carlo";
             return Err(Error::usage(Place::item(*flag), problem, "use --estimator mc, or leave it out"));
+        }
+        let least = |flag: &str, value: u64, least: u64, most: u64| {
+            if (least..=most).contains(&value) {
+                return Ok(());
+            }
+            let help = format!("give at least {least} and at most {most}");
+            Err(Error::usage(Place::item(flag), format!("{value} does not do"), help))
+        };
+        match self.estimator {
+            EstimatorFlag::Is if self.proposal.is_empty() => least("--pilot", self.pilot, 500, MOST_HELD)?,
+            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MOST_HELD)?,
+            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?,
+            _ => (),
+        }
+        if self.bootstrap > 0 {
+            least("--bootstrap", self.bootstrap.into(), 20, 1 << 20)?;
+            least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
+            if self.lanes.is_some() {
+                let problem = "a part of a run has no replicates of its own";
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --lanes out"));
+            }
         }
         if self.lanes.is_some() && !is_crude {
             let problem = "only crude Monte Carlo can be split: the adaptive estimators are sequential";
@@ -527,8 +560,9 @@ impl Run<'_> {
     }
 }
 
-/// Files of a run that must not be an input.
-fn guard(rows: &Path, out: &Path) -> Result<()> {
+/// The rows must replace neither an input nor another result.
+fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json", "part.json"];
-    super::source::refuse_overwriting(rows, &results.map(|name| out.join(name)), "--rows")
+    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
+    super::source::refuse_overwriting(rows, &others, "--rows")
 }

@@ -20,6 +20,11 @@ pub(super) fn run(folders: &[PathBuf], out: &Path, interval: BinomialInterval, l
     let [first, rest @ ..] = folders else {
         return Err(Error::usage(Place::item("--join"), "no part", "give the folders of the parts"));
     };
+    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    if folders.iter().any(|folder| place(folder) == place(out)) {
+        let problem = format!("{} is one of the parts", out.display());
+        return Err(Error::usage(Place::item("--out"), problem, "choose another folder for the result"));
+    }
     let (facts, plan, density) = run_of(first)?;
     let (criterion, mut tally) = read_part(&first.join("part.json"))?;
     for folder in rest {
@@ -39,6 +44,7 @@ pub(super) fn run(folders: &[PathBuf], out: &Path, interval: BinomialInterval, l
         tracing::warn!("{missing} of {} samples are in no part; this result is that of the rest", plan.unit_count());
     }
     make_folder(out)?;
+    sample_lanes::check_writable(out)?;
     let is_sampled = density.space.has_thw();
     let rows = crude_rows(&plan, &tally, density.exposure.as_ref(), is_sampled, interval, level, StopReason::Samples);
     let axes = tally.map.as_ref().map(|map| map.axes.clone());

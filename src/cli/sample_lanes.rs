@@ -48,8 +48,37 @@ pub(super) fn run(
         if failed { Err(std::io::Error::other("the run failed")) } else { Ok(()) }
     });
     bar.finish_and_clear();
-    let run = run.ok_or_else(|| Error::Internal("the rows were not written".to_owned()))??;
-    written.map(|()| run)
+    match run {
+        Some(Ok(run)) => written.map(|()| run),
+        Some(Err(error)) => Err(error),
+        // The file could not even be begun.
+        None => Err(written.err().unwrap_or_else(|| Error::Internal("the rows were not written".to_owned()))),
+    }
+}
+
+/// A folder that cannot be written to is known before the work.
+pub(super) fn check_writable(out: &Path) -> Result<()> {
+    crate::atomic_file::AtomicFile::create(&out.join("estimate.json")).map(drop)
+}
+
+/// Beginnings of the names of all files that a sampling run writes beside its input.
+const OURS: [&str; 6] = ["estimate", "worst.csv", "convergence.", "map-", "part.json", "proposal-"];
+
+/// Takes the files of an earlier run out of a folder, so that none stands beside the results of this one; keeps those
+/// whose names begin so.
+pub(super) fn clear(out: &Path, kept: &[&str]) -> Result<()> {
+    let io = |e| Error::io(out, "list", e);
+    for entry in std::fs::read_dir(out).map_err(io)? {
+        let entry = entry.map_err(io)?;
+        let name = entry.file_name();
+        let Some(name) = name.to_str() else { continue };
+        let begins = |list: &[&str]| list.iter().any(|beginning| name.starts_with(beginning));
+        let is_result = [".json", ".csv", ".svg"].iter().any(|ending| name.ends_with(ending));
+        if is_result && begins(&OURS) && !begins(kept) {
+            std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "replace", e))?;
+        }
+    }
+    Ok(())
 }
 
 /// Everything of a run but `estimate.json`.
@@ -61,6 +90,7 @@ pub(super) fn write(
     counting: &TallyOptions,
     is_part: bool,
 ) -> Result<()> {
+    clear(out, &[])?;
     if is_part {
         write_part(&out.join("part.json"), counting.criterion, &run.tally)?;
     } else if !run.convergence.is_empty() {

@@ -43,7 +43,7 @@ pub struct Simulate {
     #[arg(long, value_name = "FILE", requires = "lane")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a `lanesweep sample` run, for --lane: reruns that lane, bit for bit
-    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table"])]
+    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"])]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model, as errors and tables print it
     #[arg(long, value_name = "KEY")]

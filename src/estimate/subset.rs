@@ -161,8 +161,8 @@ fn conclude(
     let (estimated, variance, interval) = if reached {
         (probability, (probability * coefficient_of_variation).powi(2), interval)
     } else {
-        // What was reached bounds what was not.
-        (0.0, 0.0, Interval { low: 0.0, ..interval })
+        // Chains that do not come nearer to failure say nothing of what lies beyond: no bound but 1.
+        (0.0, 0.0, Interval::nothing(options.level))
     };
     let mut estimate =
         Estimate::new("subset", estimated, variance, interval, runs, failures, voids, StopReason::Samples);

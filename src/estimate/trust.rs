@@ -122,6 +122,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::NoFailures => write!(f, "no failure was found: the probability is only bounded from above"),
+            Warning::FewFailures { failures: 1 } => write!(f, "only 1 failure was found"),
             Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
             Warning::LowEffectiveSize { effective_size } => {
                 write!(f, "the failures count as no more than {effective_size:.1} equally weighted ones")

@@ -12,6 +12,7 @@ use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
 use crate::profile::Profile;
 use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, RiskRate, SampleTally, WorstSample};
+use crate::scenario::Category;
 use crate::sweep::generated::ATTEMPTS;
 use crate::sweep::{Headway, LanePlan, Outcome};
 use crate::{Error, Result};
@@ -226,8 +227,17 @@ impl EstimateFile {
         let _ = writeln!(
             text,
             "{} {}: density over {} scenarios ({})",
-            density.category, density.parameterization, density.kernels, density.provenance.data
+            Category::parse(density.category).map_or(density.category, Category::label),
+            density.parameterization,
+            density.kernels,
+            density.provenance.data
         );
+        if let Some(draws) =
+            self.draws.as_ref().filter(|d| d.samples < self.samples && self.stopped == StopReason::Samples)
+        {
+            let ranges: Vec<String> = draws.ranges.iter().map(|[a, b]| format!("{a}..{b}")).collect();
+            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), self.samples);
+        }
         if let Some(draws) = &self.draws {
             let _ = writeln!(
                 text,
@@ -264,7 +274,11 @@ impl EstimateFile {
                 e.failures.to_string(),
                 short(e.probability),
                 interval_text(e.interval.low, e.interval.high, e.interval.kind),
-                if is_wide { "–".to_owned() } else { format!("{:.1} %", 100.0 * e.relative_half_width) },
+                match 100.0 * e.relative_half_width {
+                    _ if is_wide => "–".to_owned(),
+                    wide if wide >= 1000.0 => "> 999 %".to_owned(),
+                    percent => format!("{percent:.1} %"),
+                },
             ];
             fields.extend(has_hours.then(|| rate_text(row.risk.per_hour)));
             fields.extend(has_kilometres.then(|| rate_text(row.risk.per_1000_km)));
@@ -285,6 +299,22 @@ impl EstimateFile {
         }
         if let Some(record) = &self.bootstrap {
             text.push_str(&bootstrap_text(record));
+        }
+        let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
+        let _ = writeln!(
+            text,
+            "Intervals at {} %; ± is the half-width of that of P over P; ≤ bounds from above where nothing failed",
+            100.0 * level
+        );
+        // A density of N scenarios was never seen beyond them.
+        let resolved = 1.0 / self.density.kernels.max(1) as f64;
+        if self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved) {
+            let _ = writeln!(
+                text,
+                "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",
+                short(resolved),
+                self.density.kernels
+            );
         }
         if self.density.provenance.synthetic {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
@@ -340,8 +370,12 @@ impl EstimateFile {
             "mean_weight",
             "risk_per_hour",
             "risk_per_hour_sd",
+            "risk_per_hour_low",
+            "risk_per_hour_high",
             "risk_per_1000_km",
             "risk_per_1000_km_sd",
+            "risk_per_1000_km_low",
+            "risk_per_1000_km_high",
             "verdict",
             "data",
         ];
@@ -349,7 +383,9 @@ impl EstimateFile {
         for row in &self.estimates {
             let e = &row.estimate;
             let weight = |f: fn(&crate::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
-            let rate = |r: Option<RiskRate>| [r.map(|r| r.estimate), r.map(|r| r.standard_deviation)];
+            let rate = |r: Option<RiskRate>| {
+                [r.map(|r| r.estimate), r.map(|r| r.standard_deviation), r.map(|r| r.low), r.map(|r| r.high)]
+            };
             let mut fields = vec![
                 self.density.category.to_owned(),
                 self.density.parameterization.clone(),
@@ -513,7 +549,13 @@ fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
 }
 
 fn rate_text(rate: Option<RiskRate>) -> String {
-    rate.map_or("unknown".to_owned(), |r| format!("{} ± {}", short(r.estimate), short(r.standard_deviation)))
+    rate.map_or("unknown".to_owned(), |r| {
+        if r.estimate > 0.0 {
+            format!("{} ({}…{})", short(r.estimate), short(r.low), short(r.high))
+        } else {
+            format!("≤ {}", short(r.high))
+        }
+    })
 }
 
 fn kind_name(kind: IntervalKind) -> &'static str {

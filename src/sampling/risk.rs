@@ -2,17 +2,20 @@
 
 use serde::Serialize;
 
-use crate::density::{Exposure, Rate};
+use crate::density::{Exposure, Rate, normal_quantile};
 use crate::estimate::Estimate;
 
-/// Failures per unit of exposure with the standard deviation of the product,
-/// √(λ²σ_P² + P²σ_λ² + σ_λ²σ_P²): λ̂ and P̂ come from independent counts.
+/// Failures per unit of exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RiskRate {
     /// λ̂·P̂.
     pub estimate: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the product, √(λ²σ_P² + P²σ_λ² + σ_λ²σ_P²): λ̂ and P̂ come from independent counts.
     pub standard_deviation: f64,
+    /// Lower end of the interval at the estimate's level: log-normal with this deviation; 0 without failures.
+    pub low: f64,
+    /// Upper end; without failures the upper ends of both intervals multiplied.
+    pub high: f64,
 }
 
 /// Risk in both units, where they are known.
@@ -24,18 +27,55 @@ pub struct Risk {
     pub per_1000_km: Option<RiskRate>,
 }
 
+impl RiskRate {
+    /// The product of a rate, times `scale`, and an estimate.
+    fn of(rate: &Rate, scale: f64, estimate: &Estimate) -> RiskRate {
+        let (events, deviation) = (rate.estimate * scale, rate.standard_deviation * scale);
+        let (p, variance) = (estimate.probability, estimate.variance);
+        let spread = events * events * variance + p * p * deviation * deviation + deviation * deviation * variance;
+        let product = events * p;
+        let standard_deviation = spread.sqrt();
+        if product <= 0.0 {
+            let high = rate.high * scale * estimate.interval.high;
+            return RiskRate { estimate: product, standard_deviation, low: 0.0, high };
+        }
+        let z = normal_quantile(0.5 + 0.5 * estimate.interval.level);
+        let factor = libm::exp(z * libm::sqrt(libm::log1p((standard_deviation / product).powi(2))));
+        RiskRate { estimate: product, standard_deviation, low: product / factor, high: product * factor }
+    }
+}
+
 impl Risk {
     /// Of an estimate under an exposure.
     pub fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
-        let product = |rate: &Rate, scale: f64| {
-            let (rate_, deviation) = (rate.estimate * scale, rate.standard_deviation * scale);
-            let (p, variance) = (estimate.probability, estimate.variance);
-            let spread = rate_ * rate_ * variance + p * p * deviation * deviation + deviation * deviation * variance;
-            RiskRate { estimate: rate_ * p, standard_deviation: spread.sqrt() }
-        };
+        let product = |rate: Option<&Rate>, scale: f64| rate.map(|rate| RiskRate::of(rate, scale, estimate));
         Risk {
-            per_hour: exposure.and_then(|e| e.per_hour.as_ref()).map(|rate| product(rate, 1.0)),
-            per_1000_km: exposure.and_then(|e| e.per_kilometre.as_ref()).map(|rate| product(rate, 1000.0)),
+            per_hour: product(exposure.and_then(|e| e.per_hour.as_ref()), 1.0),
+            per_1000_km: product(exposure.and_then(|e| e.per_kilometre.as_ref()), 1000.0),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::density::Driven;
+    use crate::estimate::{BinomialInterval, Counts, StopReason, from_counts};
+
+    #[test]
+    fn risk_without_failures_is_bounded_and_not_zero() {
+        let exposure = Exposure::new(100, Driven { hours: Some(50.0), kilometres: Some(5000.0) });
+        let counts = |failures| Counts { runs: 10_000, failures, voids: 0, tries: 10_000 };
+        let of = |failures| {
+            let estimate = from_counts(&counts(failures), BinomialInterval::Wilson, 0.95, StopReason::Samples);
+            Risk::of(&estimate, Some(&exposure)).per_hour.unwrap()
+        };
+        let none = of(0);
+        assert!(none.estimate == 0.0 && none.high > 2.0 * 2.9e-4 && none.high < 3.0 * 3.0e-4);
+        let some = of(100);
+        // 10 % from the events, 10 % from the failures.
+        assert!((some.estimate - 0.02).abs() < 1e-12);
+        assert!((some.standard_deviation / some.estimate - 0.141).abs() < 2e-3);
+        assert!(some.low < some.estimate && some.high > some.estimate);
     }
 }
