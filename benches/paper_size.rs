@@ -9,7 +9,7 @@ mod common;
 use std::path::Path;
 use std::time::Instant;
 
-use common::{lane_steps, paper_size_scenarios, swept};
+use common::{lane_steps, paper_size_scenarios, peak_memory_bytes, swept};
 use lanesweep::mining::{MiningOptions, mine_folder};
 use lanesweep::profile::Profile;
 use lanesweep::score::{ScoreOptions, score};
@@ -76,11 +76,4 @@ fn write_recordings(dir: &Path) -> u64 {
         bytes = std::fs::read_dir(dir).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
     }
     bytes
-}
-
-/// Linux: the process's highest resident memory.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
 }

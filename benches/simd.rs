@@ -12,7 +12,7 @@ mod common;
 
 use std::time::Instant;
 
-use common::{lane_steps, paper_size_scenarios};
+use common::{lane_steps, paper_size_scenarios, peak_memory_bytes};
 use lanesweep::driver::ModelId;
 use lanesweep::profile::Profile;
 use lanesweep::scalar::Counting;
@@ -196,11 +196,4 @@ mod roof {
     chains!(avx2, "avx2", x86_64, _mm256_set1_ps, _mm256_add_ps, _mm256_mul_ps, 8, 12);
     #[cfg(target_arch = "aarch64")]
     chains!(neon, "neon", aarch64, vdupq_n_f32, vaddq_f32, vmulq_f32, 4, 16);
-}
-
-/// Linux: the process's highest resident memory.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
 }

@@ -46,3 +46,10 @@ pub fn swept(plan: &LanePlan, backend: &dyn Backend) -> Partial {
     .unwrap();
     parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
 }
+
+/// Linux: the process's highest resident memory.
+pub fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}

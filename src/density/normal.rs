@@ -12,7 +12,7 @@ pub fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
 
-/// Quantile of `p`, to about 1e-15 relative; see [`super::standard_normal`].
+/// Quantile of `p`, to about 1e-15 relative; algorithm AS 241.
 pub fn normal_quantile(p: f64) -> f64 {
     super::standard_normal::quantile(p)
 }

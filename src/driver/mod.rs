@@ -14,7 +14,7 @@ mod registry;
 mod attention;
 mod profile;
 
-pub use attention::{AttentionRule, NEVER, Perception};
+pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
 pub use profile::{Bound, DriverProfile};
 
 use crate::scalar::Real;

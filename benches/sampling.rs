@@ -1,0 +1,95 @@
+//! Sampled lanes: wall time of crude Monte Carlo over one density per kind of parameterization, and memory at 10⁶,
+//! 10⁷ and 10⁸ samples (with `-- --large` at 10⁹ too).
+//!
+//! `cargo bench --bench sampling` prints one CSV row per run to stdout and a summary to stderr. Synthetic data of the
+//! default size, profile `paper`, THW 1 s, all threads of the pool.
+
+mod common;
+
+use std::time::Instant;
+
+use common::peak_memory_bytes;
+use lanesweep::criterion::Criterion;
+use lanesweep::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::driver::ModelId;
+use lanesweep::estimate::{BinomialInterval, StopRule};
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::parameterization::ParameterizationId;
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{
+    CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
+};
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::sweep::{CpuBackend, Headway};
+use lanesweep::trajectory::generator::GeneratorOptions;
+
+fn main() {
+    // `cargo test --benches` calls without `--bench`: nothing to time then.
+    if !std::env::args().any(|arg| arg == "--bench") {
+        return;
+    }
+    println!("part,density,models,samples,lanes,worst,seconds,peak_bytes,failures");
+    let scenarios = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios;
+    let million = 1_000_000;
+    for (category, key) in [
+        (Category::CutIn, "2"),
+        (Category::CutIn, "6"),
+        (Category::CutOut, "b"),
+        (Category::CutOut, "f"),
+        (Category::Lvd, "i"),
+        (Category::Lvd, "ii"),
+        (Category::Lvd, "iv"),
+    ] {
+        let density = density(category, key, &scenarios);
+        run("speed", &density, &ModelId::ALL, million, 20);
+    }
+    let density = density(Category::CutIn, "2", &scenarios);
+    run("verdicts alone", &density, &ModelId::ALL, million, 0);
+    run("ten million", &density, &ModelId::ALL, 10 * million, 20);
+    let large = std::env::args().any(|arg| arg == "--large");
+    for samples in [million, 10 * million, 100 * million, 1000 * million].into_iter().take(if large { 4 } else { 3 }) {
+        run("memory", &density, &[ModelId::Fsm], samples, 20);
+    }
+}
+
+fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    DensityModel::fit(ParameterizationId::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
+}
+
+fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {
+    let options = SamplePlanOptions {
+        samples,
+        seed: 157,
+        source: SampleSource::Random,
+        models: models.to_vec(),
+        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+    };
+    let profile = Profile::load("paper").unwrap();
+    let plan = plan_samples(density, &density.mixture().unwrap(), &profile, &options).unwrap();
+    let backend = CpuBackend::lane_arithmetic();
+    let lanes = Lanes { backend: &backend, fallback: None, recheck: None };
+    let counting = TallyOptions { worst, criterion: Criterion::Collision, map: None };
+    let crude = CrudeOptions {
+        stop: StopRule::samples(samples),
+        interval: BinomialInterval::Wilson,
+        level: 0.95,
+        exposure: None,
+        is_sampled_headway: false,
+    };
+    let start = Instant::now();
+    let run = sample_crude(&plan, 0..samples, &lanes, &counting, &crude, |_| Ok(())).unwrap();
+    let seconds = start.elapsed().as_secs_f64();
+    let id = density.space.id();
+    let name = format!("{} {}", id.category.key(), id.key);
+    let (lanes, failures) = (plan.lane_count(), run.tally.failures.iter().sum::<u64>());
+    let peak = peak_memory_bytes().unwrap_or(0);
+    println!("{part},{name},{},{samples},{lanes},{worst},{seconds},{peak},{failures}", models.len());
+    eprintln!(
+        "{part}: {name}, {samples} samples, {lanes} lanes in {seconds:.2} s, {:.2} M lanes/s, peak {:.1} MB so far",
+        lanes as f64 / seconds / 1e6,
+        peak as f64 / 1e6
+    );
+}
