@@ -169,6 +169,16 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     run(&["--estimator", "subset", "--out", "subset"]);
     let (is, ce) = ("is/proposal-FSM.json", "ce/proposal-FSM.json");
     run(&["--estimator", "is", "--proposal", ce, "--samples", "20000", "--out", "again"]);
+    // A given proposal can be split; the join is the run in one.
+    let given = ["--estimator", "is", "--proposal", ce, "--samples", "20000"];
+    run(&[&given[..], &["--out", "g1", "--lanes", "0..5000"]].concat());
+    run(&[&given[..], &["--out", "g2", "--lanes", "5000..20000"]].concat());
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "sample", "--join", "g2", "g1", "--out", "g"]);
+    assert_eq!(code, 0, "{err}");
+    let read = |folder: &str| std::fs::read_to_string(dir.path().join(folder).join("estimates.csv")).unwrap();
+    assert_eq!(read("g"), read("again"));
+    let (code, _, _) = lanesweep(dir.path(), &["-q", "sample", "--join", "g1", "g1", "--out", "h"]);
+    assert_eq!(code, 3);
     let both = ["--proposal", is, "--proposal", ce];
     run(&[&["--estimator", "is", "--samples", "20000", "--out", "balance"], &both[..]].concat());
     let estimate = |folder: &str| -> serde_json::Value {
@@ -206,7 +216,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--thw", "-1"], 2, "no time headway"),
         (&[d, "--thw", "sampled"], 2, "--with-thw"),
         (&[d, "--estimator", "subset"], 2, "one headway at a time"),
-        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "only crude Monte Carlo can be split"),
+        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "one given proposal can be split"),
         (&[d, "--lanes", "5..5"], 2, "no interval"),
         (&[d, "--lanes", "0..10", "--samples", "9"], 2, "no interval"),
         (&[d, "--level", "1"], 2, "no share"),
@@ -216,7 +226,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&["cut.json"], 3, "cut.json"),
         (&["edited.json"], 3, "edited.json"),
         (&[d, "--estimator", "is", "--thw", "1", "--proposal", d], 3, "no proposal"),
-        (&["--join", "."], 6, "estimate.json"),
+        (&["--join", "."], 6, "part.json"),
     ];
     for (args, code, said) in cases {
         let (found, out, err) = lanesweep(dir.path(), &[&["sample"], args].concat());

@@ -14,6 +14,7 @@ mod lists;
 mod mine;
 mod rerun;
 mod sample;
+mod sample_adaptive;
 mod sample_join;
 mod sample_lanes;
 mod simulate;

@@ -26,6 +26,34 @@ struct Recorded {
     plan_sha256: Option<String>,
 }
 
+/// What the sampling run that wrote this folder was asked for, with its density.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Input`] where the folder does not hold a run.
+pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<String>)> {
+    let path = dir.join("estimate.json");
+    let wrong = |problem: String| {
+        let help = "give the folder (--out) of a `lanesweep sample` run by this version";
+        Error::input(Place::file(&path), problem, help)
+    };
+    let text = std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
+    let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
+    if run.lanesweep_estimate != 1 {
+        return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
+    }
+    let estimator = ["mc", "is", "ce", "subset"].into_iter().find(|known| *known == run.estimator);
+    let facts = RunFacts {
+        estimator: estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?,
+        profile: run.profile,
+        models: run.models,
+        headways: run.plan_headways,
+        points: if run.points == "sobol" { "sobol" } else { "random" },
+        samples: run.samples,
+        seed: run.seed,
+    };
+    Ok((facts, read_density(&dir.join("density.json"))?, run.plan_sha256))
+}
+
 /// The plan of the sampling run that wrote this folder.
 ///
 /// # Errors
@@ -39,31 +67,18 @@ pub(super) fn plan_of(dir: &Path) -> Result<LanePlan> {
 /// # Errors
 /// As [`plan_of`].
 pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
-    let path = dir.join("estimate.json");
+    let (facts, density, plan_sha256) = facts_of(dir)?;
     let wrong = |problem: String| {
         let help = "give the folder (--out) of a `lanesweep sample` run of crude Monte Carlo by this version";
-        Error::input(Place::file(&path), problem, help)
+        Error::input(Place::file(dir.join("estimate.json")), problem, help)
     };
-    let text = std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
-    let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
-    if run.lanesweep_estimate != 1 || run.estimator != "mc" {
-        return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", run.estimator)));
+    if facts.estimator != "mc" {
+        return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", facts.estimator)));
     }
-    let density = read_density(&dir.join("density.json"))?;
-    let is_sobol = run.points == "sobol";
-    let facts = RunFacts {
-        estimator: "mc",
-        profile: run.profile,
-        models: run.models,
-        headways: run.plan_headways,
-        points: if is_sobol { "sobol" } else { "random" },
-        samples: run.samples,
-        seed: run.seed,
-    };
     let options = SamplePlanOptions {
         samples: facts.samples,
         seed: facts.seed,
-        source: if is_sobol { SampleSource::Sobol } else { SampleSource::Random },
+        source: if facts.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
         models: facts.models.clone(),
         headways: if density.space.has_thw() {
             SampleHeadways::Sampled
@@ -72,7 +87,7 @@ pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
         },
     };
     let plan = plan_samples(&density, &density.mixture()?, &facts.profile, &options)?;
-    match run.plan_sha256 {
+    match plan_sha256 {
         Some(hash) if hash == plan.hash() => Ok((facts, plan, density)),
         _ => Err(wrong("its plan is not the one that the density and the profile beside it make".to_owned())),
     }

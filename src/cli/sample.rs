@@ -13,18 +13,14 @@ use super::sample_join as join;
 use super::sample_lanes;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
-use crate::density::{BandwidthRule, DensityModel, Kde, Mixture, read_density, write_density};
+use crate::density::{DensityModel, read_density, write_density};
 use crate::driver::ModelId;
-use crate::estimate::{
-    BinomialInterval, Checkpoints, CrossEntropy, Defended, Density, Estimate, Importance, Pilot, StopRule, Subset,
-    Technique, balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, importance, subset,
-};
+use crate::estimate::{BinomialInterval, Checkpoints, StopRule};
 use crate::profile::Profile;
 use crate::report::files::make_folder;
-use crate::report::sampling::{EstimateFile, HostRecord, Levels, RunFacts};
+use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{
-    EstimateRow, LaneLimitState, Lanes, MapAxes, Risk, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions,
-    bootstrap, plan_points, plan_samples, read_proposal, truncated, write_proposal,
+    EstimateRow, Lanes, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, bootstrap, plan_samples,
 };
 use crate::sweep::{Headway, ONE_IN, Recheck};
 use crate::{Error, Place, Result};
@@ -54,10 +50,10 @@ pub struct Sample {
     join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
     #[arg(long, value_enum, default_value_t)]
-    estimator: EstimatorFlag,
+    pub(super) estimator: EstimatorFlag,
     /// Samples at most; of ce: of the final sample; of subset: per level [default: 100000; subset: 2000]
     #[arg(long, value_name = "N")]
-    samples: Option<u64>,
+    pub(super) samples: Option<u64>,
     /// Driver models, separated by commas [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     models: Vec<String>,
@@ -76,7 +72,7 @@ pub struct Sample {
     interval: IntervalFlag,
     /// Level of the intervals
     #[arg(long, value_name = "SHARE", default_value_t = 0.95)]
-    level: f64,
+    pub(super) level: f64,
     /// End once the interval's half-width over the estimate is at most this; looked at after 4096·2^k samples
     #[arg(long, value_name = "SHARE")]
     until: Option<f64>,
@@ -94,22 +90,22 @@ pub struct Sample {
     rows: Option<PathBuf>,
     /// Only these samples of the run: a part that joins with others
     #[arg(long, value_name = "A..B")]
-    lanes: Option<String>,
+    pub(super) lanes: Option<String>,
     /// Runs of the pilot of is
     #[arg(long, value_name = "N", default_value_t = 10_000)]
-    pilot: u64,
+    pub(super) pilot: u64,
     /// Share of the pilot's worst points that the proposal of is is fitted to
     #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
-    worst_share: f64,
+    pub(super) worst_share: f64,
     /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
     #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
-    broad: f64,
+    pub(super) broad: f64,
     /// Share of the density in the proposals of is and ce; 0 is the published form
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
-    defence: f64,
+    pub(super) defence: f64,
     /// Proposal file to sample instead of looking for one; several are combined by the balance heuristic
     #[arg(long, value_name = "FILE")]
-    proposal: Vec<PathBuf>,
+    pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
     #[arg(long, value_name = "N", default_value_t = 0)]
     bootstrap: u32,
@@ -118,10 +114,10 @@ pub struct Sample {
     bootstrap_samples: u64,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 157)]
-    seed: u64,
+    pub(super) seed: u64,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
@@ -129,7 +125,7 @@ pub struct Sample {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum EstimatorFlag {
+pub(super) enum EstimatorFlag {
     #[default]
     Mc,
     Is,
@@ -154,7 +150,7 @@ enum IntervalFlag {
 }
 
 impl EstimatorFlag {
-    fn key(self) -> &'static str {
+    pub(super) fn key(self) -> &'static str {
         match self {
             EstimatorFlag::Mc => "mc",
             EstimatorFlag::Is => "is",
@@ -166,20 +162,17 @@ impl EstimatorFlag {
 
 /// Points that an adaptive estimator holds at once, at most.
 const MOST_HELD: u64 = 10_000_000;
-/// Draws that the valid share of each of several proposals is counted on.
-const VALIDITY_DRAWS: u64 = 1_000_000;
-
 /// Everything that a run was given, read and checked.
-struct Run<'a> {
-    flags: &'a Sample,
-    density: DensityModel,
-    profile: Profile,
-    models: Vec<ModelId>,
-    criterion: Criterion,
-    headways: SampleHeadways,
-    opened: Opened,
-    verbosity: Verbosity,
-    started: Instant,
+pub(super) struct Run<'a> {
+    pub(super) flags: &'a Sample,
+    pub(super) density: DensityModel,
+    pub(super) profile: Profile,
+    pub(super) models: Vec<ModelId>,
+    pub(super) criterion: Criterion,
+    pub(super) headways: SampleHeadways,
+    pub(super) opened: Opened,
+    pub(super) verbosity: Verbosity,
+    pub(super) started: Instant,
 }
 
 impl Sample {
@@ -216,7 +209,7 @@ impl Sample {
             _ => {
                 // A proposal in this folder may be an input: it is read and written on the way.
                 let file = run.adaptive()?;
-                sample_lanes::clear(&self.out, &["proposal-"])?;
+                sample_lanes::clear(&self.out, &["proposal-", "part.json"])?;
                 file
             }
         };
@@ -289,9 +282,15 @@ impl Sample {
                 return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --lanes out"));
             }
         }
-        if self.lanes.is_some() && !is_crude {
-            let problem = "only crude Monte Carlo can be split: the adaptive estimators are sequential";
-            return Err(Error::usage(Place::item("--lanes"), problem, "use --estimator mc, or leave --lanes out"));
+        let is_given = self.estimator == EstimatorFlag::Is && self.proposal.len() == 1;
+        if self.lanes.is_some() && !is_crude && !is_given {
+            let problem = "only crude Monte Carlo and one given proposal can be split: the rest is sequential";
+            let help = "use --estimator mc, or is with one --proposal, or leave --lanes out";
+            return Err(Error::usage(Place::item("--lanes"), problem, help));
+        }
+        if self.lanes.is_some() && (self.until.is_some() || self.time_limit.is_some()) {
+            let problem = "a part of a run cannot tell when the whole is good enough";
+            return Err(Error::usage(Place::item("--lanes"), problem, "leave the stop rules out, or --lanes"));
         }
         if !self.proposal.is_empty() && self.estimator != EstimatorFlag::Is {
             return Err(Error::usage(
@@ -331,7 +330,7 @@ impl Sample {
     }
 
     /// The samples of a part.
-    fn range(&self, samples: u64) -> Result<Range<u64>> {
+    pub(super) fn range(&self, samples: u64) -> Result<Range<u64>> {
         let Some(text) = &self.lanes else { return Ok(0..samples) };
         let wrong = || {
             let problem = format!("`{text}` is no interval of the run's {samples} samples");
@@ -345,7 +344,7 @@ impl Sample {
 }
 
 impl Run<'_> {
-    fn stop(&self, samples: u64) -> StopRule {
+    pub(super) fn stop(&self, samples: u64) -> StopRule {
         StopRule {
             samples,
             relative_half_width: self.flags.until,
@@ -365,7 +364,7 @@ impl Run<'_> {
     }
 
     /// The parts of `estimate.json` that all estimators share.
-    fn file(&self, samples: u64, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
+    pub(super) fn file(&self, samples: u64, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
         let facts = RunFacts {
             estimator: self.flags.estimator.key(),
             profile: self.profile.clone(),
@@ -448,113 +447,6 @@ impl Run<'_> {
                     Error::usage(Place::item("--map"), problem, "give two, separated by a comma, or `none`")
                 })?;
                 MapAxes::of(&self.density, x.trim(), y.trim()).map(Some)
-            }
-        }
-    }
-
-    /// One model after the other, at one headway.
-    fn adaptive(&self) -> Result<EstimateFile> {
-        let headway = match &self.headways {
-            SampleHeadways::Sampled => "sampled".to_owned(),
-            SampleHeadways::Each(list) if list.len() == 1 => list[0].to_string(),
-            SampleHeadways::Each(_) => {
-                return Err(Error::usage(
-                    Place::item("--thw"),
-                    format!("--estimator {} follows one headway at a time", self.flags.estimator.key()),
-                    "give one, such as --thw 0.6, or a density fitted with --with-thw",
-                ));
-            }
-        };
-        // The same complaint for every model: make it before any work.
-        let first = self.density.kde.points()[0].clone();
-        plan_points(&self.density, &[first], &self.profile, &self.models, &self.headways)?;
-        let nominal = truncated(&self.density)?;
-        let samples = self.flags.samples.unwrap_or(match self.flags.estimator {
-            EstimatorFlag::Subset => 2000,
-            _ => 100_000,
-        });
-        let (mut rows, mut levels) = (Vec::new(), Vec::new());
-        for &model in &self.models {
-            tracing::info!("{} on {}", model.name(), self.opened.backend().describe());
-            let (estimate, level) = self.estimate(&nominal, model, samples)?;
-            let risk = Risk::of(&estimate, self.density.exposure.as_ref());
-            rows.push(EstimateRow { model, criterion: self.criterion, headway: headway.clone(), estimate, risk });
-            levels.extend(level);
-        }
-        let mut file = self.file(samples, rows)?;
-        file.levels = levels;
-        Ok(file)
-    }
-
-    fn estimate(&self, nominal: &dyn Density, model: ModelId, samples: u64) -> Result<(Estimate, Option<Levels>)> {
-        let flags = self.flags;
-        let lanes = LaneLimitState {
-            density: &self.density,
-            profile: &self.profile,
-            model,
-            criterion: self.criterion,
-            headway: self.headways.clone(),
-            backend: self.opened.backend(),
-            fallback: self.opened.fallback(),
-        };
-        let importance_options =
-            Importance { level: flags.level, stop: self.stop(samples), ..Importance::new(flags.seed, samples) };
-        let proposal_file = flags.out.join(format!("proposal-{}.json", model.name()));
-        match flags.estimator {
-            EstimatorFlag::Subset => {
-                let options = Subset { level: flags.level, ..Subset::new(flags.seed, samples) };
-                let run = subset(nominal, &lanes, &options)?;
-                Ok((run.estimate, Some(Levels::Subset(run.levels))))
-            }
-            EstimatorFlag::Ce => {
-                let options = CrossEntropy {
-                    level: flags.level,
-                    defence: flags.defence,
-                    stop: self.stop(samples),
-                    ..CrossEntropy::new(flags.seed, (samples / 10).max(2000), samples)
-                };
-                let run = cross_entropy(nominal, &lanes, &options)?;
-                write_proposal(&proposal_file, &self.density, &run.proposal)?;
-                Ok((run.estimate, Some(Levels::CrossEntropy(run.steps))))
-            }
-            EstimatorFlag::Mc | EstimatorFlag::Is if flags.proposal.is_empty() => {
-                let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-                let fit = |points: &[Vec<f64>]| Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture();
-                let (estimate, proposal) = from_pilot_with_proposal(
-                    nominal,
-                    &lanes,
-                    &fit,
-                    &Pilot {
-                        worst: flags.worst_share,
-                        broad: flags.broad,
-                        defence: flags.defence,
-                        ..Pilot::guarded(flags.pilot)
-                    },
-                    &importance_options,
-                )?;
-                write_proposal(&proposal_file, &self.density, &proposal)?;
-                Ok((estimate, None))
-            }
-            EstimatorFlag::Mc | EstimatorFlag::Is => {
-                let read = |path: &PathBuf| read_proposal(path, &self.density);
-                let mixtures: Vec<Mixture> = flags.proposal.iter().map(read).collect::<Result<_>>()?;
-                let is_one = mixtures.len() == 1;
-                let prepared = |mixture| {
-                    let proposal = defended(mixture, nominal, flags.defence)?;
-                    // One proposal's valid share comes out of its own draws.
-                    Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed, VALIDITY_DRAWS) })
-                };
-                let proposals: Vec<Defended> = mixtures.into_iter().map(prepared).collect::<Result<_>>()?;
-                let estimate = match &proposals[..] {
-                    [one] => importance(nominal, one, &lanes, &importance_options)?,
-                    several => {
-                        let draws = samples / several.len() as u64;
-                        let techniques: Vec<Technique> =
-                            several.iter().map(|proposal| Technique { proposal, draws }).collect();
-                        balance_heuristic(nominal, &techniques, &lanes, flags.seed, flags.level)?
-                    }
-                };
-                Ok((estimate, None))
             }
         }
     }

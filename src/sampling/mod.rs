@@ -16,6 +16,7 @@ mod proposal_file;
 mod risk;
 mod rows;
 mod tally;
+mod weighted_part;
 
 pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
 pub use compare::{
@@ -33,3 +34,4 @@ pub use proposal_file::{read_proposal, write_proposal};
 pub use risk::{Risk, RiskRate};
 pub use rows::{EstimateRow, crude_rows, headway_name};
 pub use tally::{SampleTally, TallyOptions, WorstSample};
+pub use weighted_part::{WeightedPart, read_weighted_part, write_weighted_part};
