@@ -4,7 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps, latched_braking,
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps,
+    latched_braking,
 };
 use crate::scalar::Real;
 use crate::scenario::Category;

@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking,
+};
 use crate::scalar::Real;
 use crate::scenario::Category;
 
