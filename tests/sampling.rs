@@ -239,6 +239,42 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
 }
 
 #[test]
+fn a_conditional_density_draws_what_is_given_and_its_neighbours() {
+    let density = density(Category::CutIn, "2");
+    let at = density.space.index_of("v_ego_mps").unwrap();
+    let given = [("v_ego_mps".to_owned(), 30.0)];
+    let found = lanesweep::sampling::conditional(&density, &given).unwrap();
+    assert!(found.effective_scenarios > 1.0 && found.effective_scenarios < density.kde.points().len() as f64);
+    let profile = Profile::load("paper").unwrap();
+    let generator = lanesweep::sampling::generator_of(
+        &density.space,
+        &found.mixture,
+        &density.sizes,
+        &profile,
+        SampleSource::Random,
+        3,
+    )
+    .unwrap();
+    // The same by the density's own conditional draws, which the published figures check.
+    let constrained = density.kde.conditional(&[(at, 30.0)]).unwrap();
+    let stream = lanesweep::random::Stream { seed: 8, purpose: 1 };
+    let n = 20_000;
+    let drawn: Vec<[f32; 14]> = (0..n).map(|i| generator.draw(i).values).collect();
+    assert!(drawn.iter().all(|p| p[at] == 30.0));
+    let theirs: Vec<Vec<f64>> = (0..n).map(|i| constrained.draw(&stream, i)).collect();
+    let valid: Vec<&Vec<f64>> = theirs.iter().filter(|p| density.space.is_valid(p)).collect();
+    for j in (0..density.space.dimensions()).filter(|j| *j != at) {
+        let mean = valid.iter().map(|p| p[j]).sum::<f64>() / valid.len() as f64;
+        let spread = (valid.iter().map(|p| (p[j] - mean).powi(2)).sum::<f64>() / valid.len() as f64).sqrt();
+        let ours = drawn.iter().map(|p| f64::from(p[j])).sum::<f64>() / n as f64;
+        assert!((ours - mean).abs() < 6.0 * spread * (2.0 / n as f64).sqrt(), "parameter {j}: {ours} and {mean}");
+    }
+    for wrong in [("v_ego_mph", 30.0), ("v_ego_mps", -3.0)] {
+        assert!(lanesweep::sampling::conditional(&density, &[(wrong.0.to_owned(), wrong.1)]).is_err());
+    }
+}
+
+#[test]
 fn a_cut_out_that_begins_at_the_exposure_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     write_density(&dir.path().join("cut-out.json"), &density(Category::CutOut, "a")).unwrap();

@@ -8,7 +8,7 @@ use crate::density::{DensityModel, read_density};
 use crate::driver::ModelId;
 use crate::profile::Profile;
 use crate::report::sampling::RunFacts;
-use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
+use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
 use crate::sweep::{Headway, LanePlan};
 use crate::{Error, Place, Result};
 
@@ -23,6 +23,8 @@ struct Recorded {
     models: Vec<ModelId>,
     plan_headways: Vec<Headway>,
     profile: Profile,
+    #[serde(default)]
+    given: Vec<(String, f64)>,
     plan_sha256: Option<String>,
 }
 
@@ -50,6 +52,7 @@ pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<Str
         points: if run.points == "sobol" { "sobol" } else { "random" },
         samples: run.samples,
         seed: run.seed,
+        given: run.given,
     };
     Ok((facts, read_density(&dir.join("density.json"))?, run.plan_sha256))
 }
@@ -86,7 +89,7 @@ pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
             SampleHeadways::Each(facts.headways.clone())
         },
     };
-    let plan = plan_samples(&density, &density.mixture()?, &facts.profile, &options)?;
+    let plan = plan_samples(&density, &mixture_of(&density, &facts.given)?, &facts.profile, &options)?;
     match plan_sha256 {
         Some(hash) if hash == plan.hash() => Ok((facts, plan, density)),
         _ => Err(wrong("its plan is not the one that the density and the profile beside it make".to_owned())),

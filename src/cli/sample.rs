@@ -20,7 +20,8 @@ use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{
-    EstimateRow, Lanes, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, bootstrap, plan_samples,
+    EstimateRow, Lanes, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, bootstrap, conditional,
+    mixture_of, plan_samples,
 };
 use crate::sweep::{Headway, ONE_IN, Recheck};
 use crate::{Error, Place, Result};
@@ -45,7 +46,7 @@ pub struct Sample {
     /// run, without its convergence
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = [
         "density", "estimator", "samples", "models", "criterion", "thw", "points", "until", "time_limit", "worst", "map",
-        "rows", "lanes", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed",
+        "rows", "lanes", "given", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed",
     ])]
     join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
@@ -103,6 +104,9 @@ pub struct Sample {
     /// Share of the density in the proposals of is and ce; 0 is the published form
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub(super) defence: f64,
+    /// Draw given this value of a parameter (mc); repeatable
+    #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
+    given: Vec<(String, f64)>,
     /// Proposal file to sample instead of looking for one; several are combined by the balance heuristic
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
@@ -255,6 +259,7 @@ impl Sample {
             ("--rows", self.rows.is_some()),
             ("--map", self.map.is_some()),
             ("--bootstrap", self.bootstrap > 0),
+            ("--given", !self.given.is_empty()),
             ("--points sobol", self.points == PointsFlag::Sobol),
         ];
         if let Some((flag, _)) = only_crude.iter().find(|(_, given)| *given && !is_crude) {
@@ -277,6 +282,10 @@ impl Sample {
         if self.bootstrap > 0 {
             least("--bootstrap", self.bootstrap.into(), 20, 1 << 20)?;
             least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
+            if !self.given.is_empty() {
+                let problem = "replicates are those of the whole density";
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --given out"));
+            }
             if self.lanes.is_some() {
                 let problem = "a part of a run has no replicates of its own";
                 return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --lanes out"));
@@ -376,6 +385,7 @@ impl Run<'_> {
             points: if self.flags.points == PointsFlag::Sobol { "sobol" } else { "random" },
             samples,
             seed: self.flags.seed,
+            given: self.flags.given.clone(),
         };
         EstimateFile::new(&self.density, facts, estimates, self.host(0))
     }
@@ -398,7 +408,12 @@ impl Run<'_> {
             headways: self.headways.clone(),
         };
         let range = flags.range(samples)?;
-        let plan = plan_samples(&self.density, &self.density.mixture()?, &self.profile, &options)?;
+        if !flags.given.is_empty() {
+            let left = conditional(&self.density, &flags.given)?.effective_scenarios;
+            let of = self.density.kde.points().len();
+            tracing::info!("{left:.1} of {of} scenarios are near the given values");
+        }
+        let plan = plan_samples(&self.density, &mixture_of(&self.density, &flags.given)?, &self.profile, &options)?;
         let recheck = self.opened.device().map(|_| Recheck::new(&plan, flags.seed, ONE_IN));
         let lanes =
             Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: recheck.as_ref() };
@@ -407,7 +422,8 @@ impl Run<'_> {
             stop: self.stop(samples),
             interval: flags.binomial(),
             level: flags.level,
-            exposure: self.density.exposure.as_ref(),
+            // How often scenarios with these values occur is not known.
+            exposure: self.density.exposure.as_ref().filter(|_| flags.given.is_empty()),
             is_sampled_headway: self.density.space.has_thw(),
         };
         tracing::info!("{} samples on {}", range.end - range.start, lanes.backend.describe());
@@ -450,6 +466,13 @@ impl Run<'_> {
             }
         }
     }
+}
+
+/// `NAME=VALUE`.
+fn given(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
+    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
+    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }
 
 /// The rows must replace neither an input nor another result.

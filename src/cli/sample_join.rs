@@ -51,7 +51,8 @@ pub(super) fn run(folders: &[PathBuf], out: &Path, interval: BinomialInterval, l
     make_folder(out)?;
     sample_lanes::check_writable(out)?;
     let is_sampled = density.space.has_thw();
-    let rows = crude_rows(&plan, &tally, density.exposure.as_ref(), is_sampled, interval, level, StopReason::Samples);
+    let exposure = density.exposure.as_ref().filter(|_| facts.given.is_empty());
+    let rows = crude_rows(&plan, &tally, exposure, is_sampled, interval, level, StopReason::Samples);
     let axes = tally.map.as_ref().map(|map| map.axes.clone());
     let counting = TallyOptions { worst: tally.worst_limit(), criterion, map: axes };
     let (stopped, summary) = (StopReason::Samples, SweepSummary::default());

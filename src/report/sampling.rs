@@ -128,6 +128,8 @@ pub struct RunFacts {
     pub samples: u64,
     /// Seed.
     pub seed: u64,
+    /// Parameters that were given, with their values.
+    pub given: Vec<(String, f64)>,
 }
 
 /// `estimate.json`.
@@ -155,6 +157,8 @@ pub struct EstimateFile {
     pub samples: u64,
     /// Seed.
     pub seed: u64,
+    /// Parameters that were given, with their values; the estimates are conditional on them.
+    pub given: Vec<(String, f64)>,
     /// Hash of the plan, of crude Monte Carlo.
     pub plan_sha256: Option<String>,
     /// Draws of crude Monte Carlo.
@@ -198,6 +202,7 @@ impl EstimateFile {
             points: facts.points,
             samples: facts.samples,
             seed: facts.seed,
+            given: facts.given,
             plan_sha256: None,
             draws: None,
             stopped: stopped.unwrap_or(StopReason::Samples),
@@ -256,6 +261,10 @@ impl EstimateFile {
                     String::new()
                 },
             );
+        }
+        if !self.given.is_empty() {
+            let list: Vec<String> = self.given.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            let _ = writeln!(text, "given {}: probabilities are conditional, risks are not known", list.join(", "));
         }
         let has_hours = self.estimates.iter().any(|r| r.risk.per_hour.is_some());
         let has_kilometres = self.estimates.iter().any(|r| r.risk.per_1000_km.is_some());

@@ -5,6 +5,7 @@
 
 mod bootstrap;
 mod compare;
+mod conditional;
 mod crude;
 mod generator;
 mod lanes;
@@ -23,6 +24,7 @@ pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
+pub use conditional::{Conditional, conditional, mixture_of};
 pub use crude::{Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, sample_crude};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use lanes::{LaneLimitState, truncated};
