@@ -210,7 +210,11 @@ impl CompareFile {
             format!("{} {range}", short(r.rate))
         };
         rows.add_row(line("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect()));
-        let risk = |r: RiskRate| format!("{} ± {}", short(r.estimate), short(r.standard_deviation));
+        let risk = |r: RiskRate| match r.estimate {
+            // No failure is no proof of none.
+            e if e > 0.0 => format!("{} ± {}", short(e), short(r.standard_deviation)),
+            _ => format!("≤ {}", short(r.high)),
+        };
         type Pick = fn(&RecordedCell) -> Option<RiskRate>;
         let risks: [(&str, Pick); 2] = [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
         for (name, pick) in risks {
