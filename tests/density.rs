@@ -243,7 +243,7 @@ fn ten_thousand_points_are_fitted_and_the_bits_do_not_depend_on_the_number_of_th
 
 /// Not among the quick ones: N² distances, 25 times. `cargo test --release --test density -- --ignored`
 #[test]
-#[ignore]
+#[ignore = "N² distances, 25 times"]
 fn ten_thousand_points_take_seconds() {
     let stream = Stream { seed: 5, purpose: 5 };
     let source = with_bandwidth(vec![vec![0.0; 5], vec![3.0; 5]], vec![1.0; 5], 1.0);

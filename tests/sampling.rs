@@ -156,6 +156,23 @@ fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
 }
 
 #[test]
+fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
+    let dir = tempfile::tempdir().unwrap();
+    write_density(&dir.path().join("d.json"), &density(Category::CutOut, "f")).unwrap();
+    let args = ["-q", "sample", "d.json", "--samples", "200", "--thw", "0.6", "--rows", "rows.csv", "--backend", "cpu"];
+    let (code, _, err) = lanesweep(dir.path(), &args);
+    assert_eq!(code, 0, "{err}");
+    let mut reader = csv::Reader::from_path(dir.path().join("rows.csv")).unwrap();
+    let rows: Vec<std::collections::HashMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
+    assert_eq!(rows.len(), 200 * 4);
+    assert!(rows.iter().all(|row| row["c5"].parse::<f32>().is_ok() && row["headway"] == "0.6s"));
+    let failed = rows.iter().filter(|row| row["collision"] == "1" && row["model"] == "FSM").count();
+    let table = std::fs::read_to_string(dir.path().join("lanesweep-sample/estimates.csv")).unwrap();
+    let told = table.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
+    assert_eq!(told.split(',').nth(7).unwrap(), failed.to_string());
+}
+
+#[test]
 fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     let (dir, _) = folder();
     let base = ["-q", "sample", "density.json", "--thw", "0.3", "--models", "FSM", "--backend", "cpu"];

@@ -427,8 +427,15 @@ impl Run<'_> {
             is_sampled_headway: self.density.space.has_thw(),
         };
         tracing::info!("{} samples on {}", range.end - range.start, lanes.backend.describe());
-        let crude_run =
-            sample_lanes::run(&plan, range, &lanes, &counting, &crude, flags.rows.as_deref(), self.verbosity)?;
+        let crude_run = sample_lanes::run(
+            &plan,
+            range,
+            &lanes,
+            &counting,
+            &crude,
+            flags.rows.as_deref().map(|path| (path, &self.density)),
+            self.verbosity,
+        )?;
         sample_lanes::write(&flags.out, &plan, &self.density, &crude_run, &counting, flags.lanes.is_some())?;
         let mut file = self.file(samples, crude_run.rows)?;
         file.plan_sha256 = Some(plan.hash().to_owned());

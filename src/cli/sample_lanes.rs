@@ -7,9 +7,9 @@ use std::path::Path;
 use super::console::{self, Verbosity};
 use crate::density::DensityModel;
 use crate::report::files::{write_atomically, write_atomically_with};
+use crate::report::sampled_rows;
 use crate::report::sampling::{WorstRow, convergence_csv, worst_csv};
 use crate::report::sampling_figures;
-use crate::report::{lanes, lanes::Digits};
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude, write_part};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
 use crate::{Error, Result};
@@ -21,11 +21,11 @@ pub(super) fn run(
     how: &Lanes,
     counting: &TallyOptions,
     options: &CrudeOptions,
-    rows: Option<&Path>,
+    rows: Option<(&Path, &DensityModel)>,
     verbosity: Verbosity,
 ) -> Result<CrudeRun> {
     let bar = console::progress(verbosity, range.end - range.start, "sampling");
-    let Some(path) = rows else {
+    let Some((path, density)) = rows else {
         let run = sample_crude(plan, range, how, counting, options, |chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             Ok(())
@@ -37,10 +37,10 @@ pub(super) fn run(
     let counting = TallyOptions { worst: counting.worst.max(1), ..counting.clone() };
     let mut run = None;
     let written = write_atomically_with(path, |out: &mut dyn Write| {
-        lanes::write_header(out)?;
+        sampled_rows::write_header(out, density)?;
         let sampled = sample_crude(plan, range, how, &counting, options, |chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
-            lanes::write_chunk(out, plan, chunk, Digits::Binary32).map_err(|e| Error::io(path, "write", e))
+            sampled_rows::write_chunk(out, plan, density, chunk).map_err(|e| Error::io(path, "write", e))
         });
         let failed = sampled.is_err();
         run = Some(sampled);

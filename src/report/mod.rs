@@ -18,6 +18,7 @@ pub mod lanes;
 pub mod radar;
 pub mod reference;
 pub mod run_record;
+pub mod sampled_rows;
 pub mod sampling;
 pub mod sampling_figures;
 pub mod study;

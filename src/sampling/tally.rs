@@ -153,7 +153,7 @@ impl SampleTally {
     /// Keeps a lane where it is among the worst.
     fn offer(&mut self, model: usize, lane: WorstSample) {
         let worst = &mut self.worst[model];
-        // Twice the limit before it is cut down: most lanes are refused at once.
+        // Most lanes are refused at once.
         if worst.len() >= self.worst_limit && worst.last().is_some_and(|last| !is_worse(&lane, last)) {
             return;
         }
