@@ -18,6 +18,7 @@ pub mod estimate;
 pub mod gpu;
 pub mod mining;
 pub mod parameterization;
+pub mod parts;
 pub mod profile;
 pub mod random;
 pub mod report;

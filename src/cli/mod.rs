@@ -11,15 +11,21 @@ mod environment;
 mod exit;
 mod fit;
 mod lists;
+mod merge;
 mod mine;
 mod rerun;
 mod sample;
 mod sample_adaptive;
+mod sample_crude;
 mod sample_join;
 mod sample_lanes;
+mod sample_plan;
+mod shard_flags;
 mod simulate;
 mod source;
 mod study;
+mod study_plan;
+mod study_run;
 mod synth;
 mod verify;
 
@@ -78,10 +84,11 @@ impl Common {
 
 #[derive(Subcommand)]
 enum Verb {
-    Study(study::Study),
+    Study(Box<study::Study>),
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
+    Merge(merge::Merge),
     Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
@@ -160,6 +167,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Mine(verb) => verb.run(cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(cli.common.verbosity()),
         Verb::Sample(verb) => verb.run(cli.common.verbosity()),
+        Verb::Merge(verb) => verb.run(),
         Verb::Compare(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),

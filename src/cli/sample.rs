@@ -9,21 +9,21 @@ use clap::{Args, ValueEnum};
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
 use super::lists;
+use super::sample_crude;
 use super::sample_join as join;
 use super::sample_lanes;
+use super::sample_plan::{PlannedSample, SampleFacts};
+use super::shard_flags::ShardFlags;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::density::{DensityModel, read_density, write_density};
 use crate::driver::ModelId;
-use crate::estimate::{BinomialInterval, Checkpoints, StopRule};
+use crate::estimate::{Checkpoints, StopRule};
 use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
-use crate::sampling::{
-    EstimateRow, Lanes, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, bootstrap, conditional,
-    mixture_of, plan_samples,
-};
-use crate::sweep::{Headway, ONE_IN, Recheck};
+use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
+use crate::sweep::Headway;
 use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
@@ -33,20 +33,27 @@ use crate::{Error, Place, Result};
 /// simulation. Each estimate says when it should not be trusted. A table goes to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
+#[command(mut_args(|arg| match arg.get_id().as_str() {
+    "density" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "until"
+    | "time_limit" | "worst" | "map" | "lanes" | "pilot" | "worst_share" | "broad" | "defence" | "given" | "proposal"
+    | "bootstrap" | "bootstrap_samples" | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
+    "rows" => arg.conflicts_with("plan_only"),
+    _ => arg,
+}))]
 #[command(
     after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
                         sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
-                        cut-in-1.json --samples 100000000 --lanes 0..50000000 --out part-1"
+                        cut-in-1.json --samples 100000000 --shard 0/2 --out big"
 )]
 pub struct Sample {
     /// Density file
-    #[arg(value_name = "DENSITY", required_unless_present = "join")]
+    #[arg(value_name = "DENSITY", required_unless_present_any = ["join", "plan"])]
     density: Option<PathBuf>,
-    /// Join the parts of a run, made with --lanes, instead of sampling: their folders. The result is that of the whole
-    /// run, without its convergence
+    /// Join the parts of a run over a given proposal, made with --lanes, instead of sampling: their folders
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = [
         "density", "estimator", "samples", "models", "criterion", "thw", "points", "until", "time_limit", "worst", "map",
-        "rows", "lanes", "given", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed",
+        "rows", "lanes", "given", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed", "shard", "plan",
+        "plan_only", "stop_after",
     ])]
     join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
@@ -88,8 +95,8 @@ pub struct Sample {
     map: Option<String>,
     /// Also write one row per lane
     #[arg(long, value_name = "FILE")]
-    rows: Option<PathBuf>,
-    /// Only these samples of the run: a part that joins with others
+    pub(super) rows: Option<PathBuf>,
+    /// Only these samples of a run over one given proposal: a part for --join
     #[arg(long, value_name = "A..B")]
     pub(super) lanes: Option<String>,
     /// Runs of the pilot of is
@@ -112,16 +119,18 @@ pub struct Sample {
     pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
     #[arg(long, value_name = "N", default_value_t = 0)]
-    bootstrap: u32,
+    pub(super) bootstrap: u32,
     /// Samples of each replicate
     #[arg(long, value_name = "N", default_value_t = 10_000)]
-    bootstrap_samples: u64,
+    pub(super) bootstrap_samples: u64,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 157)]
     pub(super) seed: u64,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
+    #[command(flatten)]
+    pub(super) shards: ShardFlags,
     #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
@@ -174,16 +183,25 @@ pub(super) struct Run<'a> {
     pub(super) models: Vec<ModelId>,
     pub(super) criterion: Criterion,
     pub(super) headways: SampleHeadways,
-    pub(super) opened: Opened,
-    pub(super) verbosity: Verbosity,
+    pub(super) opened: &'a Opened,
     pub(super) started: Instant,
 }
 
 impl Sample {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let started = Instant::now();
         self.check()?;
+        self.shards.start()?;
+        if let Some(path) = &self.shards.plan {
+            let (planned, _) = PlannedSample::read(path)?;
+            let stop = StopRule::samples(planned.facts.samples);
+            if let Some(rows) = &self.rows {
+                guard(rows, &self.out, std::iter::once(path))?;
+            }
+            return sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity);
+        }
         let Some(density) = &self.density else {
-            return join::run(&self.join, &self.out, self.binomial(), self.level);
+            return join::run(&self.join, &self.out, self.level);
         };
         let density = read_density(density)?;
         let profile = self.profile.load()?;
@@ -191,32 +209,20 @@ impl Sample {
         let criterion = self.criterion()?;
         let headways = self.headways(&density)?;
         let opened = self.backend.open()?;
-        let run = Run {
-            flags: self,
-            density,
-            profile,
-            models,
-            criterion,
-            headways,
-            opened,
-            verbosity,
-            started: Instant::now(),
-        };
         if let Some(rows) = &self.rows {
             guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }
+        let run = Run { flags: self, density, profile, models, criterion, headways, opened: &opened, started };
+        tracing::info!("{}", run.density.provenance.data);
+        if self.is_crude() {
+            let stop = run.stop(self.samples.unwrap_or(100_000));
+            return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
+        }
         make_folder(&self.out)?;
         sample_lanes::check_writable(&self.out)?;
-        tracing::info!("{}", run.density.provenance.data);
-        let file = match self.estimator {
-            EstimatorFlag::Mc if self.proposal.is_empty() => run.crude()?,
-            _ => {
-                // A proposal in this folder may be an input: it is read and written on the way.
-                let file = run.adaptive()?;
-                sample_lanes::clear(&self.out, &["proposal-", "part.json"])?;
-                file
-            }
-        };
+        let file = run.adaptive()?;
+        // A proposal in this folder may be an input: it is read and written on the way.
+        sample_lanes::clear(&self.out, &["proposal-", "part.json"])?;
         let folder = |name: &str| self.out.join(name);
         write_density(&folder("density.json"), &run.density)?;
         crate::report::files::write_atomically(&folder("estimates.csv"), &file.csv()?)?;
@@ -224,6 +230,10 @@ impl Sample {
         console::print(&file.text())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(Exit::Ok)
+    }
+
+    fn is_crude(&self) -> bool {
+        self.estimator == EstimatorFlag::Mc && self.proposal.is_empty()
     }
 
     /// What no density is needed for.
@@ -254,7 +264,7 @@ impl Sample {
             let problem = "2^63 samples and more cannot be counted";
             return Err(Error::usage(Place::item("--samples"), problem, "give fewer"));
         }
-        let is_crude = self.estimator == EstimatorFlag::Mc && self.proposal.is_empty();
+        let is_crude = self.is_crude();
         let only_crude = [
             ("--rows", self.rows.is_some()),
             ("--map", self.map.is_some()),
@@ -286,15 +296,25 @@ impl Sample {
                 let problem = "replicates are those of the whole density";
                 return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --given out"));
             }
-            if self.lanes.is_some() {
+            if self.shards.is_part() || self.shards.plan_only {
                 let problem = "a part of a run has no replicates of its own";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --lanes out"));
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --shard out"));
             }
         }
+        let is_split = self.shards.is_part() || self.shards.plan_only;
+        if is_split && !is_crude {
+            let problem = "only crude Monte Carlo makes shards: the adaptive estimators are sequential";
+            let help = "use --estimator mc; a run with one given --proposal is split by --lanes and joined by --join";
+            return Err(Error::usage(Place::item("--shard"), problem, help));
+        }
+        if is_split && (self.until.is_some() || self.time_limit.is_some()) {
+            let problem = "a part of a run cannot tell when the whole is good enough";
+            return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
+        }
         let is_given = self.estimator == EstimatorFlag::Is && self.proposal.len() == 1;
-        if self.lanes.is_some() && !is_crude && !is_given {
-            let problem = "only crude Monte Carlo and one given proposal can be split: the rest is sequential";
-            let help = "use --estimator mc, or is with one --proposal, or leave --lanes out";
+        if self.lanes.is_some() && !is_given {
+            let problem = "only a run over one given proposal is split by samples";
+            let help = "use --shard for crude Monte Carlo; is with one --proposal here; the rest is sequential";
             return Err(Error::usage(Place::item("--lanes"), problem, help));
         }
         if self.lanes.is_some() && (self.until.is_some() || self.time_limit.is_some()) {
@@ -309,13 +329,6 @@ impl Sample {
             ));
         }
         Ok(())
-    }
-
-    fn binomial(&self) -> BinomialInterval {
-        match self.interval {
-            IntervalFlag::Wilson => BinomialInterval::Wilson,
-            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
-        }
     }
 
     fn models(&self) -> Result<Vec<ModelId>> {
@@ -390,72 +403,28 @@ impl Run<'_> {
         EstimateFile::new(&self.density, facts, estimates, self.host(0))
     }
 
-    fn crude(&self) -> Result<EstimateFile> {
+    /// Crude Monte Carlo as these flags ask for it.
+    fn planned(self) -> Result<PlannedSample> {
         let flags = self.flags;
-        let samples = flags.samples.unwrap_or(100_000);
-        let source = match flags.points {
-            PointsFlag::Random => SampleSource::Random,
-            PointsFlag::Sobol => SampleSource::Sobol,
-        };
-        if source == SampleSource::Sobol {
-            tracing::warn!("Sobol points: the intervals are those of independent draws, and wider than need be");
-        }
         let options = SamplePlanOptions {
-            samples,
+            samples: flags.samples.unwrap_or(100_000),
             seed: flags.seed,
-            source,
+            source: match flags.points {
+                PointsFlag::Random => SampleSource::Random,
+                PointsFlag::Sobol => SampleSource::Sobol,
+            },
             models: self.models.clone(),
             headways: self.headways.clone(),
         };
-        let range = flags.range(samples)?;
-        if !flags.given.is_empty() {
-            let left = conditional(&self.density, &flags.given)?.effective_scenarios;
-            let of = self.density.kde.points().len();
-            tracing::info!("{left:.1} of {of} scenarios are near the given values");
-        }
-        let plan = plan_samples(&self.density, &mixture_of(&self.density, &flags.given)?, &self.profile, &options)?;
-        let recheck = self.opened.device().map(|_| Recheck::new(&plan, flags.seed, ONE_IN));
-        let lanes =
-            Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: recheck.as_ref() };
-        let counting = TallyOptions { worst: flags.worst, criterion: self.criterion, map: self.map()? };
-        let crude = crate::sampling::CrudeOptions {
-            stop: self.stop(samples),
-            interval: flags.binomial(),
+        let facts = SampleFacts {
+            criterion: self.criterion,
+            worst: flags.worst,
+            map: self.map()?,
+            clopper_pearson: flags.interval == IntervalFlag::ClopperPearson,
             level: flags.level,
-            // How often scenarios with these values occur is not known.
-            exposure: self.density.exposure.as_ref().filter(|_| flags.given.is_empty()),
-            is_sampled_headway: self.density.space.has_thw(),
+            ..SampleFacts::new(&options, &self.profile, &flags.given)
         };
-        tracing::info!("{} samples on {}", range.end - range.start, lanes.backend.describe());
-        let crude_run = sample_lanes::run(
-            &plan,
-            range,
-            &lanes,
-            &counting,
-            &crude,
-            flags.rows.as_deref().map(|path| (path, &self.density)),
-            self.verbosity,
-        )?;
-        sample_lanes::write(&flags.out, &plan, &self.density, &crude_run, &counting, flags.lanes.is_some())?;
-        let mut file = self.file(samples, crude_run.rows)?;
-        file.plan_sha256 = Some(plan.hash().to_owned());
-        file.draws = Some(crate::report::sampling::DrawRecord::of(&crude_run.tally, &plan));
-        if flags.bootstrap > 0 {
-            let bar = console::progress(self.verbosity, flags.bootstrap.into(), "resampling");
-            let record = bootstrap(
-                &self.density,
-                &self.profile,
-                &options,
-                &lanes,
-                flags.bootstrap,
-                flags.bootstrap_samples,
-                || bar.inc(1),
-            )?;
-            bar.finish_and_clear();
-            file.bootstrap = Some(record);
-        }
-        file.host = self.host(crude_run.summary.rechecked_lanes);
-        Ok(file)
+        PlannedSample::new(self.density, facts)
     }
 
     fn map(&self) -> Result<Option<MapAxes>> {

@@ -1,24 +1,22 @@
-//! `lanesweep sample --join`: the parts of a run become one result, the same as if it had never been split.
+//! `lanesweep sample --join`: the parts of a run over a given proposal become one result, the same as if it had never
+//! been split.
 
 use std::path::{Path, PathBuf};
 
-use super::rerun::{facts_of, run_of};
+use super::rerun::facts_of;
 use super::sample_lanes;
 use super::{Exit, console};
-use crate::estimate::{BinomialInterval, StopReason, from_weight_sums};
+use crate::estimate::{StopReason, from_weight_sums};
 use crate::report::files::{make_folder, write_atomically};
-use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
-use crate::sampling::{
-    CrudeRun, EstimateRow, Risk, TallyOptions, WeightedPart, crude_rows, read_part, read_weighted_part,
-};
-use crate::sweep::SweepSummary;
+use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::sampling::{EstimateRow, Risk, WeightedPart, read_weighted_part};
 use crate::{Error, Place, Result};
 
 /// Joins the parts in these folders.
 ///
 /// # Errors
 /// [`Error::Input`] where a folder holds no part, parts are of different runs, or a sample is in two.
-pub(super) fn run(folders: &[PathBuf], out: &Path, interval: BinomialInterval, level: f64) -> Result<Exit> {
+pub(super) fn run(folders: &[PathBuf], out: &Path, level: f64) -> Result<Exit> {
     let [first, rest @ ..] = folders else {
         return Err(Error::usage(Place::item("--join"), "no part", "give the folders of the parts"));
     };
@@ -30,49 +28,9 @@ pub(super) fn run(folders: &[PathBuf], out: &Path, interval: BinomialInterval, l
     if let Some(part) = read_weighted_part(&first.join("part.json"))? {
         return join_weighted(first, part, rest, out, level);
     }
-    let (facts, plan, density) = run_of(first)?;
-    let (criterion, mut tally) = read_part(&first.join("part.json"))?;
-    for folder in rest {
-        let path = folder.join("part.json");
-        let (_, other) = read_part(&path)?;
-        tally = tally.merge(other).map_err(|error| match error {
-            Error::Input { problem, help, .. } => Error::Input { place: Box::new(Place::file(&path)), problem, help },
-            other => other,
-        })?;
-    }
-    if tally.plan_sha256() != plan.hash() {
-        let problem = "it belongs to another run than estimate.json beside it";
-        return Err(Error::input(Place::file(first.join("part.json")), problem, "make the part again"));
-    }
-    let missing = plan.unit_count() - tally.samples();
-    if missing > 0 {
-        tracing::warn!("{missing} of {} samples are in no part; this result is that of the rest", plan.unit_count());
-    }
-    make_folder(out)?;
-    sample_lanes::check_writable(out)?;
-    let is_sampled = density.space.has_thw();
-    let exposure = density.exposure.as_ref().filter(|_| facts.given.is_empty());
-    let rows = crude_rows(&plan, &tally, exposure, is_sampled, interval, level, StopReason::Samples);
-    let axes = tally.map.as_ref().map(|map| map.axes.clone());
-    let counting = TallyOptions { worst: tally.worst_limit(), criterion, map: axes };
-    let (stopped, summary) = (StopReason::Samples, SweepSummary::default());
-    let run = CrudeRun { rows, tally, convergence: Vec::new(), stopped, summary };
-    sample_lanes::write(out, &plan, &density, &run, &counting, missing > 0)?;
-    let host = HostRecord {
-        backend: format!("{} parts joined", folders.len()),
-        device: None,
-        rechecked_lanes: 0,
-        seconds: 0.0,
-        threads: rayon::current_num_threads(),
-    };
-    let mut file = EstimateFile::new(&density, facts, run.rows, host)?;
-    file.plan_sha256 = Some(plan.hash().to_owned());
-    file.draws = Some(DrawRecord::of(&run.tally, &plan));
-    crate::density::write_density(&out.join("density.json"), &density)?;
-    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
-    write_atomically(&out.join("estimate.json"), &file.to_json()?)?;
-    console::print(&file.text())?;
-    Ok(if missing > 0 { Exit::Incomplete } else { Exit::Ok })
+    let problem = "it is no part of a run over a given proposal";
+    let help = "the parts of crude Monte Carlo, made with --shard, are joined by `lanesweep merge`";
+    Err(Error::input(Place::file(first.join("part.json")), problem, help))
 }
 
 /// Parts of a run over a given proposal.

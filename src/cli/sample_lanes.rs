@@ -1,32 +1,34 @@
 //! The lanes of a sampling run: progress, rows on request, and the files that come of the counts.
 
 use std::io::Write;
-use std::ops::Range;
 use std::path::Path;
 
 use super::console::{self, Verbosity};
 use crate::density::DensityModel;
+use crate::parts::Ledger;
 use crate::report::files::{write_atomically, write_atomically_with};
 use crate::report::sampled_rows;
 use crate::report::sampling::{WorstRow, convergence_csv, worst_csv};
 use crate::report::sampling_figures;
-use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude, write_part};
+use crate::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
 use crate::{Error, Result};
 
 /// Samples, with one row per lane where asked for.
 pub(super) fn run(
     plan: &LanePlan,
-    range: Range<u64>,
+    ledger: &mut Ledger<SampleTally>,
     how: &Lanes,
     counting: &TallyOptions,
     options: &CrudeOptions,
     rows: Option<(&Path, &DensityModel)>,
     verbosity: Verbosity,
 ) -> Result<CrudeRun> {
-    let bar = console::progress(verbosity, range.end - range.start, "sampling");
+    let units = ledger.units();
+    let left: u64 = ledger.missing(units)?.iter().map(|range| range.end - range.start).sum();
+    let bar = console::progress(verbosity, left, "sampling");
     let Some((path, density)) = rows else {
-        let run = sample_crude(plan, range, how, counting, options, |chunk| {
+        let run = sample_into(plan, ledger, how, counting, options, |chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             Ok(())
         });
@@ -38,7 +40,7 @@ pub(super) fn run(
     let mut run = None;
     let written = write_atomically_with(path, |out: &mut dyn Write| {
         sampled_rows::write_header(out, density)?;
-        let sampled = sample_crude(plan, range, how, &counting, options, |chunk| {
+        let sampled = sample_into(plan, ledger, how, &counting, options, |chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             sampled_rows::write_chunk(out, plan, density, chunk).map_err(|e| Error::io(path, "write", e))
         });
@@ -88,12 +90,9 @@ pub(super) fn write(
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
-    is_part: bool,
 ) -> Result<()> {
     clear(out, &[])?;
-    if is_part {
-        write_part(&out.join("part.json"), counting.criterion, &run.tally)?;
-    } else if !run.convergence.is_empty() {
+    if !run.convergence.is_empty() {
         write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
         let figure = sampling_figures::convergence(density, &run.convergence);
         write_atomically(&out.join("convergence.svg"), figure.svg().as_bytes())?;

@@ -6,24 +6,21 @@ use std::time::Instant;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
-use super::backend_flags::BackendFlags;
+use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
+use super::shard_flags::{Desk, PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
+use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
+use super::study_run::{Host, How, compare_reference, finish_study, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::ParameterizationOptions;
-use crate::report::files::make_folder;
-use crate::report::lanes::{self, Digits};
-use crate::report::reference::ReferenceComparison;
-use crate::report::run_record::{CategoryRecord, RunRecord, SweepRecord, Timings};
-use crate::report::study::StudyReport;
+use crate::report::lanes::Digits;
+use crate::report::run_record::Timings;
 use crate::scenario::Category;
-use crate::score::{ScoreOptions, f1, judge_claims, score};
-use crate::sweep::{
-    Backend, CpuBackend, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, SweepOptions, SweepSummary,
-    Wanted, chunks, plan_study, sweep,
-};
+use crate::score::ScoreOptions;
+use crate::sweep::{Backend, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, plan_study};
 use crate::{Error, Place, Result};
 
 /// How far do parameterized scenarios agree with recorded ones?
@@ -32,6 +29,12 @@ use crate::{Error, Place, Result};
 /// from ten time headways against every driver model, judges collision, TTC and BTN, and scores S' against
 /// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
+#[command(mut_args(|arg| match arg.get_id().as_str() {
+    "dir" | "scenarios" | "config" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
+    | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
+    "lanes" | "compare_reference" => arg.conflicts_with_all(["shard", "plan_only"]),
+    _ => arg,
+}))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
                         --scenarios scenarios.jsonl --lanes lanes.csv")]
 pub struct Study {
@@ -66,6 +69,8 @@ pub struct Study {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
     #[command(flatten)]
+    shards: ShardFlags,
+    #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
@@ -94,6 +99,42 @@ impl StudyConfig {
 
 impl Study {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        self.guard_inputs()?;
+        self.shards.start()?;
+        if let Some(path) = &self.shards.plan {
+            let opened = self.backend.open()?;
+            let (study, run_sha256) = PlannedStudy::read(path)?;
+            if study.facts.reference {
+                self.backend.none_but("--reference")?;
+            }
+            if self.shards.is_part() {
+                let text = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+                leave_plan(&self.out, &text)?;
+            }
+            return self.sweep(&study, &opened, run_sha256, Timings::default(), verbosity);
+        }
+        // Before the work: a device that is not there is known at once.
+        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let (study, timings) = self.prepare(verbosity)?;
+        if self.shards.plan_only || self.shards.is_part() {
+            let text = study.seal()?;
+            leave_plan(&self.out, &text)?;
+            if self.shards.plan_only {
+                let path = self.out.join(PLAN_FILE);
+                let lanes = study.plan.lane_count();
+                console::print(&format!("{} lanes planned in {}\n", lanes, path.display()))?;
+                return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
+            }
+            let run_sha256 = PlannedStudy::run_sha256(&text)?;
+            return self.sweep(&study, &opened, run_sha256, timings, verbosity);
+        }
+        // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.
+        let run_sha256 = crate::sweep::sha256(&format!("{} reference {}", study.plan.hash(), study.facts.reference));
+        self.sweep(&study, &opened, run_sha256, timings, verbosity)
+    }
+
+    /// From data to a plan.
+    fn prepare(&self, verbosity: Verbosity) -> Result<(PlannedStudy, Timings)> {
         let mut config = StudyConfig::read(self.config.as_deref())?;
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let profile = self.profile.load()?;
@@ -107,11 +148,7 @@ impl Study {
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options()?),
         };
-        self.guard_inputs()?;
-        // Before the work: a device that is not there is known at once.
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         tracing::info!("{}", source.describe());
-
         let mut timings = Timings::default();
         let collection = timed(&mut timings.mine_s, || source.load(&config.mining, verbosity))?;
         tracing::info!("{}", source::counts(&collection.scenarios));
@@ -126,63 +163,79 @@ impl Study {
                 "use more recordings, or relax the filters in the study file (--config)",
             ));
         }
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if self.reference { &reference } else { opened.backend() };
-        let recheck = opened.device().map(|_| Recheck::new(&planned.plan, config.score.seed, ONE_IN));
-        // Before the work, so that a folder that cannot be written to is known at once.
-        make_folder(&self.out)?;
-        let how = How { backend, fallback: opened.fallback(), recheck: recheck.as_ref() };
-        tracing::info!("{} lanes on {}", planned.plan.lane_count(), backend.describe());
-        let (partial, mut swept) = timed(&mut timings.sweep_s, || run_plan(&planned.plan, &how, verbosity))?;
-        let scores = timed(&mut timings.score_s, || score(&planned.plan, &partial, &config.score))?;
-        let claims = judge_claims(&scores);
-        if let Some(path) = &self.lanes {
-            let digits = if self.reference { Digits::Binary64 } else { Digits::Binary32 };
-            swept.add(&write_lanes(path, &planned.plan, &how, digits)?);
-        }
-        let comparison = self.compare_reference.then(|| compare_reference(&planned.plan)).transpose()?;
-        let categories = category_records(&collection, &planned, &scores);
-        let run = RunRecord {
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        let facts = StudyFacts {
             data: source.describe(),
             synthetic: source.is_synthetic(),
+            published: self.published,
+            reference: self.reference,
+            incomplete: !collection.problems.is_empty(),
+            scenario_file_sha256: self.scenarios.as_deref().map(source::checksum).transpose()?,
+            categories: category_facts(&collection, &planned),
+            left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
+            recordings: collection.recordings,
+            mining: config.mining,
+            parameterization: config.parameterization,
+            score: config.score,
+        };
+        Ok((PlannedStudy { plan: planned.plan, facts }, timings))
+    }
+
+    /// From a plan to a report, or to a part of one.
+    fn sweep(
+        &self,
+        study: &PlannedStudy,
+        opened: &Opened,
+        run_sha256: String,
+        mut timings: Timings,
+        verbosity: Verbosity,
+    ) -> Result<Exit> {
+        let plan = &study.plan;
+        let reference = CpuBackend::reference();
+        let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
+        let recheck = opened.device().map(|_| Recheck::new(plan, study.facts.score.seed, ONE_IN));
+        let how = How { backend, fallback: opened.fallback(), recheck: recheck.as_ref() };
+        let desk =
+            Desk { out: &self.out, run_sha256: &run_sha256, shard: self.shards.shard, unit_count: plan.unit_count() };
+        if desk.is_done::<Partial>()? {
+            tracing::info!("this part is there already, and whole");
+            return Ok(Exit::Ok);
+        }
+        // Before the work, so that a folder that cannot be written to is known at once.
+        let mut work = desk.begin::<Partial>(&[], true)?;
+        tracing::info!("{} lanes on {}", plan.lane_count(), backend.describe());
+        let mut swept = timed(&mut timings.sweep_s, || run_units(plan, &mut work, &how, verbosity))?;
+        if self.shards.is_part() {
+            desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;
+            return Ok(Exit::Ok);
+        }
+        let partial = work.ledger.counts(0..plan.unit_count())?.unwrap_or_else(|| Partial::empty(plan));
+        if let Some(path) = &self.lanes {
+            let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
+            swept.add(&write_lanes(path, plan, &how, digits)?);
+        }
+        let comparison = self.compare_reference.then(|| compare_reference(plan)).transpose()?;
+        let host = Host {
             backend: match (how.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },
             device: opened.device(),
-            sweep: SweepRecord {
-                rechecked_lanes: swept.rechecked_lanes,
-                recheck_seed: config.score.seed,
-                redone_lanes: swept.redone_lanes,
-                device_s: swept.device_s,
-            },
-            plan_sha256: planned.plan.hash().to_owned(),
-            scenario_file_sha256: self.scenarios.as_deref().map(source::checksum).transpose()?,
-            left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
-            recordings: collection.recordings,
-            categories,
-            lanes: planned.plan.lane_count(),
-            profile,
-            mining: config.mining,
-            parameterization: config.parameterization,
-            score: config.score,
+            swept,
             timings,
         };
-        let report = StudyReport { scores, claims, run, published: self.published, comparison };
-        let written = report.write(&self.out)?;
-        console::print(&report.text())?;
-        tracing::info!("{} files written to {}", written.len(), self.out.display());
-        Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
+        let exit = finish_study(study, &partial, comparison, host, &self.out)?;
+        work.forget()?;
+        Ok(exit)
     }
 
     /// The lane table must replace neither an input nor another result.
     fn guard_inputs(&self) -> Result<()> {
         let Some(lanes) = &self.lanes else { return Ok(()) };
-        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
+        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json", PLAN_FILE];
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).to_vec();
         others.extend(self.scenarios.clone());
         others.extend(self.config.clone());
+        others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--lanes")?;
         self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--lanes"))
     }
@@ -199,85 +252,12 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Who computes the lanes, who stands in, who checks.
-pub(super) struct How<'a> {
-    pub backend: &'a dyn Backend,
-    pub fallback: Option<&'a dyn Backend>,
-    pub recheck: Option<&'a Recheck<'a>>,
-}
-
-impl How<'_> {
-    fn options(&self, wanted: Wanted) -> SweepOptions<'_> {
-        SweepOptions { wanted, fallback: self.fallback, recheck: self.recheck }
-    }
-}
-
-/// Every lane of a plan, counted.
-pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
-    let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
-    let mut parts = Vec::new();
-    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &how.options(Wanted::Verdicts), |chunk| {
-        bar.inc(chunk.units.end - chunk.units.start);
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })?;
-    bar.finish_and_clear();
-    Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
-}
-
-/// Every lane in f32 and in f64, chunk by chunk.
-fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
-    let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
-    let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
-    let mut comparison = ReferenceComparison::default();
-    for units in chunks(plan, 0..plan.unit_count()) {
-        let reference = wide.run(units.clone(), Wanted::Outcomes)?;
-        comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
-    }
-    Ok(comparison)
-}
-
-/// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
-fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<SweepSummary> {
-    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
-        make_folder(dir)?;
-    }
-    let mut swept = Ok(SweepSummary::default());
-    let written = crate::report::files::write_atomically_with(path, |out| {
-        lanes::write_header(out)?;
-        let options = how.options(Wanted::Outcomes);
-        swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
-            lanes::write_chunk(out, plan, &chunk, digits).map_err(|e| Error::io(path, "write", e))
-        });
-        // The sweep's own error is the one to tell.
-        if swept.is_ok() { Ok(()) } else { Err(std::io::Error::other("the sweep failed")) }
-    });
-    let summary = swept?;
-    written.map(|()| summary)
-}
-
-fn category_records(
-    collection: &Collection,
-    planned: &StudyPlan,
-    scores: &crate::score::ScoreTable,
-) -> Vec<CategoryRecord> {
-    let plan = &planned.plan;
-    let record = |block: &crate::sweep::Block| {
+fn category_facts(collection: &Collection, planned: &StudyPlan) -> Vec<CategoryFacts> {
+    let facts = |block: &crate::sweep::Block| {
         let of = count(&collection.scenarios, block.category);
-        let scored = scores.categories.iter().find(|c| c.category == block.category);
-        let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
         let reduction = planned.reductions.iter().find(|r| r.category == block.category);
-        CategoryRecord {
-            category: block.category.key(),
-            found: of.found,
-            kept: of.kept,
-            variants: block.variants.clone(),
-            lanes: plan.lanes_per_unit(block) * block.units.len(),
-            capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
-            undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
-            undefined_draws: cells().map(|c| u64::from(c.undefined_draws)).sum(),
-            svd_explained: reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect()),
-        }
+        let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
+        CategoryFacts { found: of.found, kept: of.kept, svd_explained }
     };
-    plan.blocks.iter().map(record).collect()
+    planned.plan.blocks.iter().map(facts).collect()
 }

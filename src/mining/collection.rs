@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::miner::{CategoryCount, Mined, mine};
 use super::options::MiningOptions;
@@ -15,7 +15,7 @@ use crate::trajectory::{EgoView, Recording};
 use crate::{Error, Result};
 
 /// What one recording gave.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RecordingSummary {
     /// Its id.
     pub id: String,

@@ -10,7 +10,8 @@ use super::tally::{SampleTally, TallyOptions};
 use crate::criterion::Criterion;
 use crate::density::Exposure;
 use crate::driver::ModelId;
-use crate::estimate::{BinomialInterval, StopReason, StopRule};
+use crate::estimate::{BinomialInterval, Checkpoints, StopReason, StopRule};
+use crate::parts::Ledger;
 use crate::sweep::{Backend, Chunk, LanePlan, Recheck, SweepOptions, SweepSummary, Wanted, sweep};
 use crate::{Error, Place, Result};
 
@@ -89,9 +90,32 @@ pub fn sample_crude(
     lanes: &Lanes,
     counting: &TallyOptions,
     options: &CrudeOptions,
+    each: impl FnMut(&Chunk) -> Result<()>,
+) -> Result<CrudeRun> {
+    let mut ledger = Ledger::new(range, &checkpoints(plan.unit_count()));
+    sample_into(plan, &mut ledger, lanes, counting, options, each)
+}
+
+/// The sample sizes at which a run of so many samples is looked at.
+pub fn checkpoints(samples: u64) -> Vec<u64> {
+    let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
+    std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
+}
+
+/// The same, as far as the ledger does not hold it already; its cuts must be the plan's [`checkpoints`].
+///
+/// # Errors
+/// As [`sample_crude`], and of the ledger's journal; [`Error::Interrupted`].
+pub fn sample_into(
+    plan: &LanePlan,
+    ledger: &mut Ledger<SampleTally>,
+    lanes: &Lanes,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
     mut each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
     let started = Instant::now();
+    let range = ledger.units();
     if range.start >= range.end || range.end > plan.unit_count() {
         let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
         return Err(Error::usage(Place::item("--lanes"), problem, "give A..B with A < B, counted from 0"));
@@ -106,37 +130,68 @@ pub fn sample_crude(
     let mut tally = SampleTally::empty(plan, counting);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let mut convergence = Vec::new();
+    let looks = checkpoints(plan.unit_count());
     let mut at = range.start;
-    let rows_of = |tally: &SampleTally, stopped| {
-        let &CrudeOptions { interval, level, exposure, is_sampled_headway, .. } = options;
-        crude_rows(plan, tally, exposure, is_sampled_headway, interval, level, stopped)
-    };
     loop {
-        let next = if is_whole { options.stop.checkpoints.next(at).min(range.end) } else { range.end };
-        // Borrowed by the closure, so that a chunk is counted as soon as it is there.
-        let mut counted = Ok(());
-        let part = sweep(plan, at..next, lanes.backend, &how, |chunk| {
-            each(&chunk)?;
-            let partial = SampleTally::of_chunk(plan, &chunk, counting)?;
-            let before = std::mem::replace(&mut tally, SampleTally::empty(plan, counting));
-            match before.merge(partial) {
-                Ok(joined) => tally = joined,
-                Err(error) => counted = Err(error),
-            }
-            Ok(())
-        })?;
-        counted?;
-        summary.add(&part);
+        let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
+        let next = if is_whole { look } else { range.end };
+        for missing in ledger.missing(at..next)? {
+            let part = sweep(plan, missing, lanes.backend, &how, |chunk| {
+                each(&chunk)?;
+                ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
+            })?;
+            summary.add(&part);
+        }
+        if let Some(counts) = ledger.counts(at..next)? {
+            tally = tally.merge(counts)?;
+        }
         at = next;
-        let rows = rows_of(&tally, StopReason::Samples);
+        let rows = rows_of(plan, &tally, options, StopReason::Samples);
         if is_whole {
             convergence.push(Checkpoint { samples: at, rows: overall(&rows) });
         }
         if let Some(stopped) = stopped(options, counting.criterion, &rows, at, range.end, started) {
-            let rows = rows_of(&tally, stopped);
+            let rows = rows_of(plan, &tally, options, stopped);
             return Ok(CrudeRun { tally, rows, convergence, stopped, summary });
         }
     }
+}
+
+/// The run that parts of it make together: with the convergence of the run in one piece where they are all there.
+///
+/// # Errors
+/// [`Error::Input`] where parts are of different runs or hold the same samples.
+pub fn crude_of_segments(
+    plan: &LanePlan,
+    mut segments: Vec<SampleTally>,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+) -> Result<CrudeRun> {
+    segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
+    let looks = checkpoints(plan.unit_count());
+    let mut tally = SampleTally::empty(plan, counting);
+    let mut convergence = Vec::new();
+    for segment in segments {
+        tally = tally.merge(segment)?;
+        // Only what begins at the first sample and has no gap was ever looked at.
+        if let [covered] = tally.covered()
+            && covered.start == 0
+            && looks.contains(&covered.end)
+        {
+            let rows = overall(&rows_of(plan, &tally, options, StopReason::Samples));
+            convergence.push(Checkpoint { samples: covered.end, rows });
+        }
+    }
+    if tally.samples() < plan.unit_count() {
+        convergence.clear();
+    }
+    let rows = rows_of(plan, &tally, options, StopReason::Samples);
+    Ok(CrudeRun { tally, rows, convergence, stopped: StopReason::Samples, summary: SweepSummary::default() })
+}
+
+fn rows_of(plan: &LanePlan, tally: &SampleTally, options: &CrudeOptions, stopped: StopReason) -> Vec<EstimateRow> {
+    let &CrudeOptions { interval, level, exposure, is_sampled_headway, .. } = options;
+    crude_rows(plan, tally, exposure, is_sampled_headway, interval, level, stopped)
 }
 
 /// The rows over all headways.

@@ -11,7 +11,6 @@ mod generator;
 mod lanes;
 mod limit_state;
 mod map;
-mod part_file;
 mod plan;
 mod proposal_file;
 mod risk;
@@ -25,12 +24,13 @@ pub use compare::{
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
 pub use conditional::{Conditional, conditional, mixture_of};
-pub use crude::{Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, sample_crude};
+pub use crude::{
+    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, checkpoints, crude_of_segments, sample_crude, sample_into,
+};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use lanes::{LaneLimitState, truncated};
 pub use limit_state::limit_state;
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
-pub use part_file::{read_part, write_part};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
 pub use proposal_file::{read_proposal, write_proposal};
 pub use risk::{Risk, RiskRate};

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::limit_state::limit_state;
 use super::map::{MapAxes, MapCounts};
 use crate::criterion::Criterion;
+use crate::parts::Countable;
 use crate::sweep::generated::{ATTEMPTS, Generator};
 use crate::sweep::{Chunk, LanePlan};
 use crate::{Error, Place, Result};
@@ -237,6 +238,16 @@ impl SampleTally {
     /// Number of samples with a valid point.
     pub fn valid(&self) -> u64 {
         self.samples() - self.voids
+    }
+}
+
+impl Countable for SampleTally {
+    fn covered(&self) -> Vec<Range<u64>> {
+        self.covered.clone()
+    }
+
+    fn join(self, other: Self) -> Result<Self> {
+        self.merge(other)
     }
 }
 

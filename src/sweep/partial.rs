@@ -18,11 +18,12 @@ pub const WORST_LANES: usize = 20;
 /// What the serialized form calls itself.
 const FORMAT: &str = "lanesweep partial";
 /// Version of the serialized form.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Agreement of S' with S over the headways of one unit, variant, model and criterion. For variant 0 (S
 /// against itself) `both` counts the failures of S and `neither` its passes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "[u32; 4]", into = "[u32; 4]")]
 pub struct Confusion {
     /// TP: S and S' fail.
     pub both: u32,
@@ -32,6 +33,19 @@ pub struct Confusion {
     pub only_s_prime: u32,
     /// TN: both pass.
     pub neither: u32,
+}
+
+// Four numbers instead of four names: a unit of a study has a hundred of them.
+impl From<[u32; 4]> for Confusion {
+    fn from([both, only_s, only_s_prime, neither]: [u32; 4]) -> Confusion {
+        Confusion { both, only_s, only_s_prime, neither }
+    }
+}
+
+impl From<Confusion> for [u32; 4] {
+    fn from(c: Confusion) -> [u32; 4] {
+        [c.both, c.only_s, c.only_s_prime, c.neither]
+    }
 }
 
 impl Confusion {

@@ -1,0 +1,97 @@
+//! `lanesweep merge`: the parts of a run become its result, bit for bit that of the run in one piece.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::Exit;
+use super::shard_flags::PLAN_FILE;
+use super::study_plan::{self, PlannedStudy};
+use super::study_run::{Host, finish_study};
+use super::{sample_crude, sample_plan};
+use crate::lock::FolderLock;
+use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
+use crate::report::run_record::Timings;
+use crate::sweep::{Partial, SweepSummary};
+use crate::{Error, Place, Result};
+
+/// Make the result of a run that was computed in parts
+///
+/// Checks that the parts in DIR (left there by `--shard`) belong to the plan beside them, cover every lane exactly
+/// once and are whole; names what is missing, doubled, foreign or damaged, with the command that makes it. The result
+/// goes into DIR and is, bit for bit, that of the run in one piece.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
+                        result\n  lanesweep merge result")]
+pub struct Merge {
+    /// The run's folder
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+}
+
+impl Merge {
+    pub fn run(&self) -> Result<Exit> {
+        let plan = self.dir.join(PLAN_FILE);
+        let kind = kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?;
+        let _lock = FolderLock::acquire(&self.dir.join("run.lock"))?;
+        crate::atomic_file::clear_stale(&self.dir, |name| !name.starts_with("part-"));
+        match kind.as_str() {
+            study_plan::KIND => merge_study(&self.dir, &plan),
+            sample_plan::KIND => sample_crude::merge(&self.dir, &plan),
+            other => {
+                let help = "give the folder (--out) of a run in parts";
+                Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
+            }
+        }
+    }
+}
+
+fn merge_study(dir: &Path, plan: &Path) -> Result<Exit> {
+    let (study, run_sha256) = PlannedStudy::read(plan)?;
+    let parts = read_parts::<Partial>(dir, plan, "study", &run_sha256, study.plan.unit_count())?;
+    let mut swept = SweepSummary { lanes: study.plan.lane_count(), ..SweepSummary::default() };
+    let count = parts.len();
+    let mut partial = Partial::empty(&study.plan);
+    for part in parts {
+        swept.redone_lanes += part.lanes_redone_and_rechecked[0];
+        swept.rechecked_lanes += part.lanes_redone_and_rechecked[1];
+        partial = part.segments.into_iter().try_fold(partial, Partial::merge)?;
+    }
+    if !partial.is_complete(&study.plan) {
+        let problem = "the parts do not hold every unit that their names stand for";
+        return Err(Error::input(Place::file(dir), problem, "make them again"));
+    }
+    let host = Host { backend: format!("{count} parts merged"), device: None, swept, timings: Timings::default() };
+    finish_study(&study, &partial, None, host, dir)
+}
+
+/// All parts of a folder, checked: of this run, whole, together everything exactly once.
+pub(super) fn read_parts<T: Countable>(
+    dir: &Path,
+    plan: &Path,
+    verb: &str,
+    run_sha256: &str,
+    units: u64,
+) -> Result<Vec<Part<T>>> {
+    let command =
+        |shard: Shard| format!("lanesweep {verb} --plan {} --shard {shard} --out {}", plan.display(), dir.display());
+    let found = collect(dir, units, command)?;
+    let read = |(shard, path): &(Shard, PathBuf)| {
+        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &command(*shard))?;
+        let wrong = |problem: &str| {
+            let help = format!("delete it and make it again: {}", command(*shard));
+            Error::input(Place::file(path), problem, help)
+        };
+        let mut covered: Vec<_> = part.segments.iter().flat_map(Countable::covered).collect();
+        covered.sort_by_key(|range| range.start);
+        let mut at = part.units.start;
+        for range in covered {
+            if range.start != at {
+                return Err(wrong("it does not hold each of its units exactly once"));
+            }
+            at = range.end;
+        }
+        if at == part.units.end { Ok(part) } else { Err(wrong("it does not hold all of its units")) }
+    };
+    found.parts.iter().map(read).collect()
+}

@@ -1,0 +1,145 @@
+//! `lanesweep sample` with crude Monte Carlo: in one piece, as a shard, from a plan, and merged.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::Exit;
+use super::backend_flags::Opened;
+use super::console::{self, Verbosity};
+use super::merge::read_parts;
+use super::sample::Sample;
+use super::sample_lanes;
+use super::sample_plan::PlannedSample;
+use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
+use crate::density::write_density;
+use crate::estimate::StopRule;
+use crate::report::files::write_atomically;
+use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
+use crate::sampling::{
+    BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
+};
+use crate::sweep::{ONE_IN, Recheck};
+use crate::{Error, Place, Result, interrupt};
+
+/// Samples what was planned: the whole run, or a shard of it.
+pub(super) fn run(
+    flags: &Sample,
+    planned: &PlannedSample,
+    opened: &Opened,
+    stop: StopRule,
+    started: Instant,
+    verbosity: Verbosity,
+) -> Result<Exit> {
+    let (plan, out, shard) = (&planned.plan, &flags.out, flags.shards.shard);
+    let (text, run_sha256) = planned.seal()?;
+    if flags.shards.plan_only || shard.is_some() {
+        leave_plan(out, &text)?;
+    }
+    if flags.shards.plan_only {
+        let path = out.join(PLAN_FILE);
+        console::print(&format!("{} lanes planned in {}\n", plan.lane_count(), path.display()))?;
+        return Ok(Exit::Ok);
+    }
+    if planned.facts.sobol {
+        tracing::warn!("Sobol points: the intervals are those of independent draws, and wider than need be");
+    }
+    if !planned.facts.given.is_empty() {
+        let left = conditional(&planned.density, &planned.facts.given)?.effective_scenarios;
+        let of = planned.density.kde.points().len();
+        tracing::info!("{left:.1} of {of} scenarios are near the given values");
+    }
+    let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: plan.unit_count() };
+    if desk.is_done::<SampleTally>()? {
+        tracing::info!("this part is there already, and whole");
+        return Ok(Exit::Ok);
+    }
+    // Rows are written on the way: a run that writes them begins anew.
+    let is_journalled = flags.rows.is_none();
+    let mut work = desk.begin::<SampleTally>(&checkpoints(plan.unit_count()), is_journalled)?;
+    let recheck = opened.device().map(|_| Recheck::new(plan, planned.facts.seed, ONE_IN));
+    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+    let counting = planned.counting();
+    tracing::info!("{} samples on {}", work.units.end - work.units.start, lanes.backend.describe());
+    if work.units.is_empty() {
+        desk.finish(work, [0, 0])?;
+        return Ok(Exit::Ok);
+    }
+    let rows = flags.rows.as_deref().map(|path| (path, &planned.density));
+    let crude = {
+        let _resumable = is_journalled.then(interrupt::resumable);
+        sample_lanes::run(plan, &mut work.ledger, &lanes, &counting, &planned.options(stop), rows, verbosity)?
+    };
+    if shard.is_some() {
+        desk.finish(work, [crude.summary.redone_lanes, crude.summary.rechecked_lanes])?;
+        return Ok(Exit::Ok);
+    }
+    let record = (flags.bootstrap > 0)
+        .then(|| {
+            let bar = console::progress(verbosity, flags.bootstrap.into(), "resampling");
+            let record = bootstrap(
+                &planned.density,
+                &planned.facts.profile,
+                &planned.facts.plan_options(),
+                &lanes,
+                flags.bootstrap,
+                flags.bootstrap_samples,
+                || bar.inc(1),
+            );
+            bar.finish_and_clear();
+            record
+        })
+        .transpose()?;
+    let host = HostRecord {
+        backend: opened.backend().describe(),
+        device: opened.device(),
+        rechecked_lanes: crude.summary.rechecked_lanes,
+        seconds: started.elapsed().as_secs_f64(),
+        threads: rayon::current_num_threads(),
+    };
+    write_run(planned, crude, record, host, out)?;
+    work.forget()?;
+    Ok(Exit::Ok)
+}
+
+/// Makes the result of the parts in a folder.
+pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
+    let (planned, run_sha256) = PlannedSample::read(plan)?;
+    let parts = read_parts::<SampleTally>(dir, plan, "sample", &run_sha256, planned.plan.unit_count())?;
+    let host = HostRecord {
+        backend: format!("{} parts merged", parts.len()),
+        device: None,
+        rechecked_lanes: parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum(),
+        seconds: 0.0,
+        threads: rayon::current_num_threads(),
+    };
+    let segments: Vec<SampleTally> = parts.into_iter().flat_map(|part| part.segments).collect();
+    let options = planned.options(StopRule::samples(planned.facts.samples));
+    let crude = crude_of_segments(&planned.plan, segments, &planned.counting(), &options)?;
+    if crude.tally.samples() != planned.plan.unit_count() {
+        let problem = "the parts do not hold every sample that their names stand for";
+        return Err(Error::input(Place::file(dir), problem, "make them again"));
+    }
+    write_run(&planned, crude, None, host, dir)?;
+    Ok(Exit::Ok)
+}
+
+/// Tables, figures, the record; the record comes last.
+fn write_run(
+    planned: &PlannedSample,
+    crude: CrudeRun,
+    bootstrap: Option<BootstrapRecord>,
+    host: HostRecord,
+    out: &Path,
+) -> Result<()> {
+    sample_lanes::write(out, &planned.plan, &planned.density, &crude, &planned.counting())?;
+    let mut file = EstimateFile::new(&planned.density, planned.run_facts(), crude.rows, host)?;
+    file.plan_sha256 = Some(planned.plan.hash().to_owned());
+    file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
+    file.bootstrap = bootstrap;
+    write_density(&out.join("density.json"), &planned.density)?;
+    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
+    write_atomically(&out.join("estimate.json"), &file.to_json()?)?;
+    console::print(&file.text())?;
+    tracing::info!("results written to {}", out.display());
+    Ok(())
+}

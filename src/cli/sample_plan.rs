@@ -1,0 +1,178 @@
+//! A run of crude Monte Carlo as a plan file: the density and everything that was asked for, so that every shard and
+//! the merge know the same run.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::criterion::Criterion;
+use crate::density::DensityModel;
+use crate::driver::ModelId;
+use crate::estimate::{BinomialInterval, StopRule};
+use crate::parts::{read_sealed, seal, unseal};
+use crate::profile::Profile;
+use crate::report::sampling::RunFacts;
+use crate::sampling::{
+    CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, mixture_of, plan_samples,
+};
+use crate::sweep::{Headway, LanePlan};
+use crate::{Error, Place, Result};
+
+/// Kind of the sealed file.
+pub(super) const KIND: &str = "sampling plan";
+/// Largest plan that is read: a density, mostly.
+const LARGEST_PLAN_BYTES: u64 = 1 << 30;
+const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` of this version";
+
+/// A run of crude Monte Carlo.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SampleFacts {
+    /// The density file's text.
+    pub density: String,
+    pub profile: Profile,
+    pub models: Vec<ModelId>,
+    /// None where the density draws them.
+    pub headways: Option<Vec<Headway>>,
+    pub sobol: bool,
+    pub samples: u64,
+    pub seed: u64,
+    pub given: Vec<(String, f64)>,
+    pub criterion: Criterion,
+    pub worst: usize,
+    pub map: Option<MapAxes>,
+    pub clopper_pearson: bool,
+    pub level: f64,
+    pub plan_sha256: String,
+}
+
+/// A run ready to be sampled.
+pub(super) struct PlannedSample {
+    pub facts: SampleFacts,
+    pub density: DensityModel,
+    pub plan: LanePlan,
+}
+
+impl PlannedSample {
+    /// Plans; the hash and the density's text in `facts` are set here.
+    ///
+    /// # Errors
+    /// As [`plan_samples`].
+    pub fn new(density: DensityModel, mut facts: SampleFacts) -> Result<PlannedSample> {
+        let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
+        facts.density = String::from_utf8(density.to_json()?).map_err(unreadable)?;
+        let plan = facts.plan(&density)?;
+        facts.plan_sha256 = plan.hash().to_owned();
+        Ok(PlannedSample { facts, density, plan })
+    }
+
+    /// As the text of a plan file, with the hash of the run.
+    ///
+    /// # Errors
+    /// None for what this program makes.
+    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
+        let text = seal(KIND, &self.facts)?;
+        let (_, run_sha256) = unseal::<serde::de::IgnoredAny>(KIND, &text, &Place::item("plan"), AGAIN)?;
+        Ok((text, run_sha256))
+    }
+
+    /// From a plan file, with the hash of the run.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
+    pub fn read(path: &Path) -> Result<(PlannedSample, String)> {
+        let (facts, run_sha256): (SampleFacts, _) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
+        let place = Place::file(path);
+        let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
+        facts.profile.check(&place)?;
+        if !(facts.level > 0.0 && facts.level < 1.0) {
+            return Err(wrong("its level is no share"));
+        }
+        let density = DensityModel::from_json(facts.density.as_bytes(), &place)?;
+        let parameters = density.space.parameters().len();
+        if facts.map.as_ref().is_some_and(|map| map.x.parameter >= parameters || map.y.parameter >= parameters) {
+            return Err(wrong("its map is over parameters that the density does not have"));
+        }
+        let plan = facts.plan(&density)?;
+        if plan.hash() != facts.plan_sha256 {
+            return Err(wrong("its content is not that of its hash: another version of lanesweep made it"));
+        }
+        Ok((PlannedSample { facts, density, plan }, run_sha256))
+    }
+
+    /// What is counted.
+    pub fn counting(&self) -> TallyOptions {
+        TallyOptions { worst: self.facts.worst, criterion: self.facts.criterion, map: self.facts.map.clone() }
+    }
+
+    /// How estimates are made of counts.
+    pub fn options(&self, stop: StopRule) -> CrudeOptions<'_> {
+        CrudeOptions {
+            stop,
+            interval: if self.facts.clopper_pearson {
+                BinomialInterval::ClopperPearson
+            } else {
+                BinomialInterval::Wilson
+            },
+            level: self.facts.level,
+            // How often scenarios with given values occur is not known.
+            exposure: self.density.exposure.as_ref().filter(|_| self.facts.given.is_empty()),
+            is_sampled_headway: self.density.space.has_thw(),
+        }
+    }
+
+    /// For `estimate.json`.
+    pub fn run_facts(&self) -> RunFacts {
+        let facts = &self.facts;
+        RunFacts {
+            estimator: "mc",
+            profile: facts.profile.clone(),
+            models: facts.models.clone(),
+            headways: facts.headways.clone().unwrap_or_default(),
+            points: if facts.sobol { "sobol" } else { "random" },
+            samples: facts.samples,
+            seed: facts.seed,
+            given: facts.given.clone(),
+        }
+    }
+}
+
+impl SampleFacts {
+    /// What a plan is made of; the rest is set by [`PlannedSample::new`].
+    pub fn new(options: &SamplePlanOptions, profile: &Profile, given: &[(String, f64)]) -> SampleFacts {
+        SampleFacts {
+            density: String::new(),
+            profile: profile.clone(),
+            models: options.models.clone(),
+            headways: match &options.headways {
+                SampleHeadways::Each(list) => Some(list.clone()),
+                SampleHeadways::Sampled => None,
+            },
+            sobol: options.source == SampleSource::Sobol,
+            samples: options.samples,
+            seed: options.seed,
+            given: given.to_vec(),
+            criterion: Criterion::Collision,
+            worst: 0,
+            map: None,
+            clopper_pearson: false,
+            level: 0.95,
+            plan_sha256: String::new(),
+        }
+    }
+
+    /// As the bootstrap takes them.
+    pub fn plan_options(&self) -> SamplePlanOptions {
+        SamplePlanOptions {
+            samples: self.samples,
+            seed: self.seed,
+            source: if self.sobol { SampleSource::Sobol } else { SampleSource::Random },
+            models: self.models.clone(),
+            headways: self.headways.clone().map_or(SampleHeadways::Sampled, SampleHeadways::Each),
+        }
+    }
+
+    fn plan(&self, density: &DensityModel) -> Result<LanePlan> {
+        plan_samples(density, &mixture_of(density, &self.given)?, &self.profile, &self.plan_options())
+    }
+}

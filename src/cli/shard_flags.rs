@@ -1,0 +1,172 @@
+//! Flags of verbs that can be split and continued, and the files that parts keep in a run's folder.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::lock::FolderLock;
+use crate::parts::{Countable, Journal, Ledger, Part, Shard, read_part, write_part};
+use crate::report::files::make_folder;
+use crate::{Error, Place, Result, interrupt};
+
+/// Flags of every verb that can be split.
+#[derive(Debug, Clone, Args)]
+pub struct ShardFlags {
+    /// Compute shard I of N (from 0) and leave its part in --out, where `lanesweep merge` makes the result; `auto/N`
+    /// takes I from a Kubernetes Indexed Job or a Slurm array
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Run a plan that --plan-only wrote, instead of making one
+    #[arg(long, value_name = "FILE", conflicts_with = "plan_only")]
+    pub plan: Option<PathBuf>,
+    /// Write the plan, plan.json in --out, and end
+    #[arg(long, conflicts_with = "shard")]
+    pub plan_only: bool,
+    /// End after the chunk that is being computed then, as Ctrl-C does: the same command goes on from there
+    #[arg(long, value_name = "SECONDS")]
+    pub stop_after: Option<f64>,
+}
+
+/// Name of the plan in a run's folder.
+pub const PLAN_FILE: &str = "plan.json";
+
+impl ShardFlags {
+    /// Starts the clock of --stop-after.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for no time.
+    pub fn start(&self) -> Result<()> {
+        let Some(seconds) = self.stop_after else { return Ok(()) };
+        if !(seconds > 0.0 && seconds < 1e9) {
+            let problem = format!("{seconds} s is no time");
+            return Err(Error::usage(Place::item("--stop-after"), problem, "give seconds above 0"));
+        }
+        interrupt::stop_after(seconds);
+        Ok(())
+    }
+
+    /// Part of a run that others join?
+    pub fn is_part(&self) -> bool {
+        self.shard.is_some()
+    }
+}
+
+/// An interval of a run at work: its lock, its journal, what is counted.
+pub struct Work<T> {
+    /// The interval.
+    pub units: Range<u64>,
+    /// What is counted.
+    pub ledger: Ledger<T>,
+    lock: FolderLock,
+}
+
+/// The place of a run or of one of its parts in its folder.
+pub struct Desk<'a> {
+    /// The run's folder.
+    pub out: &'a Path,
+    /// Hash of the run.
+    pub run_sha256: &'a str,
+    /// The shard, or the whole run.
+    pub shard: Option<Shard>,
+    /// Units of the whole run.
+    pub unit_count: u64,
+}
+
+impl Desk<'_> {
+    fn units(&self) -> Range<u64> {
+        self.shard.map_or(0..self.unit_count, |shard| shard.units(self.unit_count))
+    }
+
+    /// The part's file.
+    pub fn part(&self) -> Option<PathBuf> {
+        self.shard.map(|shard| self.out.join(format!("{}.json", shard.stem())))
+    }
+
+    /// Is the part there, whole and of this run? Then nothing is to be done.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a damaged or foreign file in its place.
+    pub fn is_done<T: serde::de::DeserializeOwned>(&self) -> Result<bool> {
+        let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
+        read_part::<T>(&path, self.run_sha256, &self.units(), "run this command again").map(|_| true)
+    }
+
+    /// Takes the place: no other process computes the same. What an earlier one left is taken over, cut at `cuts`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where another process is at it; [`Error::Io`].
+    pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool) -> Result<Work<T>> {
+        make_folder(self.out)?;
+        let stem = self.shard.map(|shard| shard.stem());
+        let lock =
+            FolderLock::acquire(&self.out.join(stem.as_ref().map_or("run.lock".to_owned(), |s| format!("{s}.lock"))))?;
+        crate::atomic_file::clear_stale(self.out, |name| match &stem {
+            Some(stem) => name.strip_suffix(".json") == Some(stem),
+            None => !name.starts_with("part-"),
+        });
+        let units = self.units();
+        let mut ledger = Ledger::new(units.clone(), cuts);
+        if is_journalled {
+            let run = &self.run_sha256[..16.min(self.run_sha256.len())];
+            let name = stem.map_or(format!("run-{run}.journal"), |s| format!("{s}.journal"));
+            let (journal, found) = Journal::open(&self.out.join(name), self.run_sha256, units.clone())?;
+            let done = ledger.resume(journal, found)?;
+            if done > 0 {
+                tracing::info!("{done} of {} units are done already: this run continues", units.end - units.start);
+            }
+        }
+        Ok(Work { units, ledger, lock })
+    }
+
+    /// Writes the part and takes its journal away.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Internal`] where the ledger is not complete.
+    pub fn finish<T: Countable>(&self, mut work: Work<T>, lanes: [u64; 2]) -> Result<()> {
+        let Some(path) = self.part() else { return Err(Error::Internal("the whole run is no part".to_owned())) };
+        if !work.ledger.missing(work.units.clone())?.is_empty() {
+            return Err(Error::Internal("a part is not complete".to_owned()));
+        }
+        let (segments, journal) = work.ledger.finish()?;
+        let run_sha256 = self.run_sha256.to_owned();
+        write_part(&path, &Part { run_sha256, units: work.units, lanes_redone_and_rechecked: lanes, segments })?;
+        journal.map_or(Ok(()), Journal::remove)?;
+        drop(work.lock);
+        tracing::info!("part written to {}", path.display());
+        Ok(())
+    }
+}
+
+impl<T: Countable> Work<T> {
+    /// The result stands: the journal goes, then the lock.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn forget(self) -> Result<()> {
+        let (_, journal) = self.ledger.finish()?;
+        journal.map_or(Ok(()), Journal::remove)?;
+        drop(self.lock);
+        Ok(())
+    }
+}
+
+/// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once.
+///
+/// # Errors
+/// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
+pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
+    make_folder(out)?;
+    let path = out.join(PLAN_FILE);
+    match std::fs::read(&path) {
+        Ok(there) if there == text => Ok(()),
+        Ok(_) => {
+            let problem = "this folder holds the plan of another run";
+            let help =
+                "give another --out, or the flags that the plan was made with; or move the plan and its parts away";
+            Err(Error::input(Place::file(path), problem, help))
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => crate::report::files::write_atomically(&path, text),
+        Err(e) => Err(Error::io(path, "read", e)),
+    }
+}

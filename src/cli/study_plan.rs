@@ -1,0 +1,95 @@
+//! What a study is once its data are mined: the plan, and what its report says beside the lanes' outcomes. Made from
+//! data or read from a plan file.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::mining::{MiningOptions, RecordingSummary};
+use crate::parameterization::ParameterizationOptions;
+use crate::parts::{read_sealed, seal, unseal};
+use crate::score::ScoreOptions;
+use crate::sweep::{LanePlan, PlanContent};
+use crate::{Place, Result};
+
+/// Largest plan that is read.
+pub(super) const LARGEST_PLAN_BYTES: u64 = 8 << 30;
+/// Kind of the sealed file.
+pub(super) const KIND: &str = "study plan";
+
+/// One category's scenarios.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CategoryFacts {
+    pub found: u64,
+    pub kept: u64,
+    pub svd_explained: Vec<f64>,
+}
+
+/// What a report says beside the lanes' outcomes.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StudyFacts {
+    pub data: String,
+    pub synthetic: bool,
+    pub published: bool,
+    pub reference: bool,
+    /// Parts of the input were left out.
+    pub incomplete: bool,
+    pub scenario_file_sha256: Option<String>,
+    pub recordings: Vec<RecordingSummary>,
+    pub left_out: Vec<String>,
+    /// One per block of the plan.
+    pub categories: Vec<CategoryFacts>,
+    pub mining: MiningOptions,
+    pub parameterization: ParameterizationOptions,
+    pub score: ScoreOptions,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyPlanFile {
+    facts: StudyFacts,
+    plan: PlanContent,
+}
+
+/// A study ready to be swept.
+pub(super) struct PlannedStudy {
+    pub plan: LanePlan,
+    pub facts: StudyFacts,
+}
+
+impl PlannedStudy {
+    /// As the text of a plan file.
+    pub fn seal(&self) -> Result<Vec<u8>> {
+        seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? })
+    }
+
+    /// From a plan file, with the hash of the run.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`]; [`crate::Error::Input`] for anything but a whole plan of this version.
+    pub fn read(path: &Path) -> Result<(PlannedStudy, String)> {
+        let (file, run_sha256) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
+        Ok((PlannedStudy::of(file, &Place::file(path))?, run_sha256))
+    }
+
+    /// The hash of a plan file's run, from its text.
+    pub fn run_sha256(text: &[u8]) -> Result<String> {
+        let place = Place::item("plan");
+        Ok(unseal::<serde::de::IgnoredAny>(KIND, text, &place, AGAIN)?.1)
+    }
+
+    fn of(file: StudyPlanFile, place: &Place) -> Result<PlannedStudy> {
+        let StudyPlanFile { facts, plan } = file;
+        facts.score.validate()?;
+        let plan = plan.into_plan(place)?;
+        if facts.categories.len() != plan.blocks.len() {
+            let problem = "it does not have the facts of every category";
+            return Err(crate::Error::input(place.clone(), problem, AGAIN));
+        }
+        Ok(PlannedStudy { plan, facts })
+    }
+}
+
+const AGAIN: &str = "make it with `lanesweep study … --plan-only --out DIR` of this version";

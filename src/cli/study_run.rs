@@ -1,0 +1,170 @@
+//! The lanes of a study: swept, checked, counted; then the report.
+
+use std::path::Path;
+
+use super::Exit;
+use super::console::{self, Verbosity};
+use super::shard_flags::Work;
+use super::study_plan::PlannedStudy;
+use crate::report::files::make_folder;
+use crate::report::lanes::{self, Digits};
+use crate::report::reference::ReferenceComparison;
+use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SweepRecord, Timings};
+use crate::report::study::StudyReport;
+use crate::score::{ScoreTable, f1, judge_claims, score};
+use crate::sweep::{
+    Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Wanted, chunks, sweep,
+};
+use crate::{Error, Result, interrupt};
+
+/// Who computes the lanes, who stands in, who checks.
+pub(super) struct How<'a> {
+    pub backend: &'a dyn Backend,
+    pub fallback: Option<&'a dyn Backend>,
+    pub recheck: Option<&'a Recheck<'a>>,
+}
+
+impl How<'_> {
+    fn options(&self, wanted: Wanted) -> SweepOptions<'_> {
+        SweepOptions { wanted, fallback: self.fallback, recheck: self.recheck }
+    }
+}
+
+/// Every lane of a plan, counted.
+pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
+    let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
+    let mut parts = Vec::new();
+    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &how.options(Wanted::Verdicts), |chunk| {
+        bar.inc(chunk.units.end - chunk.units.start);
+        parts.push(Partial::from_chunk(plan, &chunk)?);
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
+}
+
+/// The lanes of an interval of units that are not counted yet.
+pub(super) fn run_units(
+    plan: &LanePlan,
+    work: &mut Work<Partial>,
+    how: &How,
+    verbosity: Verbosity,
+) -> Result<SweepSummary> {
+    let _resumable = interrupt::resumable();
+    let missing = work.ledger.missing(work.units.clone())?;
+    let left: u64 = missing.iter().map(|range| range.end - range.start).sum();
+    let bar = console::progress(verbosity, left, "sweeping");
+    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+    for range in missing {
+        let part = sweep(plan, range, how.backend, &how.options(Wanted::Verdicts), |chunk| {
+            bar.inc(chunk.units.end - chunk.units.start);
+            work.ledger.add(Partial::from_chunk(plan, &chunk)?)
+        })?;
+        summary.add(&part);
+    }
+    bar.finish_and_clear();
+    Ok(summary)
+}
+
+/// Every lane in f32 and in f64, chunk by chunk.
+pub(super) fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
+    let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
+    let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
+    let mut comparison = ReferenceComparison::default();
+    for units in chunks(plan, 0..plan.unit_count()) {
+        let reference = wide.run(units.clone(), Wanted::Outcomes)?;
+        comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
+    }
+    Ok(comparison)
+}
+
+/// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
+pub(super) fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<SweepSummary> {
+    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
+        make_folder(dir)?;
+    }
+    let mut swept = Ok(SweepSummary::default());
+    let written = crate::report::files::write_atomically_with(path, |out| {
+        lanes::write_header(out)?;
+        let options = how.options(Wanted::Outcomes);
+        swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
+            lanes::write_chunk(out, plan, &chunk, digits).map_err(|e| Error::io(path, "write", e))
+        });
+        // The sweep's own error is the one to tell.
+        if swept.is_ok() { Ok(()) } else { Err(std::io::Error::other("the sweep failed")) }
+    });
+    let summary = swept?;
+    written.map(|()| summary)
+}
+
+/// What belongs to the machine and not to the result.
+pub(super) struct Host {
+    pub backend: String,
+    pub device: Option<DeviceRecord>,
+    pub swept: SweepSummary,
+    pub timings: Timings,
+}
+
+/// Scores, tables, figures and the record, from the counts of all lanes.
+pub(super) fn finish_study(
+    study: &PlannedStudy,
+    partial: &Partial,
+    comparison: Option<ReferenceComparison>,
+    mut host: Host,
+    out: &Path,
+) -> Result<Exit> {
+    let (plan, facts) = (&study.plan, study.facts.clone());
+    let started = std::time::Instant::now();
+    let scores = score(plan, partial, &facts.score)?;
+    host.timings.score_s = started.elapsed().as_secs_f64();
+    let run = RunRecord {
+        program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        data: facts.data,
+        synthetic: facts.synthetic,
+        backend: host.backend,
+        device: host.device,
+        sweep: SweepRecord {
+            rechecked_lanes: host.swept.rechecked_lanes,
+            recheck_seed: facts.score.seed,
+            redone_lanes: host.swept.redone_lanes,
+            device_s: host.swept.device_s,
+        },
+        plan_sha256: plan.hash().to_owned(),
+        scenario_file_sha256: facts.scenario_file_sha256,
+        left_out: facts.left_out,
+        recordings: facts.recordings,
+        categories: category_records(study, &scores),
+        lanes: plan.lane_count(),
+        profile: plan.profile.clone(),
+        mining: facts.mining,
+        parameterization: facts.parameterization,
+        score: facts.score,
+        timings: host.timings,
+    };
+    let claims = judge_claims(&scores);
+    let report = StudyReport { scores, claims, run, published: facts.published, comparison };
+    let written = report.write(out)?;
+    console::print(&report.text())?;
+    tracing::info!("{} files written to {}", written.len(), out.display());
+    Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
+}
+
+fn category_records(study: &PlannedStudy, scores: &ScoreTable) -> Vec<CategoryRecord> {
+    let plan = &study.plan;
+    let record = |(block, of): (&crate::sweep::Block, &super::study_plan::CategoryFacts)| {
+        let scored = scores.categories.iter().find(|c| c.category == block.category);
+        let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
+        CategoryRecord {
+            category: block.category.key(),
+            found: of.found,
+            kept: of.kept,
+            variants: block.variants.clone(),
+            lanes: plan.lanes_per_unit(block) * block.units.len(),
+            capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
+            undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
+            undefined_draws: cells().map(|c| u64::from(c.undefined_draws)).sum(),
+            svd_explained: of.svd_explained.clone(),
+        }
+    };
+    plan.blocks.iter().zip(&study.facts.categories).map(record).collect()
+}

@@ -1,0 +1,142 @@
+//! A folder of parts: what is there, and whether it covers every unit exactly once.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::shard::Shard;
+use crate::{Error, Place, Result};
+
+/// Part files of a folder by their names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Shards with their files, in order of their units.
+    pub parts: Vec<(Shard, PathBuf)>,
+}
+
+/// Lists most of these by name.
+const NAMED: usize = 10;
+
+/// The parts in a folder, which must cover `units` units exactly once. `again` gives the command that makes a shard.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] naming what is missing or doubled, and the commands that make it.
+pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Found> {
+    let io = |e| Error::io(dir, "list", e);
+    let mut parts: Vec<(Shard, PathBuf)> = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let Some(stem) = path.file_name().and_then(|n| n.to_str()).and_then(|n| n.strip_suffix(".json")) else {
+            continue;
+        };
+        if !stem.starts_with("part-") {
+            continue;
+        }
+        match Shard::of_stem(stem) {
+            Some(shard) if (1..=Shard::MOST).contains(&shard.of) && shard.index < shard.of => {
+                parts.push((shard, path));
+            }
+            _ => {
+                let problem = "its name is that of no part: part-00003-of-00020.json is";
+                return Err(Error::input(Place::file(path), problem, "move it away, or give it its name back"));
+            }
+        }
+    }
+    if parts.is_empty() {
+        let help = format!("make the parts first, such as: {}", again(Shard { index: 0, of: 1 }));
+        return Err(Error::input(Place::file(dir), "there is no part here", help));
+    }
+    parts.sort_by_key(|(shard, _)| (shard.units(units).start, shard.units(units).end, shard.of));
+    check_cover(dir, units, &parts, again)?;
+    Ok(Found { parts })
+}
+
+fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl Fn(Shard) -> String) -> Result<()> {
+    let mut at = 0;
+    let mut before: Option<&(Shard, PathBuf)> = None;
+    let mut gaps: Vec<Range<u64>> = Vec::new();
+    // A shard of more shards than there are units may be empty: it neither covers nor doubles.
+    for part in parts.iter().filter(|(shard, _)| !shard.units(units).is_empty()) {
+        let own = part.0.units(units);
+        if own.start < at {
+            let other = before.map_or(String::new(), |(_, path)| path.display().to_string());
+            let problem =
+                format!("units {} to {} are doubled: they are also in {other}", own.start, at.min(own.end) - 1);
+            return Err(Error::input(Place::file(&part.1), problem, "move one of the two away"));
+        }
+        if own.start > at {
+            gaps.push(at..own.start);
+        }
+        at = own.end;
+        before = Some(part);
+    }
+    if at < units {
+        gaps.push(at..units);
+    }
+    if gaps.is_empty() {
+        return Ok(());
+    }
+    let missing: u64 = gaps.iter().map(|gap| gap.end - gap.start).sum();
+    let problem = format!("{missing} of {units} units are missing");
+    // Commands are known where all parts are of one number of shards.
+    let of = parts[0].0.of;
+    if parts.iter().any(|(shard, _)| shard.of != of) {
+        let list: Vec<String> = gaps.iter().take(NAMED).map(|gap| format!("{}..{}", gap.start, gap.end)).collect();
+        return Err(Error::input(
+            Place::file(dir),
+            problem,
+            format!("make shards that hold units {}", list.join(", ")),
+        ));
+    }
+    let is_there = |index: u64| parts.iter().any(|(shard, _)| shard.index == index);
+    let absent: Vec<Shard> = (0..of)
+        .filter(|&index| !is_there(index))
+        .map(|index| Shard { index, of })
+        .filter(|shard| !shard.units(units).is_empty())
+        .collect();
+    let mut help: Vec<String> = absent.iter().take(NAMED).map(|shard| again(*shard)).collect();
+    if absent.len() > NAMED {
+        help.push(format!("… and {} more shards", absent.len() - NAMED));
+    }
+    Err(Error::input(Place::file(dir), problem, format!("make them:\n{}", help.join("\n"))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(names: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for name in names {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        dir
+    }
+
+    fn told(names: &[&str], units: u64) -> String {
+        let dir = folder(names);
+        let error = collect(dir.path(), units, |shard| format!("make {shard}")).unwrap_err();
+        format!("{error} {}", error.help().unwrap_or_default())
+    }
+
+    #[test]
+    fn missing_doubled_and_misnamed_parts_are_told_with_what_to_do() {
+        let missing = told(&["part-00000-of-00003.json"], 9);
+        assert!(missing.contains("6 of 9 units are missing") && missing.contains("make 1/3\nmake 2/3"), "{missing}");
+        let doubled = told(&["part-00000-of-00003.json", "part-00000-of-00001.json"], 9);
+        assert!(doubled.contains("units 0 to 2 are doubled"), "{doubled}");
+        assert!(told(&["part-3.json"], 9).contains("no part"));
+        assert!(told(&["estimate.json"], 9).contains("there is no part here"));
+        let mixed = told(&["part-00000-of-00003.json", "part-00002-of-00004.json"], 12);
+        assert!(mixed.contains("units 4..6, 9..12"), "{mixed}");
+    }
+
+    #[test]
+    fn parts_of_different_numbers_of_shards_may_make_a_whole() {
+        let dir = folder(&["part-00000-of-00002.json", "part-00002-of-00004.json", "part-00003-of-00004.json"]);
+        let found = collect(dir.path(), 8, |_| String::new()).unwrap();
+        assert_eq!(found.parts.len(), 3);
+        // More shards than units: the empty ones need not be there.
+        let dir = folder(&["part-00001-of-00002.json"]);
+        assert!(collect(dir.path(), 1, |_| String::new()).is_ok());
+    }
+}

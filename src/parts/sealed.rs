@@ -1,0 +1,117 @@
+//! JSON with kind, version and checksum around it: whole and unchanged, or refused.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+use sha2::{Digest, Sha256};
+
+use crate::sweep::hex;
+use crate::{Error, Place, Result};
+
+const VERSION: u64 = 1;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed<'a> {
+    /// What the content is: `part`, `plan`.
+    lanesweep: String,
+    version: u64,
+    /// SHA-256 of the content's bytes, in hexadecimal.
+    sha256: String,
+    #[serde(borrow)]
+    content: &'a RawValue,
+}
+
+/// The text of a sealed file.
+///
+/// # Errors
+/// None for what this program makes.
+pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<Vec<u8>> {
+    let unwritable = |e: serde_json::Error| Error::Internal(format!("a {kind} cannot be written: {e}"));
+    let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
+    let sha256 = hex(&Sha256::digest(content.get()));
+    let sealed = Sealed { lanesweep: kind.to_owned(), version: VERSION, sha256, content: &content };
+    let mut text = serde_json::to_vec(&sealed).map_err(unwritable)?;
+    text.push(b'\n');
+    Ok(text)
+}
+
+/// The content of a sealed text with its checksum. `again` says how such a file is made.
+///
+/// # Errors
+/// [`Error::Input`] for another kind or version, or anything but the bytes that were written.
+pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again: &str) -> Result<(T, String)> {
+    let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    let sealed: Sealed = serde_json::from_slice(text).map_err(|e| wrong(format!("this is no whole {kind}: {e}")))?;
+    if sealed.lanesweep != kind {
+        return Err(wrong(format!("this is a `{}`, where a `{kind}` is needed", sealed.lanesweep)));
+    }
+    if sealed.version != VERSION {
+        return Err(wrong(format!("its version is {}, this program reads {VERSION}", sealed.version)));
+    }
+    if hex(&Sha256::digest(sealed.content.get())) != sealed.sha256 {
+        return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
+    }
+    let content = serde_json::from_str(sealed.content.get())
+        .map_err(|e| wrong(format!("its content is of another version: {e}")))?;
+    Ok((content, sealed.sha256))
+}
+
+/// Reads a sealed file of at most so many bytes.
+///
+/// # Errors
+/// [`Error::Io`]; as [`unseal`].
+pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, most_bytes: u64, again: &str) -> Result<(T, String)> {
+    let io = |e| Error::io(path, "read", e);
+    let place = Place::file(path);
+    let about = std::fs::metadata(path).map_err(io)?;
+    if !about.is_file() || about.len() > most_bytes {
+        let problem = format!("this is no {kind}: it is no file of at most {most_bytes} bytes");
+        return Err(Error::input(place, problem, again));
+    }
+    unseal(kind, &std::fs::read(path).map_err(io)?, &place, again)
+}
+
+/// The kind of a sealed file, without reading its content.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] for what is not sealed.
+pub fn kind_of(path: &Path, most_bytes: u64) -> Result<String> {
+    #[derive(Deserialize)]
+    struct Kind {
+        lanesweep: String,
+    }
+    let io = |e| Error::io(path, "read", e);
+    let wrong = |problem: String| {
+        Error::input(Place::file(path), problem, "give a file or folder that a run in parts has written")
+    };
+    let about = std::fs::metadata(path).map_err(io)?;
+    if !about.is_file() || about.len() > most_bytes {
+        return Err(wrong("this is no file of a run in parts".to_owned()));
+    }
+    let kind: Kind = serde_json::from_slice(&std::fs::read(path).map_err(io)?)
+        .map_err(|e| wrong(format!("this is no whole file of a run in parts: {e}")))?;
+    Ok(kind.lanesweep)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_changed_byte_and_every_cut_is_noticed() {
+        let text = seal("part", &vec![1.5_f64, 0.1, 3.0]).unwrap();
+        let place = Place::item("here");
+        let read = |text: &[u8]| unseal::<Vec<f64>>("part", text, &place, "make it again");
+        assert_eq!(read(&text).unwrap().0, [1.5, 0.1, 3.0]);
+        for at in 0..text.len() - 1 {
+            let mut changed = text.clone();
+            changed[at] ^= 1;
+            assert!(read(&changed).is_err(), "byte {at}");
+            assert!(read(&text[..at]).is_err(), "cut at {at}");
+        }
+        assert!(unseal::<Vec<f64>>("plan", &text, &place, "").unwrap_err().to_string().contains("a `plan` is needed"));
+    }
+}
