@@ -1,17 +1,140 @@
 //! Files that are there whole or not at all: written beside their place under a hidden name, brought to
 //! the disk, then renamed. Used by everything that leaves results behind.
 
-use std::io::{BufWriter, Write};
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
 use crate::{Error, Place, Result};
 
+/// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
+const PREFIX: &str = ".lanesweep-";
+const SUFFIX: &str = ".part";
+/// Random letters and digits in a hidden name.
+const RANDOM: usize = 6;
+/// Longest file name, in bytes, that a hidden name repeats: file systems end at 255 for all of it.
+const LONGEST: usize = 200;
+
+/// The hidden files of this process that exist now.
+static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An entry in the registry of hidden files, for as long as the file has that name.
+struct Live(PathBuf);
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        live().remove(&self.0);
+    }
+}
+
+/// Removes the hidden files of this process, which is about to end. While the answer is kept, no other begins.
+#[cfg(unix)]
+pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
+    // A file system that hangs while a file is begun there must not keep the process from ending.
+    for _ in 0..100 {
+        let paths = match LIVE.try_lock() {
+            Ok(paths) => paths,
+            Err(std::sync::TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(std::sync::TryLockError::WouldBlock) => {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+                continue;
+            }
+        };
+        for path in paths.iter() {
+            // One that has just got its proper name is not there any more.
+            let _ = std::fs::remove_file(path);
+        }
+        return Some(paths);
+    }
+    None
+}
+
+/// Removes from `dir` the hidden files that killed processes left there, of targets whose file name `is_ours`
+/// accepts. For the holder of the lock on those targets: nobody else may be writing them. What cannot be
+/// removed stays; it harms nobody.
+#[cfg_attr(not(test), expect(dead_code, reason = "for the holders of locks"))]
+pub(crate) fn clear_stale(dir: &Path, is_ours: impl Fn(&str) -> bool) {
+    let Ok(entries) = std::fs::read_dir(dir) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        // By name: the folder may be spelled in another way, and the random letters tell files apart.
+        let is_live = || live().iter().any(|path| path.file_name() == Some(&name));
+        if name.to_str().and_then(target_of).is_some_and(&is_ours) && !is_live() {
+            match std::fs::remove_file(entry.path()) {
+                Ok(()) => tracing::debug!("removed {}, left by a process that was killed", entry.path().display()),
+                Err(error) => tracing::debug!("{} stays: {error}", entry.path().display()),
+            }
+        }
+    }
+}
+
+/// The target's file name in a hidden name.
+fn target_of(hidden: &str) -> Option<&str> {
+    let (target, random) = hidden.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.rsplit_once('-')?;
+    (!target.is_empty() && random.len() == RANDOM && random.bytes().all(|b| b.is_ascii_alphanumeric()))
+        .then_some(target)
+}
+
+/// What a hidden name begins with.
+fn prefix(target: &Path) -> OsString {
+    let mut prefix = OsString::from(PREFIX);
+    match target.file_name() {
+        Some(name) if name.len() <= LONGEST => {
+            prefix.push(name);
+            prefix.push("-");
+        }
+        _ => {}
+    }
+    prefix
+}
+
+fn folder_of(target: &Path) -> &Path {
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A failure after the file was begun. The system's "no such file" does not say which: the result's name is new
+/// and the hidden one is unknown to the user.
+fn failed(target: &Path, source: std::io::Error) -> Error {
+    if source.kind() != ErrorKind::NotFound {
+        return Error::io(target, "write", source);
+    }
+    let folder = folder_of(target);
+    let why = if folder.is_dir() {
+        "the unfinished file was removed while it was written, by another program".to_owned()
+    } else {
+        format!("the folder {} vanished while the file was written", folder.display())
+    };
+    Error::io(target, "write", std::io::Error::other(why))
+}
+
+/// Makes a rename in `folder` survive a loss of power, where the system can do that.
+fn sync_folder(folder: &Path) {
+    #[cfg(unix)]
+    if let Ok(folder) = std::fs::File::open(folder) {
+        // Some file systems refuse this for folders; the file's own content is on the disk already.
+        let _ = folder.sync_all();
+    }
+    #[cfg(not(unix))]
+    let _ = folder;
+}
+
 /// A file being written; dropped before [`AtomicFile::stage`], it leaves nothing behind.
 pub(crate) struct AtomicFile {
     target: PathBuf,
     writer: BufWriter<NamedTempFile>,
+    // After the file: it is in the registry for as long as it exists.
+    live: Live,
 }
 
 /// A complete file that waits under its hidden name; dropped before [`StagedFile::publish`], it leaves
@@ -19,6 +142,7 @@ pub(crate) struct AtomicFile {
 pub(crate) struct StagedFile {
     target: PathBuf,
     file: NamedTempFile,
+    live: Live,
 }
 
 impl AtomicFile {
@@ -29,20 +153,22 @@ impl AtomicFile {
     /// If the folder cannot be written to.
     pub(crate) fn create(target: &Path) -> Result<Self> {
         let target = &resolve(target)?;
-        let folder = match target.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
+        let prefix = prefix(target);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".lanesweep-").suffix(".part");
+        builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
         // A temporary file is private by default; a result is as readable as any other new file.
         #[cfg(unix)]
         builder.permissions(match std::fs::metadata(target) {
             Ok(existing) => existing.permissions(),
             Err(_) => std::os::unix::fs::PermissionsExt::from_mode(0o666),
         });
-        let file = builder.tempfile_in(folder).map_err(|source| Error::io(target, "write", source))?;
-        Ok(AtomicFile { target: target.to_path_buf(), writer: BufWriter::with_capacity(1 << 16, file) })
+        // The registry is held until the file is in it: an interruption between the two would leave the file.
+        let mut registry = live();
+        let file = builder.tempfile_in(folder_of(target)).map_err(|source| Error::io(target, "write", source))?;
+        registry.insert(file.path().to_path_buf());
+        drop(registry);
+        let live = Live(file.path().to_path_buf());
+        Ok(AtomicFile { target: target.to_path_buf(), writer: BufWriter::with_capacity(1 << 16, file), live })
     }
 
     /// Appends.
@@ -50,7 +176,7 @@ impl AtomicFile {
     /// # Errors
     /// If the system refuses, a full disk for instance.
     pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<()> {
-        self.writer.write_all(bytes).map_err(|source| Error::io(&self.target, "write", source))
+        self.writer.write_all(bytes).map_err(|source| failed(&self.target, source))
     }
 
     /// Brings everything to the disk, still under the hidden name.
@@ -58,11 +184,11 @@ impl AtomicFile {
     /// # Errors
     /// If the system refuses.
     pub(crate) fn stage(self) -> Result<StagedFile> {
-        let AtomicFile { target, writer } = self;
-        let failed = |source| Error::io(&target, "write", source);
+        let AtomicFile { target, writer, live } = self;
+        let failed = |source| failed(&target, source);
         let file = writer.into_inner().map_err(|error| failed(error.into_error()))?;
         file.as_file().sync_all().map_err(failed)?;
-        Ok(StagedFile { target, file })
+        Ok(StagedFile { target, file, live })
     }
 }
 
@@ -97,8 +223,11 @@ impl StagedFile {
     /// # Errors
     /// If the system refuses.
     pub(crate) fn publish(self) -> Result<()> {
-        let StagedFile { target, file } = self;
-        file.persist(&target).map(drop).map_err(|error| Error::io(&target, "write", error.error))
+        let StagedFile { target, file, live } = self;
+        file.persist(&target).map_err(|error| failed(&target, error.error))?;
+        drop(live);
+        sync_folder(folder_of(&target));
+        Ok(())
     }
 }
 
@@ -140,6 +269,58 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), "new");
         let error = AtomicFile::create(dir.path()).err().unwrap();
         assert!(error.to_string().contains("this is a folder"), "{error}");
+    }
+
+    #[test]
+    fn a_hidden_name_tells_its_target() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = AtomicFile::create(&dir.path().join("part-00003-of-00020.json")).unwrap();
+        let hidden = fs::read_dir(dir.path()).unwrap().next().unwrap().unwrap().file_name().into_string().unwrap();
+        assert_eq!(target_of(&hidden), Some("part-00003-of-00020.json"));
+        assert!(live().contains(&dir.path().join(&hidden)));
+        drop(file);
+        assert!(!live().contains(&dir.path().join(&hidden)));
+        for other in
+            [".lanesweep-abc123.part", ".lanesweep-a.csv-abc12.part", "a.csv-abc123.part", ".lanesweep--abc123.part"]
+        {
+            assert_eq!(target_of(other), None, "{other}");
+        }
+        // A name of the greatest length leaves no room to repeat it.
+        let long = dir.path().join("n".repeat(255));
+        AtomicFile::create(&long).unwrap().stage().unwrap().publish().unwrap();
+        assert!(long.exists());
+    }
+
+    #[test]
+    fn leftovers_of_a_killed_process_are_cleared_by_the_owner_of_their_target_only() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let (stale, foreign, part) = (".lanesweep-run.json-aB3dE9.part", ".lanesweep-f1.csv-aB3dE9.part", "mine.part");
+        for name in [stale, foreign, part, "run.json"] {
+            fs::write(path(name), "half").unwrap();
+        }
+        let mut own = AtomicFile::create(&path("run.json")).unwrap();
+        own.append(b"new").unwrap();
+        clear_stale(dir.path(), |target| target == "run.json");
+        assert!(!path(stale).exists());
+        assert!(path(foreign).exists() && path(part).exists() && path("run.json").exists());
+        own.stage().unwrap().publish().unwrap();
+        assert_eq!(fs::read_to_string(path("run.json")).unwrap(), "new", "what is being written is no leftover");
+        clear_stale(&path("no such folder"), |_| true);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_vanishes_on_the_way_is_told_as_that() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        let staged = AtomicFile::create(&out.join("f1.csv")).unwrap().stage().unwrap();
+        fs::remove_dir_all(&out).unwrap();
+        let error = staged.publish().unwrap_err();
+        assert!(matches!(error, Error::Io { .. }), "{error}");
+        assert!(error.to_string().contains("vanished while the file was written"), "{error}");
+        assert!(!error.help().unwrap().contains("typing"), "{:?}", error.help());
     }
 
     #[test]

@@ -119,6 +119,12 @@ pub enum Error {
     /// A defect of this program, caught before it could become a wrong number.
     #[error("internal error: {0}")]
     Internal(String),
+    /// The run was asked to end early, by a signal or a time limit; what is done is kept.
+    #[error("interrupted: {done}")]
+    Interrupted {
+        /// How far it came, and where that is kept.
+        done: String,
+    },
 }
 
 impl Error {
@@ -165,6 +171,7 @@ impl Error {
             Error::Internal(_) => {
                 Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
             }
+            Error::Interrupted { .. } => Some("run the same command again: it continues".to_owned()),
         }
     }
 }

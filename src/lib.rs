@@ -3,8 +3,8 @@
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
-//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables) and
-//! [`cli`].
+//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables),
+//! [`interrupt`] (ending early in good order) and [`cli`].
 
 mod atomic_file;
 pub mod cli;
@@ -16,6 +16,9 @@ pub mod driver;
 pub mod error;
 pub mod estimate;
 pub mod gpu;
+pub mod interrupt;
+#[cfg_attr(not(test), expect(dead_code, reason = "for the writers of parts and runs"))]
+mod lock;
 pub mod mining;
 pub mod parameterization;
 pub mod parts;

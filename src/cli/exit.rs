@@ -24,11 +24,13 @@ pub enum Exit {
     NoDevice = 7,
     /// A defect of the program.
     Internal = 70,
+    /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
+    Interrupted = 75,
 }
 
 impl Exit {
     /// All, for documentation.
-    pub const ALL: [Exit; 8] = [
+    pub const ALL: [Exit; 9] = [
         Exit::Ok,
         Exit::Usage,
         Exit::BadInput,
@@ -37,6 +39,7 @@ impl Exit {
         Exit::Io,
         Exit::NoDevice,
         Exit::Internal,
+        Exit::Interrupted,
     ];
 
     /// The number.
@@ -55,6 +58,7 @@ impl Exit {
             Exit::Io => "the system refused to read or write",
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a defect of the program",
+            Exit::Interrupted => "interrupted; what is done is kept, and the same command continues",
         }
     }
 
@@ -74,6 +78,7 @@ impl From<&Error> for Exit {
             Error::Device { .. } => Exit::NoDevice,
             Error::Verification(_) => Exit::VerificationFailed,
             Error::Internal(_) => Exit::Internal,
+            Error::Interrupted { .. } => Exit::Interrupted,
         }
     }
 }

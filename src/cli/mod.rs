@@ -134,6 +134,7 @@ pub fn main() -> ExitCode {
         }
     };
     console::start_log(cli.common.verbosity());
+    crate::interrupt::install();
     // A defect must not look like a crash of the user's making.
     let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(&cli)));
     let exit = match ended {

@@ -1,0 +1,155 @@
+//! One writer per folder or part: an advisory lock on a file, which the system releases with the process
+//! however that ends. A lock file that a killed process left behind is therefore free, and is taken over.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use crate::{Error, Place, Result};
+
+/// The right to write what a lock file stands for; dropping it removes the file and releases the lock.
+#[derive(Debug)]
+pub(crate) struct FolderLock {
+    path: PathBuf,
+    /// Holds the lock as long as it is open.
+    _file: File,
+}
+
+impl FolderLock {
+    /// Takes the lock `path`, whose folder must exist, without waiting.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if another process holds it, named by its process id where that can be read;
+    /// [`Error::Io`] if the file cannot be made or the file system knows no locks.
+    pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
+        loop {
+            let mut file = OpenOptions::new()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(path)
+                .map_err(|source| Error::io(path, "lock", source))?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(held(path, &mut file)),
+                Err(TryLockError::Error(source)) => return Err(Error::io(path, "lock", source)),
+            }
+            // The former holder removes its file before it lets go: between opening and locking the name may
+            // have gone, and a lock on a file without a name keeps nobody out.
+            if !still_named(path, &file) {
+                continue;
+            }
+            write_pid(&mut file).map_err(|source| Error::io(path, "write", source))?;
+            return Ok(FolderLock { path: path.to_path_buf(), _file: file });
+        }
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // While the lock is still held, so that nobody else's file can be under that name. A file that stays
+        // is harmless.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// For the message to those who come too late.
+fn write_pid(file: &mut File) -> std::io::Result<()> {
+    file.set_len(0)?;
+    file.rewind()?;
+    writeln!(file, "{}", std::process::id())
+}
+
+fn held(path: &Path, file: &mut File) -> Error {
+    let mut text = String::new();
+    // Where locks are mandatory the holder's file cannot be read: then it stays without a number.
+    let pid = file.take(32).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
+    let who = pid.map_or(String::new(), |pid| format!(" (pid {pid})"));
+    Error::usage(
+        Place::file(path),
+        format!("another lanesweep process is writing this part or run{who}"),
+        "wait for it, or choose another --out",
+    )
+}
+
+/// Whether `path` is the file that is open as `file`.
+#[cfg(unix)]
+fn still_named(path: &Path, file: &File) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (std::fs::metadata(path), file.metadata()) {
+        (Ok(named), Ok(open)) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
+        _ => false,
+    }
+}
+
+/// Elsewhere std does not tell; an open file's name is not given away there before it is closed.
+#[cfg(not(unix))]
+fn still_named(_: &Path, _: &File) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn one_holder_at_a_time_and_the_other_is_told_who() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let lock = FolderLock::acquire(&path).unwrap();
+        let error = FolderLock::acquire(&path).unwrap_err();
+        assert!(matches!(error, Error::Usage { .. }), "{error}");
+        assert!(error.to_string().contains("run.lock: another lanesweep process"), "{error}");
+        if cfg!(unix) {
+            assert!(error.to_string().contains(&format!("(pid {})", std::process::id())), "{error}");
+        }
+        assert!(error.help().unwrap().contains("--out"));
+        drop(lock);
+        assert!(!path.exists(), "a lock that was given back leaves no file");
+        drop(FolderLock::acquire(&path).unwrap());
+    }
+
+    #[test]
+    fn the_lock_file_of_a_killed_process_is_taken_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        fs::write(&path, "4000000000 and a longer text than any number\n").unwrap();
+        let lock = FolderLock::acquire(&path).unwrap();
+        if cfg!(unix) {
+            assert_eq!(fs::read_to_string(&path).unwrap().trim(), std::process::id().to_string());
+        }
+        drop(lock);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_an_io_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = FolderLock::acquire(&dir.path().join("gone/run.lock")).unwrap_err();
+        assert!(matches!(error, Error::Io { .. }), "{error}");
+    }
+
+    #[test]
+    fn many_that_come_and_go_never_hold_it_together() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let (inside, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        let Ok(lock) = FolderLock::acquire(&path) else { continue };
+                        assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0, "two hold the lock");
+                        taken.fetch_add(1, Ordering::SeqCst);
+                        inside.fetch_sub(1, Ordering::SeqCst);
+                        drop(lock);
+                    }
+                });
+            }
+        });
+        assert!(taken.into_inner() > 0);
+    }
+}
