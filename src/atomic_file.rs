@@ -60,7 +60,6 @@ pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
 /// Removes from `dir` the hidden files that killed processes left there, of targets whose file name `is_ours`
 /// accepts. For the holder of the lock on those targets: nobody else may be writing them. What cannot be
 /// removed stays; it harms nobody.
-#[cfg_attr(not(test), expect(dead_code, reason = "for the holders of locks"))]
 pub(crate) fn clear_stale(dir: &Path, is_ours: impl Fn(&str) -> bool) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
     for entry in entries.flatten() {

@@ -17,7 +17,6 @@ pub mod error;
 pub mod estimate;
 pub mod gpu;
 pub mod interrupt;
-#[cfg_attr(not(test), expect(dead_code, reason = "for the writers of parts and runs"))]
 mod lock;
 pub mod mining;
 pub mod parameterization;

@@ -122,18 +122,15 @@ fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
     };
     let base = ["density.json", "--samples", "3000", "--thw", "0.6,0.3", "--seed", "9", "--backend", "cpu"];
     run(&[&base[..], &["--out", "whole", "--rows", "rows.csv"]].concat());
-    run(&[&base[..], &["--out", "a", "--lanes", "0..1111"]].concat());
-    run(&[&base[..], &["--out", "b", "--lanes", "1111..3000"]].concat());
-    run(&["--join", "b", "a", "--out", "joined"]);
+    run(&[&base[..], &["--out", "joined", "--shard", "1/2"]].concat());
+    run(&[&base[..], &["--out", "joined", "--shard", "0/2"]].concat());
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "joined"]);
+    assert_eq!(code, 0, "{err}");
     let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
-    for file in ["estimates.csv", "worst.csv", "map-FSM.csv", "map-Reg157.svg", "density.json"] {
+    let files = ["estimates.csv", "worst.csv", "map-FSM.csv", "map-Reg157.svg", "density.json", "convergence.csv"];
+    for file in files {
         assert!(read(&format!("whole/{file}")) == read(&format!("joined/{file}")), "{file}");
     }
-    let (code, _, err) = lanesweep(dir.path(), &["sample", "--join", "a", "--out", "half"]);
-    assert_eq!(code, 4, "{err}");
-    assert!(err.contains("1889 of 3000 samples are in no part"), "{err}");
-    let (code, _, err) = lanesweep(dir.path(), &["sample", "--join", "a", "a", "--out", "twice"]);
-    assert_eq!(code, 3, "{err}");
     assert_eq!(read("rows.csv").lines().count(), 1 + 3000 * 2 * 4);
     // The worst lanes say how to run them again, and it is the same lane.
     let mut reader = csv::Reader::from_reader(std::fs::File::open(dir.path().join("whole/worst.csv")).unwrap());
@@ -233,9 +230,13 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--thw", "-1"], 2, "no time headway"),
         (&[d, "--thw", "sampled"], 2, "--with-thw"),
         (&[d, "--estimator", "subset"], 2, "one headway at a time"),
-        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "one given proposal can be split"),
-        (&[d, "--lanes", "5..5"], 2, "no interval"),
-        (&[d, "--lanes", "0..10", "--samples", "9"], 2, "no interval"),
+        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "one given proposal is split"),
+        (&[d, "--lanes", "0..5"], 2, "use --shard for crude Monte Carlo"),
+        (&[d, "--shard", "5/5"], 2, "no shard 5 of 5"),
+        (&[d, "--shard", "0/2", "--until", "0.1"], 2, "when the whole is good enough"),
+        (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "only crude Monte Carlo makes shards"),
+        (&[d, "--shard", "0/2", "--bootstrap", "20"], 2, "no replicates"),
+        (&[d, "--plan", "plan.json"], 2, "cannot be used with"),
         (&[d, "--level", "1"], 2, "no share"),
         (&[d, "--points", "sobol", "--samples", "5000000000"], 2, "4294967296"),
         (&["absent.json"], 6, "absent.json"),

@@ -1,0 +1,192 @@
+//! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
+//! the undisturbed run, byte for byte; a folder that cannot give it says what is missing.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+
+/// Runs the program in a folder: exit code, stdout, stderr.
+fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+fn done(dir: &Path, args: &[&str]) -> String {
+    let (code, out, err) = lanesweep(dir, args);
+    assert_eq!(code, 0, "{args:?}: {err}");
+    out
+}
+
+fn flat(text: &str) -> String {
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+/// Names and content of a folder's results; of the records only what does not belong to the machine.
+fn results(dir: &Path) -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name == "plan.json" || (name.starts_with("part-") && name.ends_with(".json")) {
+            continue;
+        }
+        let mut content = std::fs::read_to_string(&path).unwrap();
+        if ["run.json", "estimate.json"].contains(&name.as_str()) {
+            let mut record: serde_json::Value = serde_json::from_str(&content).unwrap();
+            for host in ["timings", "backend", "device", "sweep", "host"] {
+                record.as_object_mut().unwrap().remove(host);
+            }
+            content = record.to_string();
+        }
+        files.push((name, content));
+    }
+    files.sort();
+    files
+}
+
+fn same(a: &Path, b: &Path) {
+    let (a, b) = (results(a), results(b));
+    let names = |list: &[(String, String)]| list.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&a), names(&b));
+    for ((name, one), (_, other)) in a.iter().zip(&b) {
+        assert!(one == other, "{name} differs");
+    }
+}
+
+const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
+
+fn density(dir: &Path) {
+    let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
+}
+
+const SAMPLE: [&str; 9] =
+    ["-q", "sample", "densities/cut-in-2.json", "--samples", "30000", "--thw", "0.6", "--backend", "cpu"];
+
+#[test]
+fn a_study_in_shards_is_the_study_in_one_piece() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let whole = done(dir, &[&STUDY[..], &["--out", "whole"]].concat());
+    // Each makes the plan itself; in another order.
+    for shard in ["2/3", "0/3", "1/3"] {
+        done(dir, &[&STUDY[..], &["--out", "three", "--shard", shard]].concat());
+    }
+    assert_eq!(done(dir, &["-q", "merge", "three"]), whole);
+    same(&dir.join("whole"), &dir.join("three"));
+    // A second merge changes nothing, and a finished part is left alone.
+    let part = dir.join("three/part-00001-of-00003.json");
+    let before = std::fs::metadata(&part).unwrap().modified().unwrap();
+    done(dir, &[&STUDY[..], &["--out", "three", "--shard", "1/3"]].concat());
+    assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
+    done(dir, &["-q", "merge", "three"]);
+    same(&dir.join("whole"), &dir.join("three"));
+    // More shards than units, from one plan: the data are not read again.
+    done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
+    for shard in 0..100 {
+        let shard = format!("{shard}/100");
+        done(
+            dir,
+            &["-q", "study", "--plan", "plan/plan.json", "--out", "hundred", "--shard", &shard, "--backend", "cpu"],
+        );
+    }
+    assert_eq!(done(dir, &["-q", "merge", "hundred"]), whole);
+    same(&dir.join("whole"), &dir.join("hundred"));
+    assert_eq!(done(dir, &["-q", "study", "--plan", "plan/plan.json", "--out", "planned", "--backend", "cpu"]), whole);
+    same(&dir.join("whole"), &dir.join("planned"));
+}
+
+#[test]
+fn samples_in_shards_are_the_run_in_one_piece_with_its_convergence() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let whole = done(dir, &[&SAMPLE[..], &["--out", "whole"]].concat());
+    for shard in ["6/7", "0/7", "3/7", "1/7", "5/7", "2/7", "4/7"] {
+        done(dir, &[&SAMPLE[..], &["--out", "seven", "--shard", shard]].concat());
+    }
+    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
+    same(&dir.join("whole"), &dir.join("seven"));
+    assert!(results(&dir.join("seven")).iter().any(|(name, _)| name == "convergence.svg"));
+}
+
+#[test]
+fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let refused = |args: &[&str], code: i32, said: &[&str]| {
+        let (found, out, err) = lanesweep(dir, args);
+        assert_eq!(found, code, "{args:?}: {err}");
+        for said in said {
+            assert!(flat(&err).contains(said), "{args:?}: {err}");
+        }
+        assert!(out.is_empty(), "{out}");
+    };
+    std::fs::create_dir(dir.join("empty")).unwrap();
+    refused(&["merge", "empty"], 6, &["plan.json"]);
+    refused(&["merge", "nowhere"], 6, &["plan.json"]);
+    let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
+    shard("0/3", "p");
+    shard("2/3", "p");
+    refused(&["merge", "p"], 3, &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"]);
+    shard("1/3", "p");
+    shard("0/1", "p");
+    refused(&["merge", "p"], 3, &["doubled"]);
+    std::fs::remove_file(dir.join("p/part-00000-of-00001.json")).unwrap();
+    // Damaged: one byte.
+    let part = dir.join("p/part-00001-of-00003.json");
+    let whole = std::fs::read(&part).unwrap();
+    let mut damaged = whole.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    std::fs::write(&part, &damaged).unwrap();
+    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
+    std::fs::write(&part, &whole[..middle]).unwrap();
+    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
+    // Foreign: the same interval of another run.
+    let other = [&SAMPLE[..], &["--out", "q", "--seed", "8", "--shard", "1/3"]].concat();
+    done(dir, &other);
+    std::fs::copy(dir.join("q/part-00001-of-00003.json"), &part).unwrap();
+    refused(&["merge", "p"], 3, &["foreign"]);
+    // Under another part's name.
+    std::fs::write(&part, std::fs::read(dir.join("p/part-00000-of-00003.json")).unwrap()).unwrap();
+    refused(&["merge", "p"], 3, &["its name stands for"]);
+    std::fs::write(&part, &whole).unwrap();
+    done(dir, &["-q", "merge", "p"]);
+    // Another run into the same folder.
+    let other = [&SAMPLE[1..], &["--out", "p", "--seed", "8", "--shard", "1/3"]].concat();
+    refused(&other, 3, &["holds the plan of another run"]);
+    // Of a plan, nothing but what does not change the run.
+    refused(&["study", "--plan", "p/plan.json", "--seed", "3"], 2, &["cannot be used with"]);
+    refused(&["study", "--plan", "p/plan.json", "--out", "x"], 3, &["a `study plan` is needed"]);
+    std::fs::write(dir.join("p/plan.json"), "{}").unwrap();
+    refused(&["merge", "p"], 3, &["no whole file of a run in parts"]);
+}
+
+#[test]
+fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let long = ["-q", "sample", "densities/cut-in-2.json", "--samples", "600000", "--backend", "cpu", "--threads", "1"];
+    done(dir, &[&long[..], &["--out", "whole"]].concat());
+    for out in [&["--out", "run"][..], &["--out", "parts", "--shard", "0/1"]] {
+        let mut interruptions = 0;
+        loop {
+            let (code, _, err) = lanesweep(dir, &[&long[..], &["--stop-after", "0.3"], out].concat());
+            match code {
+                0 => break,
+                75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
+                other => panic!("{other}: {err}"),
+            }
+            interruptions += 1;
+            assert!(interruptions < 200, "every run must come further: {err}");
+        }
+        assert!(interruptions > 0, "the run is too short to be interrupted");
+    }
+    done(dir, &["-q", "merge", "parts"]);
+    same(&dir.join("whole"), &dir.join("run"));
+    same(&dir.join("whole"), &dir.join("parts"));
+}
