@@ -42,10 +42,23 @@ fn a_killed_run_continues_and_ends_as_if_undisturbed() {
     let dir = dir.path();
     let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
-    let plan = ["-q", "study", "--synth-recordings", "3", "--reference", "--dt", "0.02", "--plan-only", "--out", "plan"];
+    let plan =
+        ["-q", "study", "--synth-recordings", "3", "--reference", "--dt", "0.02", "--plan-only", "--out", "plan"];
     done(dir, &plan);
     let study = ["-q", "study", "--plan", "plan/plan.json", "--backend", "cpu", "--threads", "1"];
-    let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "400000", "--backend", "cpu", "--threads", "1"];
+    let sample = [
+        "-q",
+        "sample",
+        "densities/cut-in-2.json",
+        "--backend",
+        "cpu",
+        "--samples",
+        "800000",
+        "--thw",
+        "0.6",
+        "--threads",
+        "1",
+    ];
     let runs: [&[&str]; 2] = [&study, &sample];
     let undisturbed = runs.map(|run| {
         let started = Instant::now();

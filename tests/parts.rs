@@ -170,7 +170,19 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
-    let long = ["-q", "sample", "densities/cut-in-2.json", "--samples", "600000", "--backend", "cpu", "--threads", "1"];
+    let long = [
+        "-q",
+        "sample",
+        "densities/cut-in-2.json",
+        "--backend",
+        "cpu",
+        "--samples",
+        "1000000",
+        "--thw",
+        "0.6",
+        "--threads",
+        "1",
+    ];
     done(dir, &[&long[..], &["--out", "whole"]].concat());
     for out in [&["--out", "run"][..], &["--out", "parts", "--shard", "0/1"]] {
         let mut interruptions = 0;

@@ -218,7 +218,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
     std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
     let d = "density.json";
-    let cases: [(&[&str], i32, &str); 22] = [
+    let cases: [(&[&str], i32, &str); 26] = [
         (&[d, "--samples", "0"], 2, "0 samples"),
         (&[d, "--samples", "9223372036854775808"], 2, "2^63"),
         (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),

@@ -202,7 +202,8 @@ impl Study {
         }
         // Before the work, so that a folder that cannot be written to is known at once.
         let mut work = desk.begin::<Partial>(&[], true)?;
-        tracing::info!("{} lanes on {}", plan.lane_count(), backend.describe());
+        let lanes = plan.first_lane_of(work.units.end) - plan.first_lane_of(work.units.start);
+        tracing::info!("{lanes} lanes on {}", backend.describe());
         let mut swept = timed(&mut timings.sweep_s, || run_units(plan, &mut work, &how, verbosity))?;
         if self.shards.is_part() {
             desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;
