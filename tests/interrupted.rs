@@ -44,7 +44,7 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     let lanes = dir.path().join("lanes.csv");
     std::fs::write(&lanes, "of an earlier run").unwrap();
     let mut study = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .args(["-q", "--threads", "1", "study", "--reference", "--synth-recordings", "6", "--synth-duration", "600"])
+        .args(["-q", "--threads", "1", "study", "--reference", "--synth-recordings", "2", "--synth-duration", "300"])
         .args([Path::new("--out"), &dir.path().join("out"), Path::new("--lanes"), &lanes])
         .stdout(Stdio::null())
         .spawn()
