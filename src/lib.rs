@@ -3,11 +3,12 @@
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
-//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables) and
-//! [`cli`].
+//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables),
+//! [`cluster`] (scripts for workload managers) and [`cli`].
 
 mod atomic_file;
 pub mod cli;
+pub mod cluster;
 pub mod conformance;
 pub mod criterion;
 pub mod density;

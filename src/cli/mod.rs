@@ -18,6 +18,7 @@ mod sample_adaptive;
 mod sample_join;
 mod sample_lanes;
 mod simulate;
+mod slurm;
 mod source;
 mod study;
 mod synth;
@@ -85,6 +86,7 @@ enum Verb {
     Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
+    Slurm(slurm::Slurm),
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
     Devices(devices::Devices),
@@ -163,6 +165,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Compare(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
+        Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(cli.common.verbosity()),
         Verb::Devices(verb) => verb.run(),
