@@ -4,10 +4,12 @@
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables),
-//! [`interrupt`] (ending early in good order) and [`cli`].
+//! [`parts`] (shards, journals, merging), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
+//! good order) and [`cli`].
 
 mod atomic_file;
 pub mod cli;
+pub mod cluster;
 pub mod conformance;
 pub mod criterion;
 pub mod density;

@@ -22,6 +22,7 @@ mod sample_lanes;
 mod sample_plan;
 mod shard_flags;
 mod simulate;
+mod slurm;
 mod source;
 mod study;
 mod study_plan;
@@ -92,6 +93,7 @@ enum Verb {
     Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Simulate(simulate::Simulate),
+    Slurm(slurm::Slurm),
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
     Devices(devices::Devices),
@@ -172,6 +174,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Compare(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
+        Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(cli.common.verbosity()),
         Verb::Devices(verb) => verb.run(),

@@ -1,0 +1,141 @@
+//! `lanesweep slurm`: a run as a Slurm job array.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Parser};
+
+use super::{Cli, Exit, console};
+use crate::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
+use crate::report::files::{make_folder, write_atomically};
+use crate::{Error, Place, Result};
+
+/// Split a run over a Slurm job array
+///
+/// Writes three scripts: array.sbatch (one task per shard), merge.sbatch (the result of the whole run) and submit.sh,
+/// which makes the plan and submits both. Tasks that reach their time limit, crash or lose their node go back to the
+/// queue and continue. All nodes must share --out.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  lanesweep slurm study.toml --array 20 --out result\n  lanesweep slurm --array 20 \
+                        --out result --gpus 1 -- sample cut-in-2.json --samples 1000000000"
+)]
+pub struct Slurm {
+    /// Study options: short for `-- study --config STUDY.toml`
+    #[arg(value_name = "STUDY.toml", conflicts_with = "run", required_unless_present = "run")]
+    study: Option<PathBuf>,
+    /// The run: study or sample with its arguments
+    #[arg(last = true, value_name = "VERB ARGUMENTS", allow_hyphen_values = true)]
+    run: Vec<String>,
+    /// Tasks; each computes one shard
+    #[arg(long, value_name = "N")]
+    array: u32,
+    /// Folder of the run: plan, parts and the result
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Time limit of a task, as Slurm writes it
+    #[arg(long, value_name = "TIME", default_value = "02:00:00")]
+    time: String,
+    /// GPUs per task: 1, or none to compute on the processors
+    #[arg(long, value_name = "1|none", default_value = "none", value_parser = ["1", "none"])]
+    gpus: String,
+    /// Processors per task
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    cpus: u32,
+    /// Memory per task, such as 4G [default: the cluster's]
+    #[arg(long, value_name = "SIZE")]
+    mem: Option<String>,
+    /// Partition [default: the cluster's]
+    #[arg(long, value_name = "NAME")]
+    partition: Option<String>,
+    /// Account [default: yours]
+    #[arg(long, value_name = "NAME")]
+    account: Option<String>,
+    /// Quality of service [default: the account's]
+    #[arg(long, value_name = "NAME")]
+    qos: Option<String>,
+    /// How long before the time limit a task is told to stop
+    #[arg(long, value_name = "SECONDS", default_value_t = 120)]
+    signal_before: u32,
+    /// The program as the nodes find it
+    #[arg(long, value_name = "PATH", default_value = "lanesweep")]
+    program: String,
+    /// Folder for scripts and logs [default: slurm in --out]
+    #[arg(long, value_name = "DIR")]
+    scripts: Option<PathBuf>,
+}
+
+impl Slurm {
+    pub fn run(&self) -> Result<Exit> {
+        let run = self.split_run()?;
+        let out = absolute("--out", &self.out)?;
+        let scripts = match &self.scripts {
+            Some(dir) => absolute("--scripts", dir)?,
+            None => format!("{}/slurm", out.trim_end_matches('/')),
+        };
+        // A name without a folder is looked up by the shell of the job.
+        let program = match self.program.contains('/') {
+            true => absolute("--program", Path::new(&self.program))?,
+            false => self.program.clone(),
+        };
+        let start = absolute("the present folder", Path::new("."))?;
+        let array = SlurmArray { run, shards: self.array, out, scripts, start, program, resources: self.resources() };
+        let texts = array.scripts()?;
+        let folder = Path::new(&array.scripts);
+        make_folder(folder)?;
+        let mut told = String::new();
+        for (name, text, what) in [
+            ("array.sbatch", &texts.array, format!("{} tasks, one shard each", array.shards)),
+            ("merge.sbatch", &texts.merge, "the result of the whole run".to_owned()),
+            ("submit.sh", &texts.submit, "makes the plan, submits both".to_owned()),
+        ] {
+            let path = folder.join(name);
+            write_atomically(&path, text.as_bytes())?;
+            told += &format!("{}: {what}\n", path.display());
+        }
+        let submit = shell_quoted("--scripts", &format!("{}/submit.sh", array.scripts))?;
+        console::print(&format!("{told}\nSubmit with:\n  bash {submit}\n"))?;
+        Ok(Exit::Ok)
+    }
+
+    /// The run, checked as far as its flags go: a typing error is told here rather than by the cluster.
+    fn split_run(&self) -> Result<SplitRun> {
+        let words = match &self.study {
+            Some(config) => vec!["study".to_owned(), "--config".to_owned(), text("STUDY.toml", config)?],
+            None => self.run.clone(),
+        };
+        let run = SplitRun::new(&words)?;
+        if let Err(error) = Cli::try_parse_from(["lanesweep".to_owned()].into_iter().chain(words)) {
+            let message = error.to_string();
+            let problem = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+            let help = format!("see lanesweep {} --help", run.verb());
+            return Err(Error::usage(Place::item("the run"), problem, help));
+        }
+        Ok(run)
+    }
+
+    fn resources(&self) -> Resources {
+        Resources {
+            time: self.time.clone(),
+            gpu: self.gpus == "1",
+            cpus: self.cpus,
+            memory: self.mem.clone(),
+            partition: self.partition.clone(),
+            account: self.account.clone(),
+            qos: self.qos.clone(),
+            signal_before_s: self.signal_before,
+        }
+    }
+}
+
+/// A path from the root, as text: scripts run elsewhere. Links stay as they are, for nodes may resolve them otherwise.
+fn absolute(flag: &str, path: &Path) -> Result<String> {
+    let path = std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?;
+    text(flag, &path)
+}
+
+fn text(flag: &str, path: &Path) -> Result<String> {
+    path.to_str().map(str::to_owned).ok_or_else(|| {
+        let problem = format!("`{}` is not UTF-8, which a script must be", path.display());
+        Error::usage(Place::item(flag), problem, "rename it, or choose another path")
+    })
+}

@@ -1,0 +1,193 @@
+//! The scripts of `lanesweep slurm`: valid shell whatever the paths hold, and saying what they must to Slurm.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn lanesweep(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    command.env("NO_COLOR", "1").current_dir(folder).args(args).output().unwrap()
+}
+
+fn said(bytes: &[u8]) -> String {
+    // The drawing breaks long lines.
+    String::from_utf8_lossy(bytes).split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+/// Array, merge and submit script in a folder, after the verb succeeded.
+fn scripts(folder: &Path, out: &str, args: &[&str]) -> [(PathBuf, String); 3] {
+    let written = lanesweep(folder, args);
+    assert!(written.status.success(), "{}", said(&written.stderr));
+    let stdout = String::from_utf8(written.stdout).unwrap();
+    ["array.sbatch", "merge.sbatch", "submit.sh"].map(|name| {
+        let path = folder.join(out).join("slurm").join(name);
+        assert!(stdout.contains(&format!("{}: ", path.display())), "{stdout}");
+        let text = std::fs::read_to_string(&path).unwrap();
+        (path, text)
+    })
+}
+
+fn has(text: &str, line: &str) {
+    assert!(text.lines().any(|l| l == line), "no line `{line}` in\n{text}");
+}
+
+#[test]
+fn the_scripts_ask_slurm_for_what_was_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    let flags =
+        ["--time", "1-12", "--gpus", "1", "--cpus", "4", "--mem", "8G", "--partition", "gpu", "--account", "a1"];
+    let args =
+        [&["slurm", "study.toml", "--array", "20", "--out", "out", "--qos", "q", "--signal-before", "60"], &flags[..]];
+    let [array, merge, submit] = scripts(dir.path(), "out", &args.concat()).map(|(_, text)| text);
+    let out = dir.path().join("out").display().to_string();
+    for line in
+        ["--time=1-12", "--cpus-per-task=4", "--mem=8G", "--partition=gpu", "--account=a1", "--qos=q", "--requeue"]
+    {
+        has(&array, &format!("#SBATCH {line}"));
+        has(&merge, &format!("#SBATCH {line}"));
+    }
+    for line in ["--array=0-19", "--gres=gpu:1", "--signal=B:USR1@60", "--open-mode=append"] {
+        has(&array, &format!("#SBATCH {line}"));
+    }
+    has(&array, &format!("#SBATCH --output={out}/slurm/%A_%a.log"));
+    has(
+        &array,
+        &format!(
+            "lanesweep study --plan {out}/plan.json --shard \"$SLURM_ARRAY_TASK_ID/20\" --out {out} --backend gpu \
+             --threads 4 &"
+        ),
+    );
+    assert!(array.contains("scontrol requeue \"$task\""));
+    has(&merge, &format!("exec lanesweep merge {out} --threads 4"));
+    assert!(!merge.contains("gpu:1") && !merge.contains("--array"));
+    has(&submit, &format!("lanesweep study --config study.toml --plan-only --out {out}"));
+    has(&submit, &format!("array=$(sbatch --parsable {out}/slurm/array.sbatch)"));
+    assert!(submit.contains("--dependency=\"afterok:$array\""));
+}
+
+#[test]
+fn any_path_gives_valid_shell() {
+    let dir = tempfile::tempdir().unwrap();
+    for (k, out) in ["plain", "my runs", "it's", "a\"b", "$HOME", "50%", "`id`", "a;b&c", "#1"].iter().enumerate() {
+        let program = format!("./{out}/lanesweep {k}");
+        let run = ["--", "sample", "densities/cut in $1's.json", "--samples", "1000000000"];
+        let args = [&["slurm", "--array", "3", "--program", &program, "--out", out], &run[..]].concat();
+        for (path, _) in scripts(dir.path(), out, &args) {
+            let parsed = Command::new("bash").arg("-n").arg(&path).output().unwrap();
+            assert!(parsed.status.success(), "{}", said(&parsed.stderr));
+            lint(&path);
+        }
+    }
+}
+
+/// By shellcheck, where it is installed.
+fn lint(path: &Path) {
+    match Command::new("shellcheck").arg("--severity=warning").arg(path).output() {
+        Ok(lint) => assert!(lint.status.success(), "{}", String::from_utf8_lossy(&lint.stdout)),
+        Err(_) => eprintln!("SKIPPED: shellcheck is not installed"),
+    }
+}
+
+#[test]
+fn submit_gives_the_program_the_arguments_as_typed() {
+    let dir = tempfile::tempdir().unwrap();
+    let echo = dir.path().join("echo args");
+    std::fs::write(&echo, "#!/bin/sh\nfor a in \"$@\"; do echo \"<$a>\"; done\nexit 1\n").unwrap();
+    std::fs::set_permissions(&echo, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let run = ["--", "sample", "it's $HOME \"x\".json", "--samples=5", "--thw", "1.2,0.4"];
+    let args = [&["slurm", "--array", "3", "--program", "./echo args", "--out", "o"], &run[..]].concat();
+    let [_, _, (submit, _)] = scripts(dir.path(), "o", &args);
+    let ended = Command::new("bash").arg(submit).current_dir("/").output().unwrap();
+    // The plan failed: nothing is submitted, and the status is the program's.
+    assert_eq!(ended.status.code(), Some(1));
+    let out = dir.path().join("o");
+    let expected = format!(
+        "<sample>\n<it's $HOME \"x\".json>\n<--samples=5>\n<--thw>\n<1.2,0.4>\n<--plan-only>\n<--out>\n<{}>\n",
+        out.display()
+    );
+    assert_eq!(String::from_utf8(ended.stdout).unwrap(), expected);
+}
+
+/// The array script with a program in lanesweep's place: its exit status, and what it asked of `scontrol`.
+fn task(program: &str, restarts: u32, signal: Option<&str>) -> (Option<i32>, String) {
+    let dir = tempfile::tempdir().unwrap();
+    let bin = dir.path().join("bin");
+    std::fs::create_dir(&bin).unwrap();
+    let asked = dir.path().join("asked");
+    let ready = dir.path().join("ready");
+    for (name, text) in [
+        ("lanesweep", format!("#!/usr/bin/env bash\nready() {{ : >'{}'; }}\n{program}\n", ready.display())),
+        ("scontrol", format!("#!/bin/sh\necho \"$@\" >>'{}'\n", asked.display())),
+    ] {
+        std::fs::write(bin.join(name), text).unwrap();
+        std::fs::set_permissions(bin.join(name), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    }
+    let [(array, _), ..] = scripts(dir.path(), "o", &["slurm", "s.toml", "--array", "3", "--out", "o"]);
+    let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
+    let mut shell = Command::new("bash");
+    shell.arg(array).env("PATH", path).env("SLURM_ARRAY_JOB_ID", "7").env("SLURM_ARRAY_TASK_ID", "2");
+    let mut child = shell.env("SLURM_RESTART_COUNT", restarts.to_string()).spawn().unwrap();
+    if let Some(signal) = signal {
+        while !ready.exists() {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    }
+    let status = child.wait().unwrap().code();
+    (status, std::fs::read_to_string(asked).unwrap_or_default())
+}
+
+/// As lanesweep: told to stop, it needs a moment, then ends with 75.
+const STOPS_WHEN_TOLD: &str = "trap 'sleep 0.2; exit 75' TERM\nready\nwhile :; do sleep 0.05; done";
+
+#[test]
+fn a_task_goes_back_to_the_queue_when_it_can_continue_and_only_then() {
+    let requeued = "requeue 7_2\n".to_owned();
+    let nothing = String::new();
+    assert_eq!(task("exit 0", 0, None), (Some(0), nothing.clone()));
+    // Before the time limit.
+    assert_eq!(task(STOPS_WHEN_TOLD, 0, Some("-USR1")), (Some(75), requeued.clone()));
+    assert_eq!(task("exit 75", 50, None), (Some(75), requeued.clone()));
+    // scancel must not bring it back.
+    assert_eq!(task(STOPS_WHEN_TOLD, 0, Some("-TERM")), (Some(75), nothing.clone()));
+    // A crash.
+    assert_eq!(task("kill -KILL $$", 9, None), (Some(137), requeued));
+    assert_eq!(task("kill -KILL $$", 10, None), (Some(137), nothing.clone()));
+    // An error comes again however often it is tried.
+    assert_eq!(task("exit 3", 0, None), (Some(3), nothing));
+}
+
+#[test]
+fn what_cannot_work_is_refused_and_nothing_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let start = ["slurm", "--array", "3", "--out", "o"];
+    for (flags, told) in [
+        (&["--", "sample", "a.json", "--shard", "0/3"][..], "--shard cannot be given after the `--`"),
+        (&["--", "study", "--out=x"], "--out cannot be given"),
+        (&["--", "study", "--plan", "p.json"], "--plan cannot be given"),
+        (&["--", "study", "--plan-only"], "--plan-only cannot be given"),
+        (&["--", "study", "--stop-after", "9"], "--stop-after cannot be given"),
+        (&["--", "study", "--threads", "9"], "--cpus N"),
+        (&["--", "study", "--backend", "cpu"], "--gpus 1"),
+        (&["--", "fit"], "`fit` cannot be split over tasks"),
+        (&["--", "sample", "a.json", "--sampels", "3"], "--sampels"),
+        (&["--", "sample", "a\nb.json"], "line break"),
+        (&["--time", "2h", "--", "study"], "--time: `2h` is no time limit"),
+        (&["--mem", "lots", "--", "study"], "--mem: `lots`"),
+        (&["--partition", "a b", "--", "study"], "--partition: `a b`"),
+        (&["--account", "x\n#SBATCH --uid=0", "--", "study"], "--account"),
+        (&["--gpus", "2", "--", "study"], "--gpus"),
+        (&["--cpus", "0", "--", "study"], "--cpus: a task needs a processor"),
+        (&["--signal-before", "0", "--", "study"], "--signal-before"),
+        (&["s.toml", "--", "study"], "cannot be used with"),
+        (&[], "required arguments"),
+    ] {
+        let refused = lanesweep(dir.path(), &[&start[..], flags].concat());
+        assert_eq!(refused.status.code(), Some(2), "{flags:?}");
+        let stderr = said(&refused.stderr);
+        assert!(stderr.contains(told), "{flags:?}: {stderr}");
+    }
+    for tasks in ["0", "100000"] {
+        assert_eq!(lanesweep(dir.path(), &["slurm", "s.toml", "--array", tasks, "--out", "o"]).status.code(), Some(2));
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
