@@ -16,6 +16,7 @@ pub mod driver;
 pub mod error;
 pub mod estimate;
 pub mod gpu;
+mod input_file;
 pub mod mining;
 pub mod parameterization;
 pub mod profile;

@@ -9,7 +9,7 @@ use super::tally::SampleTally;
 use crate::atomic_file::AtomicFile;
 use crate::criterion::Criterion;
 use crate::sweep::hex;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 /// Largest part that is read: counts, worst lanes and a map are far smaller.
@@ -53,7 +53,7 @@ pub fn read_part(path: &Path) -> Result<(Criterion, SampleTally)> {
     if std::fs::metadata(path).map_err(io)?.len() > LARGEST_BYTES {
         return Err(wrong("it is larger than any part".to_owned()));
     }
-    let text = std::fs::read(path).map_err(io)?;
+    let text = input_file::read(path, LARGEST_BYTES)?;
     let value: serde_json::Value =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no whole JSON: {e}")))?;
     match value.get("lanesweep_part").map(serde_json::Value::as_u64) {
@@ -69,5 +69,6 @@ pub fn read_part(path: &Path) -> Result<(Criterion, SampleTally)> {
     if checksum(&file.tally)? != file.sha256 {
         return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
     }
+    file.tally.check().map_err(|problem| wrong(format!("its counts cannot be: {problem}")))?;
     Ok((file.criterion, file.tally))
 }
