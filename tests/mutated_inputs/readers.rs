@@ -220,7 +220,9 @@ fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     for (_, sums) in &part.sums {
         sums.total();
     }
-    part.merge(part.clone())
+    // The same part twice has to be refused.
+    assert!(part.covered() == 0 || part.merge(part.clone()).is_err());
+    Ok(())
 }
 
 fn partial(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()> {
