@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// Which vehicles the ego's driver heeds in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -131,7 +131,7 @@ impl Profile {
                 ),
             ));
         }
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
         Profile::parse(&text, &Place::file(path))
     }
 

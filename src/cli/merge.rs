@@ -57,7 +57,7 @@ fn merge_study(dir: &Path, plan: &Path) -> Result<Exit> {
         swept.rechecked_lanes += part.lanes_redone_and_rechecked[1];
         partial = part.segments.into_iter().try_fold(partial, Partial::merge)?;
     }
-    if !partial.is_complete(&study.plan) {
+    if !partial.is_complete(&study.plan) || !partial.fits(&study.plan) {
         let problem = "the parts do not hold every unit that their names stand for";
         return Err(Error::input(Place::file(dir), problem, "make them again"));
     }

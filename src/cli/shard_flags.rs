@@ -87,7 +87,7 @@ impl Desk<'_> {
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
-    pub fn is_done<T: serde::de::DeserializeOwned>(&self) -> Result<bool> {
+    pub fn is_done<T: Countable>(&self) -> Result<bool> {
         let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
         read_part::<T>(&path, self.run_sha256, &self.units(), "run this command again").map(|_| true)
     }

@@ -105,7 +105,7 @@ impl Replay {
     fn cut_in(row: &Row, mut profile: Profile, model: ModelId) -> Result<Replay> {
         let dt = profile.frame.dt_s;
         let (v_ego, v_other) = (row.not_negative("ego_kmh")? / 3.6, row.not_negative("cutin_kmh")? / 3.6);
-        let v_lateral = row.not_negative("vlat")?;
+        let v_lateral = lateral_speed(row)?;
         let run_up = row.number("n_prepended")?;
         if !(0.0..=1e4).contains(&run_up) || run_up.fract() != 0.0 {
             return Err(Error::input(row.place("n_prepended"), format!("{run_up}"), "expected 0 or a small count"));
@@ -163,7 +163,7 @@ impl Replay {
                 length_m: LENGTH_M,
                 width_m: WIDTH_M,
                 speed: Speed::constant(v0),
-                lateral: cut_out_lateral(row.not_negative("vlat")?, dt),
+                lateral: cut_out_lateral(lateral_speed(row)?, dt),
             },
             ahead: Some(Ahead {
                 vehicle: Participant {
@@ -197,6 +197,18 @@ impl Replay {
         };
         Replayed { outcome, speed, min_ttc, min_gap }
     }
+}
+
+/// Slowest lane change that is replayed, m/s: it takes longer than any run.
+const LEAST_LATERAL_MPS: f64 = 1e-3;
+
+/// 0 or a speed at which the change ends in a number of samples that can be held.
+fn lateral_speed(row: &Row) -> Result<f64> {
+    let value = row.not_negative("vlat")?;
+    if value == 0.0 || value >= LEAST_LATERAL_MPS {
+        return Ok(value);
+    }
+    Err(Error::input(row.place("vlat"), format!("{value}"), "expected 0 or at least 0.001 m/s"))
 }
 
 /// Lateral speeds `w`, counted towards the ego: the run-up, one sample at full speed, then the plain change.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// What a table holds, told by its columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub struct Row<'a> {
 impl Table {
     /// Reads a whole table; it must have a header and at least one row.
     pub fn read(path: &Path) -> Result<Table> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let text = input_file::read_text(path, input_file::LARGEST_TABLE_BYTES)?;
         let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let broken = |e: csv::Error| {

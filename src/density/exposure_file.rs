@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::exposure::Driven;
 use super::json_rows::to_readable_json;
 use crate::atomic_file::AtomicFile;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 
@@ -65,10 +65,9 @@ impl ExposureFile {
     /// belongs to other scenarios than those with `scenarios_sha256`.
     pub fn read_beside(scenarios: &Path, scenarios_sha256: &str) -> Result<Option<ExposureFile>> {
         let path = Self::path_of(scenarios);
-        let text = match std::fs::read(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(Error::io(&path, "read", e)),
+        let text = match input_file::read(&path, input_file::LARGEST_SETTINGS_BYTES) {
+            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            read => read?,
         };
         let wrong = |place: Place, problem: String| {
             let help = "mine the recordings again, or remove this file and give --hours and --km";

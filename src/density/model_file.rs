@@ -22,7 +22,7 @@ use crate::atomic_file::AtomicFile;
 use crate::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
 use crate::scenario::Category;
 use crate::sweep::hex;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// The version that this program writes and reads.
 const VERSION: u64 = 1;
@@ -119,6 +119,8 @@ impl File {
             return wrong("parameterization", problem);
         };
         let below = |error: Error| inside(place, error);
+        // Before anything is made of them: lengths follow from these numbers.
+        self.options.validate().map_err(below)?;
         let reduction = self.basis.map(|b| {
             let basis = SvdBasis {
                 weights: b.weights,
@@ -253,8 +255,7 @@ fn broken(place: &Place, error: &serde_json::Error) -> Error {
 /// missing or unknown field, a number that is not finite, lengths that do not fit, a content that does not have
 /// the SHA-256 in the file, or more than [`LARGEST_FILE_BYTES`].
 pub fn read_density(path: &Path) -> Result<DensityModel> {
-    let io = |e| Error::io(path, "read", e);
-    let bytes = std::fs::metadata(path).map_err(io)?.len();
+    let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
     if bytes > LARGEST_FILE_BYTES {
         return Err(Error::input(
             Place::file(path),
@@ -262,7 +263,7 @@ pub fn read_density(path: &Path) -> Result<DensityModel> {
             "fit on fewer scenarios, or check that this is the right file",
         ));
     }
-    DensityModel::from_json(&std::fs::read(path).map_err(io)?, &Place::file(path))
+    DensityModel::from_json(&input_file::read(path, LARGEST_FILE_BYTES)?, &Place::file(path))
 }
 
 /// Writes a density file: whole or not at all.

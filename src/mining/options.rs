@@ -170,7 +170,7 @@ impl MiningOptions {
     /// Refuses values with which the definitions lose their meaning.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the option: not finite, negative, or zero where a length of time or way
+    /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a length of time or way
     /// is needed.
     pub fn validate(&self) -> Result<()> {
         let positive = [
@@ -206,18 +206,21 @@ impl MiningOptions {
             )
         };
         for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(refused(name, value, "a finite number above 0"));
+            if !(value > 0.0 && value <= LARGEST) {
+                return Err(refused(name, value, "above 0 and at most 1e6"));
             }
         }
         for (name, value) in at_least_zero {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(refused(name, value, "a finite number of at least 0"));
+            if !(0.0..=LARGEST).contains(&value) {
+                return Err(refused(name, value, "at least 0 and at most 1e6"));
             }
         }
         Ok(())
     }
 }
+
+/// Beyond this no time, way or speed tells anything about traffic, and its count in samples gets out of range.
+const LARGEST: f64 = 1e6;
 
 /// Positions in metres, filter values in their unit and times in seconds this near to a limit count as
 /// equal to it (method.md §3).

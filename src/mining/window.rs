@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// Least value over `x[k − window ..= k]` for every `k`; over what there is for `k < window`, where a
 /// caller that needs a complete window must not look.
 pub(super) fn trailing_min(x: &[f64], window: usize) -> Vec<f64> {
-    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window + 2);
+    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window.min(x.len()) + 2);
     x.iter()
         .enumerate()
         .map(|(k, &value)| {
@@ -13,7 +13,7 @@ pub(super) fn trailing_min(x: &[f64], window: usize) -> Vec<f64> {
                 candidates.pop_back();
             }
             candidates.push_back(k);
-            while candidates.front().is_some_and(|&j| j + window < k) {
+            while candidates.front().is_some_and(|&j| k - j > window) {
                 candidates.pop_front();
             }
             candidates.front().map_or(value, |&j| x[j])

@@ -14,4 +14,8 @@ impl Countable for Partial {
     fn join(self, other: Self) -> Result<Self> {
         self.merge(other)
     }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        Partial::check(self)
+    }
 }

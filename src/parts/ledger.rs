@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::journal::{Journal, Records};
-use crate::{Error, Result, interrupt};
+use crate::{Error, Place, Result, interrupt};
 
 /// Counts over a set of units of one plan that join in any order.
 pub trait Countable: Sized + Clone + Serialize + DeserializeOwned {
@@ -17,6 +17,11 @@ pub trait Countable: Sized + Clone + Serialize + DeserializeOwned {
     /// # Errors
     /// Where a unit is in both, or the plans differ.
     fn join(self, other: Self) -> Result<Self>;
+    /// Whether counts that were read from a file can be those of a run.
+    ///
+    /// # Errors
+    /// What contradicts itself.
+    fn check(&self) -> std::result::Result<(), String>;
 }
 
 /// Finished counts of an interval of units. Where the interval has cuts (the checkpoints of a sampling run), counts on
@@ -54,6 +59,11 @@ impl<T: Countable> Ledger<T> {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
         }
         for record in found.records {
+            let refused = |problem| {
+                let help = "move the journal away; what it holds is then computed again";
+                Error::input(Place::file(journal.path()), format!("its counts cannot be: {problem}"), help)
+            };
+            record.check().map_err(refused)?;
             self.place(record)?;
         }
         self.journal = Some(journal);
@@ -219,6 +229,10 @@ mod tests {
             self.0.extend(other.0);
             self.0.sort_unstable();
             Ok(self)
+        }
+
+        fn check(&self) -> std::result::Result<(), String> {
+            Ok(())
         }
     }
 

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::path::Path;
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::ledger::Countable;
 use super::sealed::{read_sealed, seal};
 use crate::atomic_file::AtomicFile;
 use crate::{Error, Place, Result};
@@ -41,12 +41,7 @@ pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
-pub fn read_part<T: DeserializeOwned>(
-    path: &Path,
-    run_sha256: &str,
-    units: &Range<u64>,
-    again: &str,
-) -> Result<Part<T>> {
+pub fn read_part<T: Countable>(path: &Path, run_sha256: &str, units: &Range<u64>, again: &str) -> Result<Part<T>> {
     let redo = format!("delete it and make it again: {again}");
     let (part, _): (Part<T>, _) = read_sealed("part", path, LARGEST_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
@@ -57,6 +52,9 @@ pub fn read_part<T: DeserializeOwned>(
     if part.units != *units {
         let problem = format!("it holds units {:?}, its name stands for {units:?}", part.units);
         return Err(wrong(problem, &redo));
+    }
+    for segment in &part.segments {
+        segment.check().map_err(|problem| wrong(format!("its counts cannot be: {problem}"), &redo))?;
     }
     Ok(part)
 }

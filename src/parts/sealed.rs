@@ -64,14 +64,7 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
 pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, most_bytes: u64, again: &str) -> Result<(T, String)> {
-    let io = |e| Error::io(path, "read", e);
-    let place = Place::file(path);
-    let about = std::fs::metadata(path).map_err(io)?;
-    if !about.is_file() || about.len() > most_bytes {
-        let problem = format!("this is no {kind}: it is no file of at most {most_bytes} bytes");
-        return Err(Error::input(place, problem, again));
-    }
-    unseal(kind, &std::fs::read(path).map_err(io)?, &place, again)
+    unseal(kind, &crate::input_file::read(path, most_bytes)?, &Place::file(path), again)
 }
 
 /// The kind of a sealed file, without reading its content.
@@ -83,15 +76,10 @@ pub fn kind_of(path: &Path, most_bytes: u64) -> Result<String> {
     struct Kind {
         lanesweep: String,
     }
-    let io = |e| Error::io(path, "read", e);
     let wrong = |problem: String| {
         Error::input(Place::file(path), problem, "give a file or folder that a run in parts has written")
     };
-    let about = std::fs::metadata(path).map_err(io)?;
-    if !about.is_file() || about.len() > most_bytes {
-        return Err(wrong("this is no file of a run in parts".to_owned()));
-    }
-    let kind: Kind = serde_json::from_slice(&std::fs::read(path).map_err(io)?)
+    let kind: Kind = serde_json::from_slice(&crate::input_file::read(path, most_bytes)?)
         .map_err(|e| wrong(format!("this is no whole file of a run in parts: {e}")))?;
     Ok(kind.lanesweep)
 }

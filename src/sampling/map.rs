@@ -109,7 +109,8 @@ impl MapCounts {
     }
 
     pub(super) fn add(&mut self, other: &MapCounts) {
-        let sum = |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
+        let sum =
+            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
         sum(&mut self.lanes, &other.lanes);
         for (ours, theirs) in self.failures.iter_mut().zip(&other.failures) {
             sum(ours, theirs);

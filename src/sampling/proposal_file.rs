@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::atomic_file::AtomicFile;
 use crate::density::{DensityModel, LARGEST_FILE_BYTES, Mixture};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 
@@ -61,7 +61,7 @@ pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
     if std::fs::metadata(path).map_err(io)?.len() > LARGEST_FILE_BYTES {
         return Err(wrong("it is larger than any proposal".to_owned()));
     }
-    let text = std::fs::read(path).map_err(io)?;
+    let text = input_file::read(path, LARGEST_FILE_BYTES)?;
     let value: serde_json::Value = serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
     match value.get("lanesweep_proposal").map(serde_json::Value::as_u64) {
         None => return Err(wrong("it is no proposal: `lanesweep_proposal` is missing".to_owned())),

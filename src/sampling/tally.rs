@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::limit_state::limit_state;
-use super::map::{MapAxes, MapCounts};
+use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use crate::criterion::Criterion;
 use crate::parts::Countable;
 use crate::sweep::generated::{ATTEMPTS, Generator};
@@ -165,9 +165,10 @@ impl SampleTally {
 
     /// Adds counts of other samples; the covered intervals are the caller's to join.
     fn add(&mut self, other: SampleTally) {
-        let sum = |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
-        self.voids += other.voids;
-        self.tries += other.tries;
+        let sum =
+            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
+        self.voids = self.voids.saturating_add(other.voids);
+        self.tries = self.tries.saturating_add(other.tries);
         sum(&mut self.failures, &other.failures);
         sum(&mut self.squares, &other.squares);
         sum(&mut self.capped, &other.capped);
@@ -192,6 +193,9 @@ impl SampleTally {
             return Err(Error::input(place(), problem, "join only parts of one run: same density, flags and seed"));
         }
         let axes = |tally: &SampleTally| tally.map.as_ref().map(|map| map.axes.clone());
+        if self.shape() != other.shape() {
+            return Err(Error::input(place(), "the parts have other models or headways", "make the part again"));
+        }
         if self.worst_limit != other.worst_limit || axes(&self) != axes(&other) {
             let help = "make all parts with the same --worst, --criterion and --map";
             return Err(Error::input(place(), "the parts counted different things", help));
@@ -213,6 +217,37 @@ impl SampleTally {
         self.covered = joined;
         self.add(other);
         Ok(self)
+    }
+
+    /// Numbers of cells: they follow from models, headways and criteria.
+    fn shape(&self) -> [usize; 4] {
+        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len()]
+    }
+
+    /// Whether counts that were read from a file can be those of a run.
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
+        let mut free_from = 0;
+        for range in &self.covered {
+            if range.start < free_from || range.end <= range.start || range.end >> 63 != 0 {
+                return Err(format!("samples {} to {} are misplaced", range.start, range.end));
+            }
+            free_from = range.end;
+        }
+        let (models, criteria, samples) = (self.worst.len(), Criterion::ALL.len(), self.samples());
+        let cells = self.capped.len();
+        let mut problems = vec![
+            (self.squares.len() != models * criteria || self.failures.len() != cells * criteria, "lengths differ"),
+            (models == 0 || cells == 0 || !cells.is_multiple_of(models), "no whole number of headways per model"),
+            (self.worst.iter().any(|lanes| lanes.len() > self.worst_limit), "more worst lanes than are kept"),
+            (self.voids > samples, "more void samples than samples"),
+            (self.failures.iter().chain(&self.capped).any(|n| *n > samples), "more failures than samples"),
+        ];
+        if let Some(map) = &self.map {
+            let complete = |cells: &Vec<u64>| cells.len() == MAP_CELLS * MAP_CELLS;
+            let fits = complete(&map.lanes) && map.failures.len() == models && map.failures.iter().all(complete);
+            problems.push((!fits, "the map has another number of cells"));
+        }
+        problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
     }
 
     /// Worst lanes kept per model.
@@ -248,6 +283,10 @@ impl Countable for SampleTally {
 
     fn join(self, other: Self) -> Result<Self> {
         self.merge(other)
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        SampleTally::check(self)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::estimate::{BlockSums, WeightSums};
 use crate::sweep::hex;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 const VERSION: u64 = 1;
 /// Largest part that is read: a few nodes per model.
@@ -91,7 +91,7 @@ pub fn read_weighted_part(path: &Path) -> Result<Option<WeightedPart>> {
     if std::fs::metadata(path).map_err(io)?.len() > LARGEST_BYTES {
         return Ok(None);
     }
-    let text = std::fs::read(path).map_err(io)?;
+    let text = input_file::read(path, LARGEST_BYTES)?;
     let Ok(value) = serde_json::from_slice::<serde_json::Value>(&text) else { return Ok(None) };
     match value.get("lanesweep_weighted_part").map(serde_json::Value::as_u64) {
         None => return Ok(None),
@@ -101,6 +101,9 @@ pub fn read_weighted_part(path: &Path) -> Result<Option<WeightedPart>> {
     let file: File = serde_json::from_slice(&text).map_err(|e| wrong(format!("it is damaged: {e}")))?;
     if hex(&Sha256::digest(text_of(&file.part)?)) != file.sha256 {
         return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
+    }
+    if let Some(problem) = file.part.sums.iter().find_map(|(_, sums)| sums.check().err()) {
+        return Err(wrong(format!("its sums cannot be: {problem}")));
     }
     Ok(Some(file.part))
 }

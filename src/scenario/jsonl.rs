@@ -5,8 +5,7 @@
 //! other programs can be read; what a scenario cannot do without is checked line by line.
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 
 use serde_json::Value;
@@ -15,6 +14,7 @@ use super::schema::wrong_field;
 use super::{Category, Other, Scenario};
 use crate::atomic_file::AtomicFile;
 use crate::error::{Error, Place, Result};
+use crate::input_file;
 
 /// Reads a scenario file. A byte-order mark, Windows line ends and empty lines are accepted.
 ///
@@ -25,17 +25,23 @@ use crate::error::{Error, Place, Result};
 /// is not above 0, a kept cut-out without the vehicle ahead or its gap, an id that came before, or a file
 /// without scenarios.
 pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
-    let file = File::open(path).map_err(|e| Error::io(path, "read", e))?;
+    let file = input_file::open(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut scenarios = Vec::new();
     let mut line_of: HashMap<String, u64> = HashMap::new();
     let mut line = Vec::new();
     for row in 1.. {
         line.clear();
-        if reader.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))? == 0 {
-            break;
-        }
         let place = Place::file(path).row(row);
+        let mut up_to_longest = reader.by_ref().take(LONGEST_LINE_BYTES);
+        match up_to_longest.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))? as u64 {
+            0 => break,
+            LONGEST_LINE_BYTES => {
+                let problem = format!("the line is longer than {} MiB", LONGEST_LINE_BYTES >> 20);
+                return Err(Error::input(place, problem, "expected one scenario a line"));
+            }
+            _ => (),
+        }
         let text = std::str::from_utf8(&line)
             .map_err(|_| Error::input(place.clone(), "not UTF-8 text", "save the file as UTF-8"))?;
         let text = if row == 1 { text.trim_start_matches('\u{feff}') } else { text }.trim();
@@ -123,7 +129,7 @@ impl Problem {
 /// What no type says: lengths, signs and what a category needs.
 fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
-    above_zero("fps", s.fps)?;
+    expect((LEAST_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
     above_zero("lane_width", s.lane_width)?;
     at_least_zero("ego.v0", s.ego.v0)?;
     above_zero("ego.length", s.ego.length)?;
@@ -173,6 +179,13 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     }
     Ok(())
 }
+
+/// Longest line: hours at 1000 samples a second fit.
+const LONGEST_LINE_BYTES: u64 = 64 << 20;
+
+/// Least sample rate, Hz. No motion can be told at a lower one; and two samples a day apart would be replayed in
+/// millions of steps, so that a short file could demand any memory.
+const LEAST_RATE_HZ: f64 = 0.1;
 
 /// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
 const LARGEST: f64 = 1e6;

@@ -129,7 +129,7 @@ impl Series {
     /// Long enough to see every event: motions are constant after their last event.
     fn of(motion: &Motion<f64>, tables: &Tables<f64>, step_cap: u32) -> Series {
         let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
-        let steps = step_cap.min(events.into_iter().max().unwrap_or(0) + 2);
+        let steps = step_cap.min(events.into_iter().max().unwrap_or(0).saturating_add(2));
         Series {
             lateral_m: (0..steps).map(|i| motion.lateral(tables, i).position).collect(),
             speed_mps: (0..steps).map(|i| motion.speed(tables, i)).collect(),

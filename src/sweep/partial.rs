@@ -193,7 +193,7 @@ impl Partial {
             units,
             worst_limit: self.worst_limit,
             worst: keep_worst(worst, self.worst_limit),
-            valued_lanes: self.valued_lanes + other.valued_lanes,
+            valued_lanes: self.valued_lanes.saturating_add(other.valued_lanes),
         })
     }
 
@@ -228,6 +228,37 @@ impl Partial {
             }
         }
         intervals
+    }
+
+    /// Whether counts that were read from a file can be those of a study.
+    ///
+    /// # Errors
+    /// What contradicts itself.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        if self.units.windows(2).any(|pair| pair[0].unit >= pair[1].unit) {
+            return Err("its units are not in order, or not each there once".to_owned());
+        }
+        if self.units.last().is_some_and(|last| last.unit >> 63 != 0) {
+            return Err("a unit is beyond any plan".to_owned());
+        }
+        if self.worst.len() > self.worst_limit {
+            return Err("it has more worst lanes than it keeps".to_owned());
+        }
+        Ok(())
+    }
+
+    /// Has every unit the counts that the plan's variants, models and criteria make?
+    pub fn fits(&self, plan: &LanePlan) -> bool {
+        let models = plan.models.len();
+        self.units.iter().all(|unit| {
+            let block = plan.blocks.iter().rev().find(|block| block.first_unit <= unit.unit && !block.units.is_empty());
+            block.is_some_and(|block| {
+                let cells = block.variants.len() * models;
+                unit.unit < block.first_unit + block.units.len()
+                    && unit.cells.len() == cells * Criterion::ALL.len()
+                    && unit.capped.len() == cells
+            })
+        })
     }
 
     /// Does it hold every unit of the plan?
@@ -270,6 +301,7 @@ impl Partial {
         if sealed.get("sha256").and_then(|s| s.as_str()) != Some(partial.checksum()?.as_str()) {
             return Err(error("the checksum does not fit: the file is damaged".to_owned(), damaged));
         }
+        partial.check().map_err(|problem| error(format!("its counts cannot be: {problem}"), damaged))?;
         Ok(partial)
     }
 

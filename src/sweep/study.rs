@@ -8,7 +8,7 @@ use crate::driver::ModelId;
 use crate::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdFit, recorded_case};
 use crate::profile::Profile;
 use crate::scenario::{Case, Category, Scenario, Tables};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// What a study sweeps.
 #[derive(Debug, Clone)]
@@ -61,12 +61,16 @@ impl CaseSource for CaseTable {
     }
 }
 
+/// Steps of all series together: the records of lanes point into the tables with 32 bits.
+const MOST_STEPS: f64 = 4e9;
+
 /// Plans a study over mined scenarios: the kept ones are simulated, in the order given; a decomposition
 /// may be fitted on more (see [`SvdFit`]).
 pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyPlan> {
     let dt_s = profile.frame.dt_s;
     let parameterization = &options.parameterization;
     let mut table = CaseTable { tables: Tables::default(), cases: Vec::new(), variants: Vec::new() };
+    let mut steps = 0.0;
     let (mut blocks, mut reductions, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for &category in &options.categories {
         let of_category = || scenarios.iter().filter(move |s| s.category == category);
@@ -88,6 +92,16 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
         };
         let ids: Vec<ParameterizationId> =
             ParameterizationId::of(category).filter(|id| id.kind == Kind::Kinematic || reduction.is_some()).collect();
+        steps += kept.iter().map(|s| s.duration_s() / dt_s + 2.0).sum::<f64>() * (1 + ids.len()) as f64;
+        if steps > MOST_STEPS {
+            return Err(Error::usage(
+                Place::item("`frame.dt_s`"),
+                format!(
+                    "{dt_s} s: the scenarios and their parameterizations have {steps:.1e} steps, the tables {MOST_STEPS:.1e}"
+                ),
+                "use a longer time step, or study fewer or shorter scenarios at once",
+            ));
+        }
         // Cases in parallel, records in order: the tables must not depend on the number of threads.
         let cases: Vec<Vec<Case>> = kept
             .par_iter()

@@ -12,7 +12,7 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 use sha2::{Digest, Sha256};
 
 use super::number;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// What identifies a file's content in a run's record.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -55,7 +55,7 @@ impl Table {
     /// # Errors
     /// If it cannot be read, is empty, or has no comma-separated header in UTF-8.
     pub fn open(path: &Path, known: &'static [&'static str]) -> Result<Self> {
-        let file = File::open(path).map_err(|source| Error::io(path, "read", source))?;
+        let file = input_file::open(path)?;
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)

@@ -75,7 +75,7 @@ pub(super) fn header(columns: &[&str]) -> String {
 
 /// Frame rates outside these bounds are mistakes (a period instead of a rate, for one), and the counts
 /// that follow from them would not fit anywhere.
-pub(super) const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;
+pub(super) const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
 
 /// Most lane lines of one carriageway; more is damage.
 pub(super) const LANE_LINES_LIMIT: usize = 256;

@@ -1,0 +1,269 @@
+//! Every reader of the library: valid inputs for it, and what a program does with what it reads.
+
+use std::path::Path;
+
+use lanesweep::conformance::{Table, TableKind, compare_functions, compare_jrc, compare_lanes};
+use lanesweep::criterion::Criterion;
+use lanesweep::density::{DensityModel, Exposure, ExposureFile, read_density};
+use lanesweep::driver::ModelId;
+use lanesweep::mining::{MiningOptions, mine, mine_folder};
+use lanesweep::parameterization::ParameterizationOptions;
+use lanesweep::parts::{Journal, Ledger, read_part, read_sealed};
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{
+    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples, read_proposal,
+    read_weighted_part,
+};
+use lanesweep::scenario::{Scenario, read_scenarios};
+use lanesweep::score::ScoreOptions;
+use lanesweep::sweep::{
+    Backend, CpuBackend, Headway, LanePlan, Partial, PlanContent, StudyOptions, Wanted, plan_study,
+};
+use lanesweep::{Error, Place, Result};
+use sha2::{Digest, Sha256};
+
+use super::seeds::{Seeds, density_of};
+
+/// Puts the checksum right that a change has spoilt.
+pub type Reseal = fn(&[u8], &Path, &Seeds) -> Option<Vec<u8>>;
+
+/// One kind of input.
+pub struct Reader {
+    pub name: &'static str,
+    pub seeds: Vec<Vec<u8>>,
+    /// Reads the bytes, alone in a folder, and uses what was read; `heavy` for the steps that take longer.
+    pub read: fn(&[u8], &Path, &Seeds, heavy: bool) -> Result<()>,
+    /// Makes a file's checksum fit again.
+    pub reseal: Option<Reseal>,
+}
+
+pub fn all(seeds: &Seeds) -> Vec<Reader> {
+    let plain = |name, seeds: &[Vec<u8>], read| Reader { name, seeds: seeds.to_vec(), read, reseal: None };
+    let [tracks, tracks_meta, recording_meta] = &seeds.recording;
+    let mut readers = vec![
+        plain("tracks", std::slice::from_ref(tracks), |b, d, s, _| recording(0, b, d, s)),
+        plain("tracksMeta", std::slice::from_ref(tracks_meta), |b, d, s, _| recording(1, b, d, s)),
+        plain("recordingMeta", std::slice::from_ref(recording_meta), |b, d, s, _| recording(2, b, d, s)),
+        plain("scenarios", &seeds.scenario_files, scenarios),
+        plain("exposure", &seeds.exposures, exposure),
+        plain("conformance table", &seeds.tables, table),
+        plain("profile", &seeds.profiles, profile),
+        plain("mining options", &seeds.mining, mining),
+        plain("parameterization options", &seeds.parameterization, parameterization),
+        plain("score options", &seeds.score, |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
+        plain("proposal", &seeds.proposals, proposal),
+    ];
+    readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
+    let sealed = |b: &[u8], _: &Path, _: &Seeds| resealed(b.strip_suffix(b"\n").unwrap_or(b), b"\"content\":");
+    readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
+    readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
+    readers.push(plain("journal", &seeds.journals, journal));
+    let sums = |b: &[u8], _: &Path, _: &Seeds| resealed(b, b"\"part\":");
+    readers.push(Reader { reseal: Some(sums), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
+    readers.push(Reader { reseal: Some(reseal_partial), ..plain("partial", &seeds.partials, partial) });
+    readers
+}
+
+fn file(bytes: &[u8], dir: &Path, name: &str) -> std::path::PathBuf {
+    let path = dir.join(name);
+    std::fs::write(&path, bytes).expect("the temporary folder can be written to");
+    path
+}
+
+fn recording(which: usize, bytes: &[u8], dir: &Path, seeds: &Seeds) -> Result<()> {
+    let names = ["01_tracks.csv", "01_tracksMeta.csv", "01_recordingMeta.csv"];
+    for (k, name) in names.into_iter().enumerate() {
+        file(if k == which { bytes } else { &seeds.recording[k] }, dir, name);
+    }
+    mine_folder(dir, &MiningOptions::default(), || ()).map(drop)
+}
+
+/// The first lanes of a plan, with one headway.
+fn run_some(plan: &LanePlan, units: u64) -> Result<()> {
+    let mut session = CpuBackend::<f64>::reference().prepare(plan)?;
+    session.run(0..plan.unit_count().min(units), Wanted::Outcomes).map(drop)
+}
+
+fn study(scenarios: &[Scenario], profile: &Profile, options: &ParameterizationOptions, heavy: bool) -> Result<()> {
+    let options = StudyOptions {
+        headways: vec![Headway::ThwS(1.0)],
+        parameterization: options.clone(),
+        ..StudyOptions::default()
+    };
+    let plan = plan_study(scenarios, profile, &options)?.plan;
+    if heavy { run_some(&plan, 1) } else { Ok(()) }
+}
+
+fn scenarios(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let scenarios = read_scenarios(&file(bytes, dir, "s.jsonl"))?;
+    study(&scenarios, &seeds.profile, &ParameterizationOptions::default(), heavy)
+}
+
+fn exposure(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
+    file(bytes, dir, "s.exposure.json");
+    if let Some(read) = ExposureFile::read_beside(&dir.join("s.jsonl"), "00")? {
+        Exposure::new(3, read.driven);
+    }
+    Ok(())
+}
+
+fn table(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let table = Table::read(&file(bytes, dir, "table.csv"))?;
+    if table.has("param") {
+        return compare_lanes(&seeds.scenarios, &table, &seeds.profile).map(drop);
+    }
+    match table.kind()? {
+        TableKind::JrcCases => compare_jrc(&table, &seeds.jrc).map(drop),
+        TableKind::Functions => compare_functions(&table, &seeds.jrc).map(drop),
+    }
+}
+
+fn profile(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let profile = Profile::load(&file(bytes, dir, "p.toml").to_string_lossy())?;
+    if heavy { study(&seeds.scenarios[..1], &profile, &ParameterizationOptions::default(), true) } else { Ok(()) }
+}
+
+fn options<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T> {
+    let place = || Place::item("options");
+    let text = std::str::from_utf8(bytes).map_err(|e| Error::input(place(), e.to_string(), "use UTF-8"))?;
+    toml::from_str(text).map_err(|e| Error::input(place(), e.message().to_owned(), "correct it"))
+}
+
+fn mining(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let options: MiningOptions = options(bytes)?;
+    options.validate()?;
+    mine(&seeds.loaded, &options);
+    Ok(())
+}
+
+fn parameterization(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let options: ParameterizationOptions = options(bytes)?;
+    options.validate()?;
+    study(&seeds.scenarios[..3], &seeds.profile, &options, false)
+}
+
+/// The plan of a few samples.
+pub fn small_plan(
+    density: &DensityModel,
+    proposal: &lanesweep::density::Mixture,
+    profile: &Profile,
+) -> Result<LanePlan> {
+    let options = SamplePlanOptions {
+        samples: 20,
+        seed: 5,
+        source: SampleSource::Random,
+        models: ModelId::ALL.to_vec(),
+        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+    };
+    plan_samples(density, proposal, profile, &options)
+}
+
+fn density(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let density = read_density(&file(bytes, dir, "d.json"))?;
+    let plan = small_plan(&density, &density.mixture()?, &seeds.profile)?;
+    if heavy { run_some(&plan, 2) } else { Ok(()) }
+}
+
+fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let density = density_of(seeds);
+    let plan = small_plan(density, &read_proposal(&file(bytes, dir, "g.json"), density)?, &seeds.profile)?;
+    if heavy { run_some(&plan, 2) } else { Ok(()) }
+}
+
+/// The message of a density file whose content was changed says which checksum would fit.
+fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
+    let message = read_density(&file(bytes, dir, "d.json")).err()?.to_string();
+    let (_, rest) = message.split_once("content_sha256`: is ")?;
+    let (old, rest) = rest.split_once(", but the content has ")?;
+    let new = rest.get(..64)?;
+    Some(String::from_utf8(bytes.to_vec()).ok()?.replacen(old, new, 1).into_bytes())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The checksum of compact JSON from `key` to the last brace, which closes the whole.
+fn resealed(bytes: &[u8], key: &[u8]) -> Option<Vec<u8>> {
+    let from = bytes.windows(key.len()).position(|w| w == key)? + key.len();
+    let sum = hex(bytes.get(from..bytes.len().checked_sub(1)?)?);
+    with_checksum(bytes, &sum)
+}
+
+fn with_checksum(bytes: &[u8], sum: &str) -> Option<Vec<u8>> {
+    let key = b"\"sha256\":\"";
+    let at = bytes.windows(key.len()).position(|w| w == key)? + key.len();
+    let mut bytes = bytes.to_vec();
+    (at + 64 <= bytes.len()).then(|| bytes.splice(at..at + 64, sum.bytes()));
+    Some(bytes)
+}
+
+/// A partial's fields are sealed in the order of the type and written in the order of names.
+fn reseal_partial(bytes: &[u8], _: &Path, _: &Seeds) -> Option<Vec<u8>> {
+    let value: serde_json::Value = serde_json::from_slice(bytes).ok()?;
+    let partial: Partial = serde_json::from_value(value.get("partial")?.clone()).ok()?;
+    with_checksum(bytes, &hex(&serde_json::to_vec(&partial).ok()?))
+}
+
+fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let read = read_part::<SampleTally>(&file(bytes, dir, "part.json"), "00", &PART_UNITS, "make it again")?;
+    for tally in read.segments {
+        tally.samples();
+        tally.valid();
+        let axes = tally.map.as_ref().map(|map| map.axes.clone());
+        let options = TallyOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes };
+        let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
+        let joined = SampleTally::empty(&plan, &options).merge(tally.clone())?;
+        let back = tally.clone().merge(SampleTally::empty(&plan, &options))?;
+        joined.samples();
+        // The same part twice has to be refused.
+        assert!(back.samples() == 0 || back.merge(tally).is_err());
+    }
+    Ok(())
+}
+
+fn plan(bytes: &[u8], dir: &Path, _: &Seeds, heavy: bool) -> Result<()> {
+    let path = file(bytes, dir, "plan.json");
+    let (content, _): (PlanContent, _) = read_sealed("plan", &path, 1 << 26, "make it again")?;
+    let plan = content.into_plan(&Place::file(&path))?;
+    if heavy { run_some(&plan, 2) } else { Ok(()) }
+}
+
+fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
+    let path = file(bytes, dir, "part.journal");
+    let (journal, found) = Journal::<SampleTally>::open(&path, "00", PART_UNITS)?;
+    let mut ledger = Ledger::new(PART_UNITS, &[]);
+    ledger.resume(journal, found)?;
+    ledger.missing(PART_UNITS)?;
+    Ok(())
+}
+
+/// The units of the part that is made as a seed.
+pub const PART_UNITS: std::ops::Range<u64> = 3..17;
+
+fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
+    let Some(mut part) = read_weighted_part(&file(bytes, dir, "part.json"))? else {
+        return Err(Error::input(Place::item("part"), "another kind", "give another"));
+    };
+    part.covered();
+    for (_, sums) in &part.sums {
+        sums.total();
+    }
+    // The same part twice has to be refused.
+    assert!(part.covered() == 0 || part.merge(part.clone()).is_err());
+    Ok(())
+}
+
+fn partial(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let place = || Place::item("partial");
+    let text = std::str::from_utf8(bytes).map_err(|e| Error::input(place(), e.to_string(), "use UTF-8"))?;
+    let partial = Partial::from_json(text, place())?;
+    partial.covered();
+    let merged = Partial::empty(&seeds.study).merge(partial)?;
+    merged.covered();
+    merged.is_complete(&seeds.study);
+    Ok(())
+}
+
+/// The criterion of the parts that are made as seeds.
+pub const CRITERION: Criterion = Criterion::Collision;

@@ -1,0 +1,198 @@
+//! Valid inputs, made by the program itself.
+
+use std::path::Path;
+
+use lanesweep::density::{DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use lanesweep::driver::ModelId;
+use lanesweep::estimate::{BlockSums, WeightSums};
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions};
+use lanesweep::parts::{Journal, Part, seal, write_part};
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{MapAxes, SampleTally, TallyOptions, WeightedPart, write_proposal, write_weighted_part};
+use lanesweep::scenario::{Category, Scenario, write_scenarios};
+use lanesweep::score::ScoreOptions;
+use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, PlanContent, Wanted};
+use lanesweep::trajectory::Recording;
+use lanesweep::trajectory::generator::GeneratorOptions;
+
+use super::plans;
+use super::readers::{CRITERION, PART_UNITS, small_plan};
+use super::small;
+
+/// Valid inputs and what the next steps need beside them.
+pub struct Seeds {
+    /// tracks, tracksMeta, recordingMeta.
+    pub recording: [Vec<u8>; 3],
+    pub loaded: Recording,
+    /// A few of each category.
+    pub scenarios: Vec<Scenario>,
+    pub scenario_files: Vec<Vec<u8>>,
+    pub exposures: Vec<Vec<u8>>,
+    pub tables: Vec<Vec<u8>>,
+    pub profiles: Vec<Vec<u8>>,
+    pub mining: Vec<Vec<u8>>,
+    pub parameterization: Vec<Vec<u8>>,
+    pub score: Vec<Vec<u8>>,
+    pub densities: Vec<Vec<u8>>,
+    pub proposals: Vec<Vec<u8>>,
+    pub parts: Vec<Vec<u8>>,
+    pub plans: Vec<Vec<u8>>,
+    pub journals: Vec<Vec<u8>>,
+    pub weighted_parts: Vec<Vec<u8>>,
+    pub partials: Vec<Vec<u8>>,
+    pub profile: Profile,
+    pub jrc: Profile,
+    pub study: LanePlan,
+    density: DensityModel,
+}
+
+/// The density that proposals and parts belong to.
+pub fn density_of(seeds: &Seeds) -> &DensityModel {
+    &seeds.density
+}
+
+fn first_of(scenarios: &[Scenario], category: Category, n: usize) -> Vec<Scenario> {
+    scenarios.iter().filter(|s| s.category == category && s.kept).take(n).cloned().collect()
+}
+
+/// What a writer leaves in a file.
+fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("file.json");
+    write(&path);
+    std::fs::read(path).unwrap()
+}
+
+/// The header and every k-th line of a table, a few lines.
+fn some_lines(table: &str, k: usize) -> Vec<u8> {
+    let lines: Vec<&str> = table.lines().collect();
+    let some = lines[..1].iter().chain(lines[1..].iter().step_by(k).take(4));
+    some.map(|line| format!("{line}\n")).collect::<String>().into_bytes()
+}
+
+const CUT_INS: &str = "scenario,variant,check,model,ego_kmh,cutin_kmh,vlat,n_prepended,dist_ref,collision,crash_type,\
+t_react,t_crash,impact_speed,impact_rel_speed,min_ttc,min_gap,v@0.5,v@1,v@1.5,v@2,v@2.5,v@3,v@4,v@5,v@6,v@8,v@10,v@15,\
+x@1,x@2,x@3,x@5,x@10,robust
+cut_in,comparison,,CC_human_driver,60,40,0.9,3,20,0,0,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
+cut_in,plain,,FSM,60,40,0.3,0,20,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
+";
+
+const CUT_OUTS: &str = "scenario,check,model,v0_kmh,vlat,front_length,vfront_kmh,front_dist,initial_gap_nominal,\
+collision,crash_type,t_react,t_crash,impact_speed,impact_rel_speed,min_ttc,min_gap,v@0.5,v@1,v@1.5,v@2,v@2.5,v@3,v@4,\
+v@5,v@6,v@8,v@10,v@15,x@1,x@2,x@3,x@5,x@10,robust
+cut_out,cutin_check,FSM,80,1.0,4.3,0,30,25,0,0,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
+cut_out,plain,RSS,80,0.5,4.3,10,30,25,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,0
+";
+
+impl Seeds {
+    pub fn make() -> Seeds {
+        let generator = GeneratorOptions { recordings: 4, duration_s: 120.0, ..GeneratorOptions::default() };
+        let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let few: Vec<Scenario> = Category::ALL.into_iter().flat_map(|c| first_of(&mined, c, 2)).collect();
+        let profile = Profile::load("paper").unwrap();
+        let fit = |category, key, n| {
+            let facts = DataFacts {
+                data: "synthetic".to_owned(),
+                synthetic: true,
+                scenarios_sha256: String::new(),
+                driven: None,
+            };
+            let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
+            let id = ParameterizationId::find(category, key).unwrap();
+            DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
+        };
+        let density = fit(Category::CutIn, "2", 8);
+        let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
+        let plan = small_plan(&density, &density.mixture().unwrap(), &profile).unwrap();
+        let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
+        let map = MapAxes::of(&density, names[0], names[1]).unwrap();
+        let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
+        let parts = [None, Some(map)].map(|map| {
+            let options = TallyOptions { worst: 3, criterion: CRITERION, map };
+            let tally = SampleTally::of_chunk(&plan, &chunk, &options).unwrap();
+            (
+                tally.clone(),
+                Part {
+                    run_sha256: "00".to_owned(),
+                    units: PART_UNITS,
+                    lanes_redone_and_rechecked: [0, 0],
+                    segments: vec![tally],
+                },
+            )
+        });
+        let journals = parts.each_ref().map(|(tally, _)| {
+            written(|path| {
+                let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
+                journal.append(std::slice::from_ref(tally)).unwrap();
+            })
+        });
+        let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
+        let sums = |k: u64| WeightSums { draws: k, weight: 0.5, ..WeightSums::default() };
+        let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
+        let weighted = WeightedPart {
+            run_sha256: "00".to_owned(),
+            criterion: CRITERION,
+            headway: "1 s".to_owned(),
+            samples: 20,
+            sums: ModelId::ALL.into_iter().map(|m| (m, BlockSums::of_leaves(5, &leaves))).collect(),
+        };
+        let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
+        let lane = |lane: u64| (lanesweep::sweep::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
+        let partial = Partial::from_chunk_keeping(&study, &plans::chunk(&study, 1..3, &lane, true), 20).unwrap();
+        let driven = Driven { hours: Some(1.5), kilometres: Some(90.0) };
+        let exposure =
+            ExposureFile { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
+        let texts = small::Texts::small();
+        let golden = |name: &str| {
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)).unwrap()
+        };
+        let lanes = few.iter().zip(["1", "S", "a", "b", "i", "ii"]).map(|(s, param)| {
+            format!("{},{},{param},2.0,Reg157,0,1,1,0.44,1.19,0,5.08,,,13.92,1\n", s.id, s.category.key())
+        });
+        let lanes =
+            golden("paper_sumo_01_02_lanes.csv").lines().next().unwrap().to_owned() + "\n" + &lanes.collect::<String>();
+        let toml = |text: String| vec![text.into_bytes()];
+        Seeds {
+            recording: [texts.tracks, texts.tracks_meta, texts.recording_meta].map(String::into_bytes),
+            loaded: small::recording(),
+            scenario_files: [&few[..], &few[..1], &few[4..5]]
+                .map(|s| written(|path| write_scenarios(path, s).unwrap()))
+                .into(),
+            scenarios: few,
+            exposures: vec![{
+                let dir = tempfile::tempdir().unwrap();
+                exposure.write_beside(&dir.path().join("s.jsonl")).unwrap();
+                std::fs::read(dir.path().join("s.exposure.json")).unwrap()
+            }],
+            tables: vec![
+                some_lines(&golden("lvd.csv"), 150),
+                some_lines(&golden("functions.csv"), 200),
+                CUT_INS.into(),
+                CUT_OUTS.into(),
+                lanes.into_bytes(),
+            ],
+            profiles: ["paper", "jrc-2021"]
+                .map(|n| toml::to_string(&Profile::load(n).unwrap()).unwrap().into_bytes())
+                .into(),
+            mining: toml(toml::to_string(&MiningOptions::default()).unwrap()),
+            parameterization: toml(toml::to_string(&ParameterizationOptions::default()).unwrap()),
+            score: toml(toml::to_string(&ScoreOptions::default()).unwrap()),
+            densities: [&density]
+                .into_iter()
+                .chain(&others)
+                .map(|d| written(|p| write_density(p, d).unwrap()))
+                .collect(),
+            proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
+            parts: parts.into(),
+            plans: vec![seal("plan", &PlanContent::of(&study).unwrap()).unwrap()],
+            journals: journals.into(),
+            weighted_parts: vec![written(|p| write_weighted_part(p, &weighted).unwrap())],
+            partials: vec![partial.to_json().unwrap().into_bytes()],
+            profile,
+            jrc: Profile::load("jrc-2021").unwrap(),
+            study,
+            density,
+        }
+    }
+}
