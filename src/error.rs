@@ -116,6 +116,14 @@ pub enum Error {
     /// A check that the user asked for did not pass (conformance, verification).
     #[error("{0}")]
     Verification(String),
+    /// Another process is at work on the same run or part: the same command can do it later.
+    #[error("{place}: {problem}")]
+    Busy {
+        /// The lock.
+        place: Box<Place>,
+        /// Who holds it.
+        problem: String,
+    },
     /// A defect of this program, caught before it could become a wrong number.
     #[error("internal error: {0}")]
     Internal(String),
@@ -168,6 +176,7 @@ impl Error {
                 _ => "check that the disk is present and has space, then run again".to_owned(),
             }),
             Error::Verification(_) => None,
+            Error::Busy { .. } => Some("wait for it and run this again, or choose another --out".to_owned()),
             Error::Internal(_) => {
                 Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
             }

@@ -19,7 +19,7 @@ impl FolderLock {
     /// Takes the lock `path`, whose folder must exist, without waiting.
     ///
     /// # Errors
-    /// [`Error::Usage`] if another process holds it, named by its process id where that can be read;
+    /// [`Error::Busy`] if another process holds it, named by its process id where that can be read;
     /// [`Error::Io`] if the file cannot be made or the file system knows no locks.
     pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
         loop {
@@ -66,11 +66,10 @@ fn held(path: &Path, file: &mut File) -> Error {
     // Where locks are mandatory the holder's file cannot be read: then it stays without a number.
     let pid = file.take(32).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
     let who = pid.map_or(String::new(), |pid| format!(" (pid {pid})"));
-    Error::usage(
-        Place::file(path),
-        format!("another lanesweep process is writing this part or run{who}"),
-        "wait for it, or choose another --out",
-    )
+    Error::Busy {
+        place: Box::new(Place::file(path)),
+        problem: format!("another lanesweep process is writing this part or run{who}"),
+    }
 }
 
 /// Whether `path` is the file that is open as `file`.
@@ -100,7 +99,7 @@ mod tests {
         let path = dir.path().join("run.lock");
         let lock = FolderLock::acquire(&path).unwrap();
         let error = FolderLock::acquire(&path).unwrap_err();
-        assert!(matches!(error, Error::Usage { .. }), "{error}");
+        assert!(matches!(error, Error::Busy { .. }), "{error}");
         assert!(error.to_string().contains("run.lock: another lanesweep process"), "{error}");
         if cfg!(unix) {
             assert!(error.to_string().contains(&format!("(pid {})", std::process::id())), "{error}");

@@ -58,7 +58,7 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     assert!(name.starts_with(".lanesweep-lanes.csv-"), "{name}");
     send(signal, study.id());
     let code = ended(&mut study);
-    assert_eq!(unfinished(dir.path()), [PathBuf::new(); 0], "after {signal}");
+    assert_eq!(unfinished(dir.path()), Vec::<PathBuf>::new(), "after {signal}");
     assert_eq!(std::fs::read_to_string(&lanes).unwrap(), "of an earlier run", "what was there stays");
     code
 }

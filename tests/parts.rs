@@ -202,3 +202,29 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     same(&dir.join("whole"), &dir.join("run"));
     same(&dir.join("whole"), &dir.join("parts"));
 }
+
+#[test]
+fn two_processes_do_not_compute_the_same_part() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let long =
+        ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
+    let mut first = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .current_dir(dir)
+        .args(long)
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let lock = dir.join("run/run.lock");
+    while !lock.exists() || std::fs::read_to_string(&lock).unwrap_or_default().is_empty() {
+        assert!(first.try_wait().unwrap().is_none(), "the first process has ended");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let (code, out, err) = lanesweep(dir, &long);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert_eq!(code, 75, "{err}");
+    let told = format!("another lanesweep process is writing this part or run (pid {})", first.id());
+    assert!(flat(&err).contains(&told) && out.is_empty(), "{err}");
+}

@@ -58,7 +58,7 @@ impl Exit {
             Exit::Io => "the system refused to read or write",
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a defect of the program",
-            Exit::Interrupted => "interrupted; what is done is kept, and the same command continues",
+            Exit::Interrupted => "interrupted, or busy elsewhere; what is done is kept, and the same command continues",
         }
     }
 
@@ -78,7 +78,7 @@ impl From<&Error> for Exit {
             Error::Device { .. } => Exit::NoDevice,
             Error::Verification(_) => Exit::VerificationFailed,
             Error::Internal(_) => Exit::Internal,
-            Error::Interrupted { .. } => Exit::Interrupted,
+            Error::Interrupted { .. } | Error::Busy { .. } => Exit::Interrupted,
         }
     }
 }

@@ -95,7 +95,7 @@ impl Desk<'_> {
     /// Takes the place: no other process computes the same. What an earlier one left is taken over, cut at `cuts`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where another process is at it; [`Error::Io`].
+    /// [`Error::Busy`] where another process is at it; [`Error::Io`].
     pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool) -> Result<Work<T>> {
         make_folder(self.out)?;
         let stem = self.shard.map(|shard| shard.stem());

@@ -100,7 +100,7 @@ mod tests {
                 for index in 0..of {
                     let units = Shard { index, of }.units(count);
                     assert_eq!(units.start, at);
-                    assert!(units.end - units.start <= count / of + 1);
+                    assert!(units.end - units.start <= (count / of).saturating_add(1));
                     at = units.end;
                 }
                 assert_eq!(at, count);
