@@ -47,7 +47,7 @@ pub struct Resources {
 pub struct SlurmArray {
     /// The run.
     pub run: SplitRun,
-    /// Tasks of the array, 1 to [`MOST_SHARDS`].
+    /// Tasks of the array, 1 to 99,999.
     pub shards: u32,
     /// Folder of the run, absolute: nodes share it.
     pub out: String,
