@@ -122,7 +122,7 @@ fn overlaps_and_strangers_are_refused() {
     assert!(read("{\"a\": 1}").contains("no partial result"));
     assert!(read("{\"format\": \"lanesweep partial\", \"ver").contains("no complete JSON"));
     assert!(read("{\"format\": \"lanesweep partial\", \"version\": 99}").contains("version is 99"));
-    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 1}").contains("damaged"));
+    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 2}").contains("damaged"));
 }
 
 #[test]
