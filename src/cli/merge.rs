@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::Exit;
-use super::shard_flags::PLAN_FILE;
+use super::shard_flags::{PLAN_FILE, is_result};
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan};
@@ -34,7 +34,7 @@ impl Merge {
         let plan = self.dir.join(PLAN_FILE);
         let kind = kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?;
         let _lock = FolderLock::acquire(&self.dir.join("run.lock"))?;
-        crate::atomic_file::clear_stale(&self.dir, |name| !name.starts_with("part-"));
+        crate::atomic_file::clear_stale(&self.dir, is_result);
         match kind.as_str() {
             study_plan::KIND => merge_study(&self.dir, &plan),
             sample_plan::KIND => sample_crude::merge(&self.dir, &plan),

@@ -31,6 +31,28 @@ pub struct ShardFlags {
 /// Name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";
 
+/// Beginnings of the names that a whole run or a merge writes under its lock. Others in the same folder may be some
+/// other command's, at work.
+const RESULTS: [&str; 12] = [
+    "claims.csv",
+    "convergence.",
+    "density.json",
+    "estimate",
+    "f1.csv",
+    "failures.csv",
+    "map-",
+    "radar-",
+    "reference.csv",
+    "report.txt",
+    "run.json",
+    "worst.csv",
+];
+
+/// Is a file the result of a whole run or of a merge?
+pub fn is_result(name: &str) -> bool {
+    RESULTS.iter().any(|beginning| name.starts_with(beginning))
+}
+
 impl ShardFlags {
     /// Starts the clock of --stop-after.
     ///
@@ -103,7 +125,7 @@ impl Desk<'_> {
             FolderLock::acquire(&self.out.join(stem.as_ref().map_or("run.lock".to_owned(), |s| format!("{s}.lock"))))?;
         crate::atomic_file::clear_stale(self.out, |name| match &stem {
             Some(stem) => name.strip_suffix(".json") == Some(stem),
-            None => !name.starts_with("part-"),
+            None => is_result(name),
         });
         let units = self.units();
         let mut ledger = Ledger::new(units.clone(), cuts);
@@ -168,5 +190,17 @@ pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => crate::report::files::write_atomically(&path, text),
         Err(e) => Err(Error::io(path, "read", e)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_result;
+
+    #[test]
+    fn leftovers_of_other_commands_are_not_taken_for_results_of_a_run() {
+        assert!(["run.json", "radar-lvd.svg", "map-FSM.csv", "estimates.csv"].into_iter().all(is_result));
+        let others = ["plan.json", "part-00000-of-00002.json", "scenarios.jsonl", "lanes.csv", "01_tracks.csv"];
+        assert!(!others.into_iter().any(is_result));
     }
 }

@@ -118,12 +118,16 @@ pub fn sample_into(
     let range = ledger.units();
     if range.start >= range.end || range.end > plan.unit_count() {
         let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
-        return Err(Error::usage(Place::item("--lanes"), problem, "give A..B with A < B, counted from 0"));
+        return Err(Error::usage(
+            Place::item("--shard"),
+            problem,
+            "give an interval that is not empty, counted from 0",
+        ));
     }
     let is_whole = range == (0..plan.unit_count());
     if !is_whole && (options.stop.relative_half_width.is_some() || options.stop.time_limit.is_some()) {
         let problem = "a part of a run cannot tell when the whole is good enough";
-        return Err(Error::usage(Place::item("--lanes"), problem, "leave the stop rules out, or --lanes"));
+        return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
     }
     let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
     let how = SweepOptions { wanted, fallback: lanes.fallback, recheck: lanes.recheck };
