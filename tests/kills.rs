@@ -1,5 +1,5 @@
 //! A run that is killed (SIGKILL, as a power cut or the system's memory killer would) at any moment and started again
-//! ends as if undisturbed. Four kills by default; the long form is
+//! ends as if undisturbed. Six kills by default; the long form is
 //! `LANESWEEP_KILLS=200 cargo test --release --test kills -- --nocapture`.
 #![cfg(unix)]
 
@@ -37,7 +37,7 @@ fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 #[test]
 fn a_killed_run_continues_and_ends_as_if_undisturbed() {
-    let kills: u64 = std::env::var("LANESWEEP_KILLS").ok().map_or(4, |text| text.parse().unwrap());
+    let kills: u64 = std::env::var("LANESWEEP_KILLS").ok().map_or(6, |text| text.parse().unwrap());
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
@@ -59,7 +59,14 @@ fn a_killed_run_continues_and_ends_as_if_undisturbed() {
         "--threads",
         "1",
     ];
-    let runs: [&[&str]; 2] = [&study, &sample];
+    let density = sample[2];
+    let found = ["-q", "sample", density, "--estimator", "is", "--pilot", "2000", "--samples", "100", "--out", "pilot"];
+    done(dir, &[&found[..], &["--thw", "0.6", "--models", "RSS"]].concat());
+    let proposal = "pilot/proposal-RSS.json";
+    let plan = ["-q", "sample", density, "--estimator", "is", "--proposal", proposal, "--thw", "0.6", "--plan-only"];
+    done(dir, &[&plan[..], &["--samples", "600000", "--models", "RSS,FSM", "--out", "weighted"]].concat());
+    let weighted = ["-q", "sample", "--plan", "weighted/plan.json", "--backend", "cpu", "--threads", "1"];
+    let runs: [&[&str]; 3] = [&study, &sample, &weighted];
     let undisturbed = runs.map(|run| {
         let started = Instant::now();
         done(dir, &[run, &["--out", "undisturbed"]].concat());
@@ -69,7 +76,7 @@ fn a_killed_run_continues_and_ends_as_if_undisturbed() {
     });
     let (mut alive, mut continued) = (0, 0);
     for kill in 0..kills {
-        let at = (kill % 2) as usize;
+        let at = (kill % 3) as usize;
         let (took, expected) = &undisturbed[at];
         // A low-discrepancy sequence of moments over the whole run.
         let share = (kill as f64 * 0.618_033_988_749_895 + 0.5).fract();

@@ -185,14 +185,16 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     run(&["--estimator", "is", "--proposal", ce, "--samples", "20000", "--out", "again"]);
     // A given proposal can be split; the join is the run in one.
     let given = ["--estimator", "is", "--proposal", ce, "--samples", "20000"];
-    run(&[&given[..], &["--out", "g1", "--lanes", "0..5000"]].concat());
-    run(&[&given[..], &["--out", "g2", "--lanes", "5000..20000"]].concat());
-    let (code, _, err) = lanesweep(dir.path(), &["-q", "sample", "--join", "g2", "g1", "--out", "g"]);
+    for shard in ["2/3", "0/3", "1/3"] {
+        run(&[&given[..], &["--out", "g", "--shard", shard]].concat());
+    }
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "g"]);
     assert_eq!(code, 0, "{err}");
     let read = |folder: &str| std::fs::read_to_string(dir.path().join(folder).join("estimates.csv")).unwrap();
     assert_eq!(read("g"), read("again"));
-    let (code, _, _) = lanesweep(dir.path(), &["-q", "sample", "--join", "g1", "g1", "--out", "h"]);
-    assert_eq!(code, 3);
+    // The weighed sums of a run that stops by a rule are the same ones.
+    run(&[&given[..], &["--out", "ruled", "--until", "0.000001"]].concat());
+    assert_eq!(read("ruled"), read("again"));
     let both = ["--proposal", is, "--proposal", ce];
     run(&[&["--estimator", "is", "--samples", "20000", "--out", "balance"], &both[..]].concat());
     let estimate = |folder: &str| -> serde_json::Value {
@@ -218,7 +220,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
     std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
     let d = "density.json";
-    let cases: [(&[&str], i32, &str); 26] = [
+    let cases: [(&[&str], i32, &str); 25] = [
         (&[d, "--samples", "0"], 2, "0 samples"),
         (&[d, "--samples", "9223372036854775808"], 2, "2^63"),
         (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),
@@ -230,11 +232,10 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--thw", "-1"], 2, "no time headway"),
         (&[d, "--thw", "sampled"], 2, "--with-thw"),
         (&[d, "--estimator", "subset"], 2, "one headway at a time"),
-        (&[d, "--estimator", "ce", "--thw", "1", "--lanes", "0..5"], 2, "one given proposal is split"),
-        (&[d, "--lanes", "0..5"], 2, "use --shard for crude Monte Carlo"),
+        (&[d, "--estimator", "ce", "--thw", "1", "--shard", "0/5"], 2, "with one given --proposal"),
         (&[d, "--shard", "5/5"], 2, "no shard 5 of 5"),
         (&[d, "--shard", "0/2", "--until", "0.1"], 2, "when the whole is good enough"),
-        (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "only crude Monte Carlo makes shards"),
+        (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "the adaptive estimators are sequential"),
         (&[d, "--shard", "0/2", "--bootstrap", "20"], 2, "no replicates"),
         (&[d, "--plan", "plan.json"], 2, "cannot be used with"),
         (&[d, "--level", "1"], 2, "no share"),
@@ -244,7 +245,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&["cut.json"], 3, "cut.json"),
         (&["edited.json"], 3, "edited.json"),
         (&[d, "--estimator", "is", "--thw", "1", "--proposal", d], 3, "no proposal"),
-        (&["--join", "."], 6, "part.json"),
+        (&[], 2, "<DENSITY>"),
     ];
     for (args, code, said) in cases {
         let (found, out, err) = lanesweep(dir.path(), &[&["sample"], args].concat());

@@ -8,7 +8,7 @@ use super::Exit;
 use super::shard_flags::{PLAN_FILE, is_result};
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
-use super::{sample_crude, sample_plan};
+use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
 use crate::lock::FolderLock;
 use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
 use crate::report::run_record::Timings;
@@ -38,6 +38,7 @@ impl Merge {
         match kind.as_str() {
             study_plan::KIND => merge_study(&self.dir, &plan),
             sample_plan::KIND => sample_crude::merge(&self.dir, &plan),
+            weighted_plan::KIND => sample_weighted::merge(&self.dir, &plan),
             other => {
                 let help = "give the folder (--out) of a run in parts";
                 Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))

@@ -16,10 +16,11 @@ mod mine;
 mod rerun;
 mod sample;
 mod sample_adaptive;
+mod sample_checks;
 mod sample_crude;
-mod sample_join;
 mod sample_lanes;
 mod sample_plan;
+mod sample_weighted;
 mod shard_flags;
 mod simulate;
 mod slurm;
@@ -29,6 +30,7 @@ mod study_plan;
 mod study_run;
 mod synth;
 mod verify;
+mod weighted_plan;
 
 pub use exit::Exit;
 

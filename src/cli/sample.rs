@@ -1,6 +1,5 @@
 //! `lanesweep sample`: a density in, probabilities of failure out.
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -9,20 +8,23 @@ use clap::{Args, ValueEnum};
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
 use super::lists;
+use super::sample_checks;
 use super::sample_crude;
-use super::sample_join as join;
 use super::sample_lanes;
-use super::sample_plan::{PlannedSample, SampleFacts};
+use super::sample_plan::{self, PlannedSample, SampleFacts};
+use super::sample_weighted;
 use super::shard_flags::ShardFlags;
+use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::density::{DensityModel, read_density, write_density};
 use crate::driver::ModelId;
 use crate::estimate::{Checkpoints, StopRule};
+use crate::parts::kind_of;
 use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
-use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
+use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
 use crate::sweep::Headway;
 use crate::{Error, Place, Result};
 
@@ -35,7 +37,7 @@ use crate::{Error, Place, Result};
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "density" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "until"
-    | "time_limit" | "worst" | "map" | "lanes" | "pilot" | "worst_share" | "broad" | "defence" | "given" | "proposal"
+    | "time_limit" | "worst" | "map" | "pilot" | "worst_share" | "broad" | "defence" | "given" | "proposal"
     | "bootstrap" | "bootstrap_samples" | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
@@ -47,15 +49,8 @@ use crate::{Error, Place, Result};
 )]
 pub struct Sample {
     /// Density file
-    #[arg(value_name = "DENSITY", required_unless_present_any = ["join", "plan"])]
+    #[arg(value_name = "DENSITY", required_unless_present = "plan")]
     density: Option<PathBuf>,
-    /// Join the parts of a run over a given proposal, made with --lanes, instead of sampling: their folders
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = [
-        "density", "estimator", "samples", "models", "criterion", "thw", "points", "until", "time_limit", "worst", "map",
-        "rows", "lanes", "given", "pilot", "worst_share", "broad", "defence", "proposal", "bootstrap", "bootstrap_samples", "seed", "shard", "plan",
-        "plan_only", "stop_after",
-    ])]
-    join: Vec<PathBuf>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
     #[arg(long, value_enum, default_value_t)]
     pub(super) estimator: EstimatorFlag,
@@ -74,31 +69,28 @@ pub struct Sample {
     thw: Option<String>,
     /// Kind of points of mc
     #[arg(long, value_enum, default_value_t)]
-    points: PointsFlag,
+    pub(super) points: PointsFlag,
     /// Kind of interval of mc
     #[arg(long, value_enum, default_value_t)]
-    interval: IntervalFlag,
+    pub(super) interval: IntervalFlag,
     /// Level of the intervals
     #[arg(long, value_name = "SHARE", default_value_t = 0.95)]
     pub(super) level: f64,
     /// End once the interval's half-width over the estimate is at most this; looked at after 4096·2^k samples
     #[arg(long, value_name = "SHARE")]
-    until: Option<f64>,
+    pub(super) until: Option<f64>,
     /// End at the first look after so many seconds: not reproducible
     #[arg(long, value_name = "SECONDS")]
-    time_limit: Option<f64>,
+    pub(super) time_limit: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster
     #[arg(long, value_name = "N", default_value_t = 20)]
     worst: usize,
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none")]
-    map: Option<String>,
+    pub(super) map: Option<String>,
     /// Also write one row per lane
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
-    /// Only these samples of a run over one given proposal: a part for --join
-    #[arg(long, value_name = "A..B")]
-    pub(super) lanes: Option<String>,
     /// Runs of the pilot of is
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     pub(super) pilot: u64,
@@ -113,7 +105,7 @@ pub struct Sample {
     pub(super) defence: f64,
     /// Draw given this value of a parameter (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
-    given: Vec<(String, f64)>,
+    pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample instead of looking for one; several are combined by the balance heuristic
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
@@ -147,7 +139,7 @@ pub(super) enum EstimatorFlag {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum PointsFlag {
+pub(super) enum PointsFlag {
     /// Independent draws
     #[default]
     Random,
@@ -156,7 +148,7 @@ enum PointsFlag {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum IntervalFlag {
+pub(super) enum IntervalFlag {
     #[default]
     Wilson,
     ClopperPearson,
@@ -173,8 +165,6 @@ impl EstimatorFlag {
     }
 }
 
-/// Points that an adaptive estimator holds at once, at most.
-const MOST_HELD: u64 = 10_000_000;
 /// Everything that a run was given, read and checked.
 pub(super) struct Run<'a> {
     pub(super) flags: &'a Sample,
@@ -193,15 +183,14 @@ impl Sample {
         self.check()?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
-            let (planned, _) = PlannedSample::read(path)?;
-            let stop = StopRule::samples(planned.facts.samples);
-            if let Some(rows) = &self.rows {
-                guard(rows, &self.out, std::iter::once(path))?;
-            }
-            return sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity);
+            return self.run_plan(path, started, verbosity);
         }
         let Some(density) = &self.density else {
-            return join::run(&self.join, &self.out, self.level);
+            return Err(Error::usage(
+                Place::item("DENSITY"),
+                "there is none",
+                "give a file that `lanesweep fit` wrote",
+            ));
         };
         let density = read_density(density)?;
         let profile = self.profile.load()?;
@@ -218,11 +207,14 @@ impl Sample {
             let stop = run.stop(self.samples.unwrap_or(100_000));
             return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
         }
+        if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
+            return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);
+        }
         make_folder(&self.out)?;
         sample_lanes::check_writable(&self.out)?;
         let file = run.adaptive()?;
         // A proposal in this folder may be an input: it is read and written on the way.
-        sample_lanes::clear(&self.out, &["proposal-", "part.json"])?;
+        sample_lanes::clear(&self.out, &["proposal-"])?;
         let folder = |name: &str| self.out.join(name);
         write_density(&folder("density.json"), &run.density)?;
         crate::report::files::write_atomically(&folder("estimates.csv"), &file.csv()?)?;
@@ -232,103 +224,30 @@ impl Sample {
         Ok(Exit::Ok)
     }
 
-    fn is_crude(&self) -> bool {
+    /// Runs what a plan file says: of crude Monte Carlo or over a given proposal.
+    fn run_plan(&self, path: &PathBuf, started: Instant, verbosity: Verbosity) -> Result<Exit> {
+        if kind_of(path, sample_plan::LARGEST_PLAN_BYTES)? == weighted_plan::KIND {
+            if self.rows.is_some() {
+                return Err(sample_checks::only_crude("--rows"));
+            }
+            let (planned, _) = PlannedWeighted::read(path)?;
+            return sample_weighted::run(self, &planned, &self.backend.open()?, started, verbosity);
+        }
+        let (planned, _) = PlannedSample::read(path)?;
+        let stop = StopRule::samples(planned.facts.samples);
+        if let Some(rows) = &self.rows {
+            guard(rows, &self.out, std::iter::once(path))?;
+        }
+        sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity)
+    }
+
+    pub(super) fn is_crude(&self) -> bool {
         self.estimator == EstimatorFlag::Mc && self.proposal.is_empty()
     }
 
-    /// What no density is needed for.
-    fn check(&self) -> Result<()> {
-        let share = |name: &str, value: f64, from_zero: bool| {
-            let fits = value < 1.0 && (value > 0.0 || (from_zero && value == 0.0));
-            if fits {
-                return Ok(());
-            }
-            let range = if from_zero { "from 0 to below 1" } else { "between 0 and 1" };
-            Err(Error::usage(Place::item(name), format!("{value} is no share"), format!("give a number {range}")))
-        };
-        share("--level", self.level, false)?;
-        share("--worst-share", self.worst_share, false)?;
-        share("--defence", self.defence, true)?;
-        share("--broad", self.broad, true)?;
-        if self.until.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
-            return Err(Error::usage(Place::item("--until"), "no half-width", "give a number above 0, such as 0.05"));
-        }
-        if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
-            return Err(Error::usage(Place::item("--time-limit"), "no time", "give seconds above 0"));
-        }
-        if self.samples == Some(0) {
-            let help = "give 1000000, for instance";
-            return Err(Error::usage(Place::item("--samples"), "0 samples estimate nothing", help));
-        }
-        if self.samples.is_some_and(|n| n >= 1 << 63) {
-            let problem = "2^63 samples and more cannot be counted";
-            return Err(Error::usage(Place::item("--samples"), problem, "give fewer"));
-        }
-        let is_crude = self.is_crude();
-        let only_crude = [
-            ("--rows", self.rows.is_some()),
-            ("--map", self.map.is_some()),
-            ("--bootstrap", self.bootstrap > 0),
-            ("--given", !self.given.is_empty()),
-            ("--points sobol", self.points == PointsFlag::Sobol),
-        ];
-        if let Some((flag, _)) = only_crude.iter().find(|(_, given)| *given && !is_crude) {
-            let problem = "this belongs to crude Monte Carlo";
-            return Err(Error::usage(Place::item(*flag), problem, "use --estimator mc, or leave it out"));
-        }
-        let least = |flag: &str, value: u64, least: u64, most: u64| {
-            if (least..=most).contains(&value) {
-                return Ok(());
-            }
-            let help = format!("give at least {least} and at most {most}");
-            Err(Error::usage(Place::item(flag), format!("{value} does not do"), help))
-        };
-        match self.estimator {
-            EstimatorFlag::Is if self.proposal.is_empty() => least("--pilot", self.pilot, 500, MOST_HELD)?,
-            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MOST_HELD)?,
-            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?,
-            _ => (),
-        }
-        if self.bootstrap > 0 {
-            least("--bootstrap", self.bootstrap.into(), 20, 1 << 20)?;
-            least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
-            if !self.given.is_empty() {
-                let problem = "replicates are those of the whole density";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --given out"));
-            }
-            if self.shards.is_part() || self.shards.plan_only {
-                let problem = "a part of a run has no replicates of its own";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --shard out"));
-            }
-        }
-        let is_split = self.shards.is_part() || self.shards.plan_only;
-        if is_split && !is_crude {
-            let problem = "only crude Monte Carlo makes shards: the adaptive estimators are sequential";
-            let help = "use --estimator mc; a run with one given --proposal is split by --lanes and joined by --join";
-            return Err(Error::usage(Place::item("--shard"), problem, help));
-        }
-        if is_split && (self.until.is_some() || self.time_limit.is_some()) {
-            let problem = "a part of a run cannot tell when the whole is good enough";
-            return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
-        }
-        let is_given = self.estimator == EstimatorFlag::Is && self.proposal.len() == 1;
-        if self.lanes.is_some() && !is_given {
-            let problem = "only a run over one given proposal is split by samples";
-            let help = "use --shard for crude Monte Carlo; is with one --proposal here; the rest is sequential";
-            return Err(Error::usage(Place::item("--lanes"), problem, help));
-        }
-        if self.lanes.is_some() && (self.until.is_some() || self.time_limit.is_some()) {
-            let problem = "a part of a run cannot tell when the whole is good enough";
-            return Err(Error::usage(Place::item("--lanes"), problem, "leave the stop rules out, or --lanes"));
-        }
-        if !self.proposal.is_empty() && self.estimator != EstimatorFlag::Is {
-            return Err(Error::usage(
-                Place::item("--proposal"),
-                "a given proposal is sampled by importance sampling",
-                "add --estimator is",
-            ));
-        }
-        Ok(())
+    /// Importance sampling of one given proposal: its samples are independent, so the run can be split and continued.
+    pub(super) fn is_weighted(&self) -> bool {
+        self.estimator == EstimatorFlag::Is && self.proposal.len() == 1
     }
 
     fn models(&self) -> Result<Vec<ModelId>> {
@@ -349,19 +268,6 @@ impl Sample {
             None | Some("paper") => Ok(SampleHeadways::Each(Headway::paper())),
             Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `sampled`")?)),
         }
-    }
-
-    /// The samples of a part.
-    pub(super) fn range(&self, samples: u64) -> Result<Range<u64>> {
-        let Some(text) = &self.lanes else { return Ok(0..samples) };
-        let wrong = || {
-            let problem = format!("`{text}` is no interval of the run's {samples} samples");
-            Error::usage(Place::item("--lanes"), problem, "give A..B with A < B, counted from 0, B at most --samples")
-        };
-        let (from, to) = text.split_once("..").ok_or_else(wrong)?;
-        let number = |part: &str| part.trim().replace('_', "").parse::<u64>().map_err(|_| wrong());
-        let range = number(from)?..number(to)?;
-        if range.start < range.end && range.end <= samples { Ok(range) } else { Err(wrong()) }
     }
 }
 
@@ -427,6 +333,29 @@ impl Run<'_> {
         PlannedSample::new(self.density, facts)
     }
 
+    /// Importance sampling of one given proposal, a fixed number of samples.
+    fn planned_weighted(self) -> Result<PlannedWeighted> {
+        let flags = self.flags;
+        let headway = match &self.headways {
+            SampleHeadways::Sampled => None,
+            SampleHeadways::Each(list) => Some(one_headway(list, flags.estimator)?),
+        };
+        let proposal = read_proposal(&flags.proposal[0], &self.density)?;
+        let facts = WeightedFacts {
+            density: String::new(),
+            proposal: String::new(),
+            defence: flags.defence,
+            profile: self.profile,
+            models: self.models,
+            headway,
+            criterion: self.criterion,
+            samples: flags.samples.unwrap_or(100_000),
+            seed: flags.seed,
+            level: flags.level,
+        };
+        PlannedWeighted::new(self.density, proposal, facts)
+    }
+
     fn map(&self) -> Result<Option<MapAxes>> {
         let parameters = self.density.space.parameters();
         match self.flags.map.as_deref() {
@@ -444,6 +373,18 @@ impl Run<'_> {
     }
 }
 
+/// The estimators that weigh follow one headway.
+pub(super) fn one_headway(list: &[Headway], estimator: EstimatorFlag) -> Result<Headway> {
+    let [one] = list else {
+        return Err(Error::usage(
+            Place::item("--thw"),
+            format!("--estimator {} follows one headway at a time", estimator.key()),
+            "give one, such as --thw 0.6, or a density fitted with --with-thw",
+        ));
+    };
+    Ok(*one)
+}
+
 /// `NAME=VALUE`.
 fn given(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
@@ -453,7 +394,7 @@ fn given(text: &str) -> std::result::Result<(String, f64), String> {
 
 /// The rows must replace neither an input nor another result.
 fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json", "part.json"];
+    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
     super::source::refuse_overwriting(rows, &others, "--rows")
 }

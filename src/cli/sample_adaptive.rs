@@ -1,25 +1,19 @@
 //! `lanesweep sample` with the estimators that look for failures, and with given proposals.
 
-use std::ops::Range;
 use std::path::PathBuf;
 
-use sha2::{Digest, Sha256};
-
-use super::sample::{EstimatorFlag, Run};
+use super::sample::{EstimatorFlag, Run, one_headway};
+use crate::Result;
 use crate::density::{BandwidthRule, Kde, Mixture};
 use crate::driver::ModelId;
 use crate::estimate::{
-    BlockSums, CrossEntropy, Defended, Density, Estimate, Importance, Pilot, StopReason, Subset, Technique, WeightSums,
-    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, from_weight_sums, importance,
-    importance_sums, subset,
+    CrossEntropy, Defended, Density, Estimate, Importance, Pilot, Subset, Technique, balance_heuristic, cross_entropy,
+    defended, from_pilot_with_proposal, importance, subset,
 };
 use crate::report::sampling::{EstimateFile, Levels};
 use crate::sampling::{
-    EstimateRow, LaneLimitState, Risk, SampleHeadways, WeightedPart, plan_points, read_proposal, truncated,
-    write_proposal, write_weighted_part,
+    EstimateRow, LaneLimitState, Risk, SampleHeadways, plan_points, read_proposal, truncated, write_proposal,
 };
-use crate::sweep::hex;
-use crate::{Error, Place, Result};
 
 /// Draws that the valid share of each of several proposals is counted on.
 const VALIDITY_DRAWS: u64 = 1_000_000;
@@ -29,14 +23,7 @@ impl Run<'_> {
     pub(super) fn adaptive(&self) -> Result<EstimateFile> {
         let headway = match &self.headways {
             SampleHeadways::Sampled => "sampled".to_owned(),
-            SampleHeadways::Each(list) if list.len() == 1 => list[0].to_string(),
-            SampleHeadways::Each(_) => {
-                return Err(Error::usage(
-                    Place::item("--thw"),
-                    format!("--estimator {} follows one headway at a time", self.flags.estimator.key()),
-                    "give one, such as --thw 0.6, or a density fitted with --with-thw",
-                ));
-            }
+            SampleHeadways::Each(list) => one_headway(list, self.flags.estimator)?.to_string(),
         };
         // The same complaint for every model: make it before any work.
         let first = self.density.kde.points()[0].clone();
@@ -46,35 +33,16 @@ impl Run<'_> {
             EstimatorFlag::Subset => 2000,
             _ => 100_000,
         });
-        let range = self.flags.lanes.is_some().then(|| self.flags.range(samples)).transpose()?;
-        let (mut rows, mut levels, mut sums) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rows, mut levels) = (Vec::new(), Vec::new());
         for &model in &self.models {
             tracing::info!("{} on {}", model.name(), self.opened.backend().describe());
-            let (estimate, level) = match &range {
-                Some(range) => {
-                    let part = self.part(&nominal, model, range.clone())?;
-                    let total = part.total().unwrap_or_default();
-                    sums.push((model, part));
-                    (from_weight_sums(&total, false, self.flags.level, StopReason::Samples), None)
-                }
-                None => self.estimate(&nominal, model, samples)?,
-            };
+            let (estimate, level) = self.estimate(&nominal, model, samples)?;
             let risk = Risk::of(&estimate, self.density.exposure.as_ref());
             rows.push(EstimateRow { model, criterion: self.criterion, headway: headway.clone(), estimate, risk });
             levels.extend(level);
         }
         let mut file = self.file(samples, rows)?;
         file.levels = levels;
-        let part = self.flags.out.join("part.json");
-        if range.is_some() {
-            let run_sha256 = self.weighted_run(samples)?;
-            write_weighted_part(
-                &part,
-                &WeightedPart { run_sha256, criterion: self.criterion, headway, samples, sums },
-            )?;
-        } else if part.exists() {
-            std::fs::remove_file(&part).map_err(|e| Error::io(&part, "replace", e))?;
-        }
         Ok(file)
     }
 
@@ -89,21 +57,6 @@ impl Run<'_> {
             backend: self.opened.backend(),
             fallback: self.opened.fallback(),
         }
-    }
-
-    /// The sums of some samples of one given proposal.
-    fn part(&self, nominal: &dyn Density, model: ModelId, range: Range<u64>) -> Result<BlockSums<WeightSums>> {
-        let proposal = defended(read_proposal(&self.flags.proposal[0], &self.density)?, nominal, self.flags.defence)?;
-        importance_sums(nominal, &proposal, &self.limit_state(model), self.flags.seed, range)
-    }
-
-    /// What must be the same in all parts of a run.
-    fn weighted_run(&self, samples: u64) -> Result<String> {
-        let proposal = read_proposal(&self.flags.proposal[0], &self.density)?;
-        let headways = &self.headways;
-        let what = (self.flags.defence, self.flags.seed, samples, self.criterion, headways, &self.models);
-        let text = format!("{} {proposal:?} {:?} {what:?}", self.density.content_sha256()?, self.profile);
-        Ok(hex(&Sha256::digest(text)))
     }
 
     fn estimate(&self, nominal: &dyn Density, model: ModelId, samples: u64) -> Result<(Estimate, Option<Levels>)> {

@@ -64,7 +64,7 @@ pub(super) fn check_writable(out: &Path) -> Result<()> {
 }
 
 /// Beginnings of the names of all files that a sampling run writes beside its input.
-const OURS: [&str; 6] = ["estimate", "worst.csv", "convergence.", "map-", "part.json", "proposal-"];
+const OURS: [&str; 5] = ["estimate", "worst.csv", "convergence.", "map-", "proposal-"];
 
 /// Takes the files of an earlier run out of a folder, so that none stands beside the results of this one; keeps those
 /// whose names begin so.

@@ -117,7 +117,7 @@ impl Study {
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let (study, timings) = self.prepare(verbosity)?;
         if self.shards.plan_only || self.shards.is_part() {
-            let text = study.seal()?;
+            let (text, run_sha256) = study.seal()?;
             leave_plan(&self.out, &text)?;
             if self.shards.plan_only {
                 let path = self.out.join(PLAN_FILE);
@@ -125,7 +125,6 @@ impl Study {
                 console::print(&format!("{} lanes planned in {}\n", lanes, path.display()))?;
                 return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
             }
-            let run_sha256 = PlannedStudy::run_sha256(&text)?;
             return self.sweep(&study, &opened, run_sha256, timings, verbosity);
         }
         // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mining::{MiningOptions, RecordingSummary};
 use crate::parameterization::ParameterizationOptions;
-use crate::parts::{read_sealed, seal, unseal};
+use crate::parts::{read_sealed, seal};
 use crate::score::ScoreOptions;
 use crate::sweep::{LanePlan, PlanContent};
 use crate::{Place, Result};
@@ -60,8 +60,8 @@ pub(super) struct PlannedStudy {
 }
 
 impl PlannedStudy {
-    /// As the text of a plan file.
-    pub fn seal(&self) -> Result<Vec<u8>> {
+    /// As the text of a plan file, with the hash of the run.
+    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
         seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? })
     }
 
@@ -72,12 +72,6 @@ impl PlannedStudy {
     pub fn read(path: &Path) -> Result<(PlannedStudy, String)> {
         let (file, run_sha256) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
         Ok((PlannedStudy::of(file, &Place::file(path))?, run_sha256))
-    }
-
-    /// The hash of a plan file's run, from its text.
-    pub fn run_sha256(text: &[u8]) -> Result<String> {
-        let place = Place::item("plan");
-        Ok(unseal::<serde::de::IgnoredAny>(KIND, text, &place, AGAIN)?.1)
     }
 
     fn of(file: StudyPlanFile, place: &Place) -> Result<PlannedStudy> {

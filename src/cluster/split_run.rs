@@ -6,7 +6,7 @@ use crate::{Error, Place, Result};
 const VERBS: [&str; 2] = ["study", "sample"];
 
 /// Flags that the scripts give the run, each with what to write instead.
-const TAKEN: [(&str, &str); 9] = [
+const TAKEN: [(&str, &str); 8] = [
     ("--shard", "leave it out: --array says into how many shards the run is split"),
     ("--out", "give --out DIR before the `--`: the folder belongs to all tasks"),
     ("--plan", "leave it out: submit.sh makes the plan and each task runs from it"),
@@ -15,7 +15,6 @@ const TAKEN: [(&str, &str); 9] = [
     ("--threads", "give --cpus N before the `--`: each task uses the processors that Slurm gives it"),
     ("--backend", "give --gpus 1 or --gpus none before the `--`"),
     ("--device", "leave it out: each task uses the GPU that Slurm gives it (--gpus 1)"),
-    ("--join", "leave it out: merge.sbatch joins the parts"),
 ];
 
 /// A run that can be split: `study` or `sample` with its own arguments.

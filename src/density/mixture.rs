@@ -39,7 +39,7 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// Checks shapes and scales the weights to sum 1.
+    /// Checks shapes and scales the weights to sum 1; weights that do so up to rounding are kept.
     ///
     /// # Errors
     /// [`Error::Usage`] where there is no component, shapes differ, there are more than [`MAX_DIMENSIONS`]
@@ -81,7 +81,9 @@ impl Mixture {
         if factor_of.iter().any(|&f| f >= factors.len()) {
             return wrong("a component has no spread".to_owned());
         }
-        let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
+        // What has been scaled once sums to 1 up to rounding and stays as it is: a mixture read back is the same one.
+        let is_scaled = (total - 1.0).abs() <= 2.0 * weights.len() as f64 * f64::EPSILON;
+        let weights = if is_scaled { weights } else { weights.iter().map(|w| w / total).collect() };
         Ok(Mixture::prepared(dimensions, weights, means, factors, factor_of))
     }
 
@@ -283,6 +285,19 @@ mod tests {
         let expected = -0.5 * (0.25 + 4.0 / 9.0) - libm::log(2.0 * std::f64::consts::PI * 6.0);
         assert!((one.log_density(&[2.0, 4.0]) - expected).abs() < 1e-14);
         assert_eq!(one.log_density(&[f64::NAN, 0.0]), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn a_mixture_made_of_its_own_weights_is_the_same_one() {
+        for seed in 0..200_u64 {
+            let n = 1 + seed as usize * 7 % 300;
+            let weights =
+                (0..n as u64).map(|i| libm::exp(((i * 2_654_435_761 + seed * 97) % 1000) as f64 / 90.0 - 8.0));
+            let means: Vec<Vec<f64>> = (0..n).map(|i| vec![i as f64]).collect();
+            let one = Mixture::new(weights.collect(), means.clone(), vec![vec![1.0]], vec![0; n]).unwrap();
+            let again = Mixture::new(one.weights().to_vec(), means, vec![vec![1.0]], vec![0; n]).unwrap();
+            assert_eq!(one, again, "{n} weights");
+        }
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub struct Part<T> {
 /// [`Error::Io`].
 pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    file.append(&seal("part", part)?)?;
+    file.append(&seal("part", part)?.0)?;
     file.stage()?.publish()
 }
 

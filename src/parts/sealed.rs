@@ -24,18 +24,18 @@ struct Sealed<'a> {
     content: &'a RawValue,
 }
 
-/// The text of a sealed file.
+/// The text of a sealed file, with its content's hash.
 ///
 /// # Errors
 /// None for what this program makes.
-pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<Vec<u8>> {
+pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> {
     let unwritable = |e: serde_json::Error| Error::Internal(format!("a {kind} cannot be written: {e}"));
     let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
     let sha256 = hex(&Sha256::digest(content.get()));
     let sealed = Sealed { lanesweep: kind.to_owned(), version: VERSION, sha256, content: &content };
     let mut text = serde_json::to_vec(&sealed).map_err(unwritable)?;
     text.push(b'\n');
-    Ok(text)
+    Ok((text, sealed.sha256))
 }
 
 /// The content of a sealed text with its checksum. `again` says how such a file is made.
@@ -90,10 +90,10 @@ mod tests {
 
     #[test]
     fn every_changed_byte_and_every_cut_is_noticed() {
-        let text = seal("part", &vec![1.5_f64, 0.1, 3.0]).unwrap();
+        let (text, sha256) = seal("part", &vec![1.5_f64, 0.1, 3.0]).unwrap();
         let place = Place::item("here");
         let read = |text: &[u8]| unseal::<Vec<f64>>("part", text, &place, "make it again");
-        assert_eq!(read(&text).unwrap().0, [1.5, 0.1, 3.0]);
+        assert_eq!(read(&text).unwrap(), (vec![1.5, 0.1, 3.0], sha256));
         for at in 0..text.len() - 1 {
             let mut changed = text.clone();
             changed[at] ^= 1;

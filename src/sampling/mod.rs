@@ -16,7 +16,7 @@ mod proposal_file;
 mod risk;
 mod rows;
 mod tally;
-mod weighted_part;
+mod weighted_tally;
 
 pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
 pub use compare::{
@@ -32,8 +32,8 @@ pub use lanes::{LaneLimitState, truncated};
 pub use limit_state::limit_state;
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
-pub use proposal_file::{read_proposal, write_proposal};
+pub use proposal_file::{proposal_from_text, proposal_text, read_proposal, write_proposal};
 pub use risk::{Risk, RiskRate};
 pub use rows::{EstimateRow, crude_rows, headway_name};
 pub use tally::{SampleTally, TallyOptions, WorstSample};
-pub use weighted_part::{WeightedPart, read_weighted_part, write_weighted_part};
+pub use weighted_tally::WeightedTally;

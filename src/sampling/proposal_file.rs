@@ -29,11 +29,11 @@ fn names(density: &DensityModel) -> Vec<String> {
     density.space.parameters().iter().map(|p| p.name.clone()).collect()
 }
 
-/// Writes a proposal: whole or not at all.
+/// A proposal for a density as the text of a file.
 ///
 /// # Errors
-/// [`Error::Io`] if the folder cannot be written to.
-pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -> Result<()> {
+/// None for what this program makes.
+pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<String> {
     let components = 0..proposal.weights().len();
     let file = File {
         lanesweep_proposal: VERSION,
@@ -43,10 +43,16 @@ pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -
         means: components.clone().map(|k| proposal.mean(k).to_vec()).collect(),
         factors: components.map(|k| proposal.factor(k).to_vec()).collect(),
     };
-    let text = serde_json::to_string_pretty(&file)
-        .map_err(|e| Error::Internal(format!("a proposal cannot be written: {e}")))?;
+    serde_json::to_string_pretty(&file).map_err(|e| Error::Internal(format!("a proposal cannot be written: {e}")))
+}
+
+/// Writes a proposal: whole or not at all.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be written to.
+pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -> Result<()> {
     let mut out = AtomicFile::create(path)?;
-    out.append(text.as_bytes())?;
+    out.append(proposal_text(density, proposal)?.as_bytes())?;
     out.stage()?.publish()
 }
 
@@ -55,14 +61,17 @@ pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
 pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
-    let io = |e| Error::io(path, "read", e);
+    proposal_from_text(&input_file::read(path, LARGEST_FILE_BYTES)?, density, &Place::file(path))
+}
+
+/// A proposal for a density from the text of a file.
+///
+/// # Errors
+/// [`Error::Input`] at `place`, as [`read_proposal`].
+pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) -> Result<Mixture> {
     let again = "write it again with `lanesweep sample --estimator ce` or `is`";
-    let wrong = |problem: String| Error::input(Place::file(path), problem, again);
-    if std::fs::metadata(path).map_err(io)?.len() > LARGEST_FILE_BYTES {
-        return Err(wrong("it is larger than any proposal".to_owned()));
-    }
-    let text = input_file::read(path, LARGEST_FILE_BYTES)?;
-    let value: serde_json::Value = serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
+    let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    let value: serde_json::Value = serde_json::from_slice(text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
     match value.get("lanesweep_proposal").map(serde_json::Value::as_u64) {
         None => return Err(wrong("it is no proposal: `lanesweep_proposal` is missing".to_owned())),
         Some(Some(VERSION)) => (),

@@ -8,11 +8,11 @@ use lanesweep::density::{DensityModel, Exposure, ExposureFile, read_density};
 use lanesweep::driver::ModelId;
 use lanesweep::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::parameterization::ParameterizationOptions;
-use lanesweep::parts::{Journal, Ledger, read_part, read_sealed};
+use lanesweep::parts::{Countable, Journal, Ledger, read_part, read_sealed};
 use lanesweep::profile::Profile;
 use lanesweep::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples, read_proposal,
-    read_weighted_part,
+    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, WeightedTally, plan_samples,
+    read_proposal,
 };
 use lanesweep::scenario::{Scenario, read_scenarios};
 use lanesweep::score::ScoreOptions;
@@ -58,8 +58,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
     readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
     readers.push(plain("journal", &seeds.journals, journal));
-    let sums = |b: &[u8], _: &Path, _: &Seeds| resealed(b, b"\"part\":");
-    readers.push(Reader { reseal: Some(sums), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
+    readers.push(Reader { reseal: Some(sealed), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
     readers.push(Reader { reseal: Some(reseal_partial), ..plain("partial", &seeds.partials, partial) });
     readers
 }
@@ -241,16 +240,18 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
 /// The units of the part that is made as a seed.
 pub const PART_UNITS: std::ops::Range<u64> = 3..17;
 
+/// The units of the part of weighted sums that is made as a seed.
+pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
+
 fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
-    let Some(mut part) = read_weighted_part(&file(bytes, dir, "part.json"))? else {
-        return Err(Error::input(Place::item("part"), "another kind", "give another"));
-    };
-    part.covered();
-    for (_, sums) in &part.sums {
-        sums.total();
+    let part = read_part::<WeightedTally>(&file(bytes, dir, "part.json"), "00", &WEIGHTED_UNITS, "again")?;
+    for segment in part.segments {
+        for (_, sums) in &segment.sums {
+            sums.total().unwrap_or_default().figures();
+        }
+        // The same samples twice have to be refused.
+        assert!(segment.covered().is_empty() || segment.clone().join(segment).is_err());
     }
-    // The same part twice has to be refused.
-    assert!(part.covered() == 0 || part.merge(part.clone()).is_err());
     Ok(())
 }
 

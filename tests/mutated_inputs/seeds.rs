@@ -9,7 +9,7 @@ use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions};
 use lanesweep::parts::{Journal, Part, seal, write_part};
 use lanesweep::profile::Profile;
-use lanesweep::sampling::{MapAxes, SampleTally, TallyOptions, WeightedPart, write_proposal, write_weighted_part};
+use lanesweep::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::score::ScoreOptions;
 use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, PlanContent, Wanted};
@@ -17,7 +17,7 @@ use lanesweep::trajectory::Recording;
 use lanesweep::trajectory::generator::GeneratorOptions;
 
 use super::plans;
-use super::readers::{CRITERION, PART_UNITS, small_plan};
+use super::readers::{CRITERION, PART_UNITS, WEIGHTED_UNITS, small_plan};
 use super::small;
 
 /// Valid inputs and what the next steps need beside them.
@@ -130,12 +130,12 @@ impl Seeds {
         let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
         let sums = |k: u64| WeightSums { draws: k, weight: 0.5, ..WeightSums::default() };
         let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
-        let weighted = WeightedPart {
+        let sums = ModelId::ALL.into_iter().map(|m| (m, BlockSums::of_leaves(5, &leaves))).collect();
+        let weighted = Part {
             run_sha256: "00".to_owned(),
-            criterion: CRITERION,
-            headway: "1 s".to_owned(),
-            samples: 20,
-            sums: ModelId::ALL.into_iter().map(|m| (m, BlockSums::of_leaves(5, &leaves))).collect(),
+            units: WEIGHTED_UNITS,
+            lanes_redone_and_rechecked: [0; 2],
+            segments: vec![WeightedTally { sums }],
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::sweep::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
@@ -185,9 +185,9 @@ impl Seeds {
                 .collect(),
             proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
             parts: parts.into(),
-            plans: vec![seal("plan", &PlanContent::of(&study).unwrap()).unwrap()],
+            plans: vec![seal("plan", &PlanContent::of(&study).unwrap()).unwrap().0],
             journals: journals.into(),
-            weighted_parts: vec![written(|p| write_weighted_part(p, &weighted).unwrap())],
+            weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
             partials: vec![partial.to_json().unwrap().into_bytes()],
             profile,
             jrc: Profile::load("jrc-2021").unwrap(),

@@ -1,0 +1,99 @@
+//! What the flags of `lanesweep sample` must fulfil whatever the density is.
+
+use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use crate::{Error, Place, Result};
+
+/// Points that an adaptive estimator holds at once, at most.
+const MOST_HELD: u64 = 10_000_000;
+
+/// The complaint about a flag that the weighing estimators do not have.
+pub(super) fn only_crude(flag: &str) -> Error {
+    let problem = "this belongs to crude Monte Carlo";
+    Error::usage(Place::item(flag), problem, "use --estimator mc, or leave it out")
+}
+
+impl Sample {
+    /// What no density is needed for.
+    pub(super) fn check(&self) -> Result<()> {
+        let share = |name: &str, value: f64, from_zero: bool| {
+            let fits = value < 1.0 && (value > 0.0 || (from_zero && value == 0.0));
+            if fits {
+                return Ok(());
+            }
+            let range = if from_zero { "from 0 to below 1" } else { "between 0 and 1" };
+            Err(Error::usage(Place::item(name), format!("{value} is no share"), format!("give a number {range}")))
+        };
+        share("--level", self.level, false)?;
+        share("--worst-share", self.worst_share, false)?;
+        share("--defence", self.defence, true)?;
+        share("--broad", self.broad, true)?;
+        if self.until.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
+            return Err(Error::usage(Place::item("--until"), "no half-width", "give a number above 0, such as 0.05"));
+        }
+        if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
+            return Err(Error::usage(Place::item("--time-limit"), "no time", "give seconds above 0"));
+        }
+        if self.samples == Some(0) {
+            let help = "give 1000000, for instance";
+            return Err(Error::usage(Place::item("--samples"), "0 samples estimate nothing", help));
+        }
+        if self.samples.is_some_and(|n| n >= 1 << 63) {
+            let problem = "2^63 samples and more cannot be counted";
+            return Err(Error::usage(Place::item("--samples"), problem, "give fewer"));
+        }
+        let is_crude = self.is_crude();
+        let belongs_to_crude = [
+            ("--rows", self.rows.is_some()),
+            ("--map", self.map.is_some()),
+            ("--bootstrap", self.bootstrap > 0),
+            ("--given", !self.given.is_empty()),
+            ("--points sobol", self.points == PointsFlag::Sobol),
+        ];
+        if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
+            return Err(only_crude(flag));
+        }
+        let least = |flag: &str, value: u64, least: u64, most: u64| {
+            if (least..=most).contains(&value) {
+                return Ok(());
+            }
+            let help = format!("give at least {least} and at most {most}");
+            Err(Error::usage(Place::item(flag), format!("{value} does not do"), help))
+        };
+        match self.estimator {
+            EstimatorFlag::Is if self.proposal.is_empty() => least("--pilot", self.pilot, 500, MOST_HELD)?,
+            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MOST_HELD)?,
+            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?,
+            _ => (),
+        }
+        if self.bootstrap > 0 {
+            least("--bootstrap", self.bootstrap.into(), 20, 1 << 20)?;
+            least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
+            if !self.given.is_empty() {
+                let problem = "replicates are those of the whole density";
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --given out"));
+            }
+            if self.shards.is_part() || self.shards.plan_only {
+                let problem = "a part of a run has no replicates of its own";
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --shard out"));
+            }
+        }
+        let is_split = self.shards.is_part() || self.shards.plan_only;
+        if is_split && !is_crude && !self.is_weighted() {
+            let problem = "the adaptive estimators are sequential: they make no shards";
+            let help = "use --estimator mc, or --estimator is with one given --proposal";
+            return Err(Error::usage(Place::item("--shard"), problem, help));
+        }
+        if is_split && (self.until.is_some() || self.time_limit.is_some()) {
+            let problem = "a part of a run cannot tell when the whole is good enough";
+            return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
+        }
+        if !self.proposal.is_empty() && self.estimator != EstimatorFlag::Is {
+            return Err(Error::usage(
+                Place::item("--proposal"),
+                "a given proposal is sampled by importance sampling",
+                "add --estimator is",
+            ));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,155 @@
+//! Importance sampling of one given proposal: in one piece, as a shard, from a plan, and merged.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::Exit;
+use super::backend_flags::Opened;
+use super::console::{self, Verbosity};
+use super::merge::read_parts;
+use super::sample::Sample;
+use super::sample_lanes;
+use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
+use super::weighted_plan::PlannedWeighted;
+use crate::density::write_density;
+use crate::driver::ModelId;
+use crate::estimate::{BlockSums, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
+use crate::parts::{Countable, Ledger};
+use crate::report::files::write_atomically;
+use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
+use crate::{Error, Place, Result, interrupt};
+
+/// Samples that are judged between two looks at the journal.
+const CHUNK: u64 = 1 << 16;
+
+/// Samples what was planned: the whole run, or a shard of it.
+pub(super) fn run(
+    flags: &Sample,
+    planned: &PlannedWeighted,
+    opened: &Opened,
+    started: Instant,
+    verbosity: Verbosity,
+) -> Result<Exit> {
+    let (samples, out, shard) = (planned.facts.samples, &flags.out, flags.shards.shard);
+    let (text, run_sha256) = planned.seal()?;
+    if flags.shards.plan_only || shard.is_some() {
+        leave_plan(out, &text)?;
+    }
+    if flags.shards.plan_only {
+        let lanes = samples.saturating_mul(planned.facts.models.len() as u64);
+        console::print(&format!("{lanes} lanes planned in {}\n", out.join(PLAN_FILE).display()))?;
+        return Ok(Exit::Ok);
+    }
+    let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: samples };
+    if desk.is_done::<WeightedTally>()? {
+        tracing::info!("this part is there already, and whole");
+        return Ok(Exit::Ok);
+    }
+    let mut work = desk.begin::<WeightedTally>(&[], true)?;
+    let left: u64 = work.ledger.missing(work.units.clone())?.iter().map(|range| range.end - range.start).sum();
+    tracing::info!("{left} samples on {}", opened.backend().describe());
+    {
+        let _resumable = interrupt::resumable();
+        let bar = console::progress(verbosity, left, "sampling");
+        let sampled = sample(planned, opened, &mut work.ledger, |samples| bar.inc(samples));
+        bar.finish_and_clear();
+        sampled?;
+    }
+    if shard.is_some() {
+        desk.finish(work, [0, 0])?;
+        return Ok(Exit::Ok);
+    }
+    let host = HostRecord {
+        backend: opened.backend().describe(),
+        device: opened.device(),
+        rechecked_lanes: 0,
+        seconds: started.elapsed().as_secs_f64(),
+        threads: rayon::current_num_threads(),
+    };
+    let tally = work.ledger.counts(0..samples)?;
+    write_run(planned, tally, host, out)?;
+    work.forget()?;
+    Ok(Exit::Ok)
+}
+
+/// Draws, judges and weighs what the ledger does not hold yet.
+fn sample(
+    planned: &PlannedWeighted,
+    opened: &Opened,
+    ledger: &mut Ledger<WeightedTally>,
+    each: impl Fn(u64),
+) -> Result<()> {
+    let (facts, density) = (&planned.facts, &planned.density);
+    let nominal = truncated(density)?;
+    let proposal = defended(planned.proposal.clone(), &nominal, facts.defence)?;
+    let lanes_of = |model: ModelId| LaneLimitState {
+        density,
+        profile: &facts.profile,
+        model,
+        criterion: facts.criterion,
+        headway: planned.headways(),
+        backend: opened.backend(),
+        fallback: opened.fallback(),
+    };
+    let units = ledger.units();
+    for missing in ledger.missing(units)? {
+        let mut at = missing.start;
+        while at < missing.end {
+            let next = (at / CHUNK + 1).saturating_mul(CHUNK).min(missing.end);
+            let sums_of = |&model: &ModelId| {
+                Ok((model, importance_sums(&nominal, &proposal, &lanes_of(model), facts.seed, at..next)?))
+            };
+            ledger.add(WeightedTally { sums: facts.models.iter().map(sums_of).collect::<Result<_>>()? })?;
+            each(next - at);
+            at = next;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the result of the parts in a folder.
+pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
+    let (planned, run_sha256) = PlannedWeighted::read(plan)?;
+    let parts = read_parts::<WeightedTally>(dir, plan, "sample", &run_sha256, planned.facts.samples)?;
+    let host = HostRecord {
+        backend: format!("{} parts merged", parts.len()),
+        device: None,
+        rechecked_lanes: 0,
+        seconds: 0.0,
+        threads: rayon::current_num_threads(),
+    };
+    let mut segments = parts.into_iter().flat_map(|part| part.segments);
+    let first = segments.next();
+    let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
+    write_run(&planned, tally, host, dir)?;
+    Ok(Exit::Ok)
+}
+
+/// Table, density, the record; the record comes last.
+fn write_run(planned: &PlannedWeighted, tally: Option<WeightedTally>, host: HostRecord, out: &Path) -> Result<()> {
+    let (facts, density) = (&planned.facts, &planned.density);
+    let tally = tally.filter(|tally| {
+        let models: Vec<ModelId> = tally.sums.iter().map(|(model, _)| *model).collect();
+        tally.covered().as_slice() == std::slice::from_ref(&(0..facts.samples)) && models == facts.models
+    });
+    let Some(tally) = tally else {
+        let problem = "the parts do not hold every sample of every driver model";
+        return Err(Error::input(Place::file(out), problem, "make them again"));
+    };
+    let row = |(model, sums): &(ModelId, BlockSums<WeightSums>)| {
+        let total = sums.total().unwrap_or_default();
+        let estimate = from_weight_sums(&total, false, facts.level, StopReason::Samples);
+        let risk = Risk::of(&estimate, density.exposure.as_ref());
+        EstimateRow { model: *model, criterion: facts.criterion, headway: planned.headway_name(), estimate, risk }
+    };
+    let file = EstimateFile::new(density, planned.run_facts(), tally.sums.iter().map(row).collect(), host)?;
+    // A proposal in this folder may be the one that was given.
+    sample_lanes::clear(out, &["proposal-"])?;
+    write_density(&out.join("density.json"), density)?;
+    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
+    write_atomically(&out.join("estimate.json"), &file.to_json()?)?;
+    console::print(&file.text())?;
+    tracing::info!("results written to {}", out.display());
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! A run over one given proposal as a plan file: density, proposal and everything that was asked for, so that every
+//! shard and the merge know the same run.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::criterion::Criterion;
+use crate::density::{DensityModel, Mixture};
+use crate::driver::ModelId;
+use crate::parts::{read_sealed, seal};
+use crate::profile::Profile;
+use crate::report::sampling::RunFacts;
+use crate::sampling::{SampleHeadways, plan_points, proposal_from_text, proposal_text};
+use crate::sweep::Headway;
+use crate::{Error, Place, Result};
+
+/// Kind of the sealed file.
+pub(super) const KIND: &str = "weighted sampling plan";
+/// Largest plan that is read: a density and a mixture.
+const LARGEST_PLAN_BYTES: u64 = 1 << 30;
+const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposal FILE --plan-only --out DIR` of this \
+                     version";
+
+/// Importance sampling of one given proposal, a fixed number of samples.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WeightedFacts {
+    /// The density file's text.
+    pub density: String,
+    /// The proposal file's text.
+    pub proposal: String,
+    /// Share of the density in the proposal.
+    pub defence: f64,
+    pub profile: Profile,
+    pub models: Vec<ModelId>,
+    /// None where the density draws it.
+    pub headway: Option<Headway>,
+    pub criterion: Criterion,
+    pub samples: u64,
+    pub seed: u64,
+    pub level: f64,
+}
+
+/// A run ready to be sampled.
+pub(super) struct PlannedWeighted {
+    pub facts: WeightedFacts,
+    pub density: DensityModel,
+    pub proposal: Mixture,
+}
+
+impl PlannedWeighted {
+    /// Plans; the texts in `facts` are set here.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where density, headway and models give no lanes.
+    pub fn new(density: DensityModel, proposal: Mixture, mut facts: WeightedFacts) -> Result<PlannedWeighted> {
+        let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
+        facts.density = String::from_utf8(density.to_json()?).map_err(unreadable)?;
+        facts.proposal = proposal_text(&density, &proposal)?;
+        let planned = PlannedWeighted { facts, density, proposal };
+        planned.check_lanes()?;
+        Ok(planned)
+    }
+
+    /// As the text of a plan file, with the hash of the run.
+    ///
+    /// # Errors
+    /// None for what this program makes.
+    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
+        seal(KIND, &self.facts)
+    }
+
+    /// From a plan file, with the hash of the run.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
+    pub fn read(path: &Path) -> Result<(PlannedWeighted, String)> {
+        let (facts, run_sha256): (WeightedFacts, _) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
+        let place = Place::file(path);
+        let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
+        facts.profile.check(&place)?;
+        if !(facts.level > 0.0 && facts.level < 1.0) {
+            return Err(wrong("its level is no share"));
+        }
+        if !(0.0..1.0).contains(&facts.defence) {
+            return Err(wrong("its defensive share is no share"));
+        }
+        if facts.samples == 0 || facts.samples >= 1 << 63 {
+            return Err(wrong("its number of samples cannot be"));
+        }
+        let density = DensityModel::from_json(facts.density.as_bytes(), &place)?;
+        let proposal = proposal_from_text(facts.proposal.as_bytes(), &density, &place)?;
+        let planned = PlannedWeighted { facts, density, proposal };
+        planned.check_lanes()?;
+        Ok((planned, run_sha256))
+    }
+
+    /// The headway of every lane, or the density's own.
+    pub fn headways(&self) -> SampleHeadways {
+        self.facts.headway.map_or(SampleHeadways::Sampled, |headway| SampleHeadways::Each(vec![headway]))
+    }
+
+    /// The headway's name in tables.
+    pub fn headway_name(&self) -> String {
+        self.facts.headway.map_or_else(|| "sampled".to_owned(), |headway| headway.to_string())
+    }
+
+    /// For `estimate.json`.
+    pub fn run_facts(&self) -> RunFacts {
+        let facts = &self.facts;
+        RunFacts {
+            estimator: "is",
+            profile: facts.profile.clone(),
+            models: facts.models.clone(),
+            headways: facts.headway.into_iter().collect(),
+            points: "random",
+            samples: facts.samples,
+            seed: facts.seed,
+            given: Vec::new(),
+        }
+    }
+
+    /// One point as lanes: complains before any work about what every point would.
+    fn check_lanes(&self) -> Result<()> {
+        let first = self.density.kde.points()[0].clone();
+        plan_points(&self.density, &[first], &self.facts.profile, &self.facts.models, &self.headways()).map(drop)
+    }
+}
