@@ -38,6 +38,7 @@ pub struct Journal<T> {
     head: Head,
     file: Option<File>,
     due: Instant,
+    spent: Duration,
     kind: PhantomData<T>,
 }
 
@@ -57,7 +58,8 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let head = Head { lanesweep_journal: 1, run_sha256: run_sha256.to_owned(), units };
         let due = Instant::now() + SHORTEST_WAIT;
-        let mut journal = Journal { path: path.to_path_buf(), head, file: None, due, kind: PhantomData };
+        let mut journal =
+            Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
         let mut file = match OpenOptions::new().read(true).write(true).open(path) {
             Ok(file) => file,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
@@ -130,8 +132,14 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             file.write_all(&text).and_then(|()| file.sync_data()).map_err(io)?;
         }
         let took = started.elapsed();
+        self.spent += took;
         self.due = Instant::now() + SHORTEST_WAIT.max(took * PATIENCE);
         Ok(())
+    }
+
+    /// Time that appending has taken so far.
+    pub fn spent(&self) -> Duration {
+        self.spent
     }
 
     /// The part is finished, or is to be forgotten: takes the file away.

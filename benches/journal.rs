@@ -1,0 +1,171 @@
+//! What it costs that nothing is lost: runs with and without a journal in turn, the time that the journal itself
+//! took, and what sealing and checking the plan and the parts takes beside the run.
+//!
+//! `cargo bench --bench journal` prints one CSV row per repetition to stdout and a summary to stderr. Synthetic data:
+//! a sampling run of 2·10⁶ samples of cut-in 2 against all models, and the study of the paper's size 20 times over.
+
+mod common;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use common::paper_size_scenarios;
+use lanesweep::criterion::Criterion;
+use lanesweep::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::driver::ModelId;
+use lanesweep::estimate::{BinomialInterval, StopRule};
+use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::parameterization::ParameterizationId;
+use lanesweep::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed, seal, write_part};
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{
+    CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
+    plan_samples, sample_into,
+};
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::sweep::{
+    CpuBackend, Headway, LanePlan, Partial, PlanContent, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
+};
+use lanesweep::trajectory::generator::GeneratorOptions;
+
+const PAIRS: usize = 9;
+const STUDIES: usize = 20;
+
+fn main() {
+    // `cargo test --benches` calls without `--bench`: nothing to time then.
+    if !std::env::args().any(|arg| arg == "--bench") {
+        return;
+    }
+    println!("run,repetition,seconds_without,seconds_with,seconds_in_journal,seconds_part");
+    let folder = tempfile::tempdir().unwrap();
+    sampling(folder.path());
+    study(folder.path());
+}
+
+fn sampling(folder: &Path) {
+    let samples = 2_000_000;
+    let options = SamplePlanOptions {
+        samples,
+        seed: 157,
+        source: SampleSource::Random,
+        models: ModelId::ALL.to_vec(),
+        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+    };
+    let density = density();
+    let plan = plan_samples(&density, &density.mixture().unwrap(), &Profile::load("paper").unwrap(), &options).unwrap();
+    let backend = CpuBackend::lane_arithmetic();
+    let lanes = Lanes { backend: &backend, fallback: None, recheck: None };
+    let counting = TallyOptions { worst: 20, criterion: Criterion::Collision, map: None };
+    let crude = CrudeOptions {
+        stop: StopRule::samples(samples),
+        interval: BinomialInterval::Wilson,
+        level: 0.95,
+        exposure: None,
+        is_sampled_headway: false,
+    };
+    pairs("sample", folder, plan.unit_count(), &checkpoints(samples), |ledger: &mut Ledger<SampleTally>| {
+        sample_into(&plan, ledger, &lanes, &counting, &crude, |_| Ok(())).unwrap();
+    });
+}
+
+fn study(folder: &Path) {
+    let one = paper_size_scenarios();
+    let many = (0..STUDIES).flat_map(|copy| {
+        one.iter().map(move |scenario| {
+            let mut scenario = scenario.clone();
+            scenario.id = format!("{}~{copy}", scenario.id);
+            scenario
+        })
+    });
+    let scenarios: Vec<Scenario> = many.collect();
+    let plan = plan_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan;
+    let backend = CpuBackend::lane_arithmetic();
+    pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
+        let units = ledger.units();
+        sweep(&plan, units, &backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
+            ledger.add(Partial::from_chunk(&plan, &chunk)?)
+        })
+        .unwrap();
+    });
+    plan_file(folder, &plan);
+}
+
+/// Runs with and without a journal in turn; what is counted last is written as a part and read again.
+fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run: impl Fn(&mut Ledger<T>)) {
+    let (mut ratios, mut shares) = (Vec::new(), Vec::new());
+    for repetition in 0..PAIRS {
+        let timed = |with: bool| {
+            let start = Instant::now();
+            let mut ledger = Ledger::new(0..units, cuts);
+            if with {
+                let (journal, found) = Journal::open(&folder.join("run.journal"), "run", 0..units).unwrap();
+                ledger.resume(journal, found).unwrap();
+            }
+            run(&mut ledger);
+            let (segments, journal) = ledger.finish().unwrap();
+            let spent = journal.as_ref().map_or(Duration::ZERO, Journal::spent);
+            if let Some(journal) = journal {
+                journal.remove().unwrap();
+            }
+            (start.elapsed().as_secs_f64(), spent.as_secs_f64(), segments)
+        };
+        // Each comes first every other time.
+        let is_with_first = repetition % 2 == 0;
+        let first = timed(is_with_first);
+        let second = timed(!is_with_first);
+        let (with, without) = if is_with_first { (first, second) } else { (second, first) };
+        let (with_s, in_journal_s, segments) = with;
+        let without_s = without.0;
+        let path = folder.join("part.json");
+        let start = Instant::now();
+        let part = Part { run_sha256: "run".to_owned(), units: 0..units, lanes_redone_and_rechecked: [0; 2], segments };
+        write_part(&path, &part).unwrap();
+        read_part::<T>(&path, "run", &(0..units), "again").unwrap();
+        let part_s = start.elapsed().as_secs_f64();
+        println!("{name},{repetition},{without_s},{with_s},{in_journal_s},{part_s}");
+        ratios.push(with_s / without_s);
+        shares.push((in_journal_s + part_s) / with_s);
+    }
+    ratios.sort_by(f64::total_cmp);
+    shares.sort_by(f64::total_cmp);
+    eprintln!(
+        "{name}: with over without {:.4} (median of {PAIRS} pairs, from {:.4} to {:.4}); journal and part by their own \
+         clocks {:.2} % of the run (median, at most {:.2} %)",
+        ratios[PAIRS / 2],
+        ratios[0],
+        ratios[PAIRS - 1],
+        100.0 * shares[PAIRS / 2],
+        100.0 * shares[PAIRS - 1]
+    );
+}
+
+/// What a shard that is given the plan pays for it.
+fn plan_file(folder: &Path, plan: &LanePlan) {
+    let path = folder.join("plan.json");
+    let start = Instant::now();
+    let (text, _) = seal("plan", &PlanContent::of(plan).unwrap()).unwrap();
+    std::fs::write(&path, &text).unwrap();
+    let written = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let (content, _): (PlanContent, _) = read_sealed("plan", &path, 4 << 30, "again").unwrap();
+    let parsed = start.elapsed().as_secs_f64();
+    let again = content.into_plan(&lanesweep::Place::file(&path)).unwrap();
+    let read = start.elapsed().as_secs_f64();
+    assert_eq!(again.hash(), plan.hash());
+    println!("plan file of {} lanes and {} bytes,0,{written},{read},{parsed},", plan.lane_count(), text.len());
+    eprintln!(
+        "plan file: {} lanes, {:.1} MB, written in {written:.2} s, read and checked in {read:.2} s",
+        plan.lane_count(),
+        text.len() as f64 / 1e6
+    );
+}
+
+fn density() -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let scenarios = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios;
+    DensityModel::fit(ParameterizationId::find(Category::CutIn, "2").unwrap(), &scenarios, &facts, &options)
+        .unwrap()
+        .model
+}
