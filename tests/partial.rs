@@ -80,6 +80,21 @@ proptest! {
 }
 
 #[test]
+fn counts_by_headway_that_do_not_add_up_are_those_of_no_study() {
+    let plan = study();
+    let honest = whole(&plan, 3);
+    assert!(honest.fits(&plan) && Partial::empty(&plan).fits(&plan));
+    let parts = [0..3, 3..9].map(|units| Partial::from_chunk(&plan, &chunk(&plan, units, &lane(3), false)).unwrap());
+    assert!(parts.iter().all(|part| part.fits(&plan)));
+    let mut changed = serde_json::to_value(&honest).unwrap();
+    let count = &mut changed["headway_failures"][5];
+    *count = (count.as_u64().unwrap() + 1).into();
+    assert!(!serde_json::from_value::<Partial>(changed.clone()).unwrap().fits(&plan));
+    changed["headway_failures"].as_array_mut().unwrap().pop();
+    assert!(!serde_json::from_value::<Partial>(changed).unwrap().fits(&plan));
+}
+
+#[test]
 fn the_worst_lanes_are_the_smallest_by_value_and_then_by_lane() {
     let plan = study();
     let lane = |lane: u64| (Verdicts(0), if lane.is_multiple_of(3) { 0.0 } else { 1.0 });
@@ -107,6 +122,13 @@ fn counts_are_over_the_headways_of_one_scenario() {
     assert_eq!((cell(1).both, cell(1).only_s, cell(1).only_s_prime, cell(1).neither), (3, 7, 0, 0));
     assert_eq!((cell(2).both, cell(2).only_s), (0, 10));
     assert_eq!(unit.cells[1].neither, 10, "TTC never fails");
+    // Over the four cut-ins, headway by headway: S fails everywhere, variant 1 at the first three.
+    let by_headway = partial.headway_failures(&plan, 0).unwrap();
+    let width = plan.models.len() * Criterion::ALL.len();
+    let first: Vec<u64> = by_headway.iter().step_by(width).copied().collect();
+    assert_eq!(first[..10], [4; 10]);
+    assert_eq!(first[10..20], [4, 4, 4, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(by_headway.iter().sum::<u64>(), first.iter().sum::<u64>());
 }
 
 #[test]
@@ -122,7 +144,7 @@ fn overlaps_and_strangers_are_refused() {
     assert!(read("{\"a\": 1}").contains("no partial result"));
     assert!(read("{\"format\": \"lanesweep partial\", \"ver").contains("no complete JSON"));
     assert!(read("{\"format\": \"lanesweep partial\", \"version\": 99}").contains("version is 99"));
-    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 2}").contains("damaged"));
+    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 3}").contains("damaged"));
 }
 
 #[test]

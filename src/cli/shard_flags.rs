@@ -33,16 +33,22 @@ pub const PLAN_FILE: &str = "plan.json";
 
 /// Beginnings of the names that a whole run or a merge writes under its lock. Others in the same folder may be some
 /// other command's, at work.
-const RESULTS: [&str; 12] = [
+const RESULTS: [&str; 18] = [
     "claims.csv",
     "convergence.",
     "density.json",
     "estimate",
+    "f1-by-parameters-",
     "f1.csv",
     "failures.csv",
+    "headways",
     "map-",
+    "modes-",
+    "parameters-",
     "radar-",
+    "recall-precision-",
     "reference.csv",
+    "report.html",
     "report.txt",
     "run.json",
     "worst.csv",

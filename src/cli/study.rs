@@ -15,10 +15,11 @@ use super::study_run::{Host, How, compare_reference, finish_study, run_units, wr
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
-use crate::parameterization::ParameterizationOptions;
+use crate::parameterization::{ParameterizationOptions, Reduction};
+use crate::report::distributions::parameter_histograms;
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
-use crate::scenario::Category;
+use crate::scenario::{Category, Scenario};
 use crate::score::ScoreOptions;
 use crate::sweep::{Backend, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, plan_study};
 use crate::{Error, Place, Result};
@@ -169,7 +170,7 @@ impl Study {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenarios.as_deref().map(source::checksum).transpose()?,
-            categories: category_facts(&collection, &planned),
+            categories: category_facts(&collection, &planned, &config.parameterization)?,
             left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
             recordings: collection.recordings,
             mining: config.mining,
@@ -252,12 +253,20 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     result
 }
 
-fn category_facts(collection: &Collection, planned: &StudyPlan) -> Vec<CategoryFacts> {
+fn category_facts(
+    collection: &Collection,
+    planned: &StudyPlan,
+    options: &ParameterizationOptions,
+) -> Result<Vec<CategoryFacts>> {
     let facts = |block: &crate::sweep::Block| {
         let of = count(&collection.scenarios, block.category);
         let reduction = planned.reductions.iter().find(|r| r.category == block.category);
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
-        CategoryFacts { found: of.found, kept: of.kept, svd_explained }
+        let modes = reduction.map_or(Vec::new(), Reduction::mode_shapes);
+        let kept: Vec<&Scenario> =
+            collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
+        let parameters = parameter_histograms(block.category, &kept, options)?;
+        Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes })
     };
     planned.plan.blocks.iter().map(facts).collect()
 }

@@ -6,8 +6,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::mining::{MiningOptions, RecordingSummary};
-use crate::parameterization::ParameterizationOptions;
+use crate::parameterization::{ModeShape, ParameterizationOptions};
 use crate::parts::{read_sealed, seal};
+use crate::report::distributions::ParameterHistogram;
 use crate::score::ScoreOptions;
 use crate::sweep::{LanePlan, PlanContent};
 use crate::{Place, Result};
@@ -24,6 +25,8 @@ pub(super) struct CategoryFacts {
     pub found: u64,
     pub kept: u64,
     pub svd_explained: Vec<f64>,
+    pub parameters: Vec<ParameterHistogram>,
+    pub modes: Vec<ModeShape>,
 }
 
 /// What a report says beside the lanes' outcomes.

@@ -10,7 +10,8 @@ use crate::report::files::make_folder;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SweepRecord, Timings};
-use crate::report::study::StudyReport;
+use crate::report::study::{CategoryPictures, StudyReport};
+use crate::report::study_figures::HeadwayFailures;
 use crate::score::{ScoreTable, f1, judge_claims, score};
 use crate::sweep::{
     Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Wanted, chunks, sweep,
@@ -142,7 +143,16 @@ pub(super) fn finish_study(
         timings: host.timings,
     };
     let claims = judge_claims(&scores);
-    let report = StudyReport { scores, claims, run, published: facts.published, comparison };
+    let picture = |(block, of): (usize, &super::study_plan::CategoryFacts)| {
+        Ok(CategoryPictures {
+            headways: HeadwayFailures::of(plan, partial, block)?,
+            parameters: of.parameters.clone(),
+            modes: of.modes.clone(),
+            svd_explained: of.svd_explained.clone(),
+        })
+    };
+    let pictures = study.facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
+    let report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
     let written = report.write(out)?;
     console::print(&report.text())?;
     tracing::info!("{} files written to {}", written.len(), out.display());

@@ -9,6 +9,7 @@
 mod cut_in;
 mod cut_out;
 mod lvd;
+mod modes;
 mod options;
 mod recorded;
 mod reduction;
@@ -19,6 +20,7 @@ mod svd;
 pub use cut_in::CutInParameters;
 pub use cut_out::CutOutParameters;
 pub use lvd::LvdParameters;
+pub use modes::ModeShape;
 pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };

@@ -109,6 +109,16 @@ impl Reduction {
         weighted / self.basis.weights[column]
     }
 
+    /// Instants of a series.
+    pub(super) fn instants(&self) -> usize {
+        self.options.svd_instants
+    }
+
+    /// Whether the lateral series is left-positive instead of positive on the target's side.
+    pub(super) fn is_signed(&self) -> bool {
+        self.options.svd_lateral == SvdLateral::Signed
+    }
+
     /// Column of T, the last one.
     pub fn duration_column(&self) -> usize {
         self.basis.mean.len() - 1

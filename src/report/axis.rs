@@ -264,7 +264,7 @@ pub(super) fn plain_end(value: f64) -> f64 {
 }
 
 /// The smallest 1, 2 or 5 times a power of ten that is not below `step` (positive).
-fn plain_step(step: f64) -> f64 {
+pub(super) fn plain_step(step: f64) -> f64 {
     let step = step.max(f64::MIN_POSITIVE);
     let (digit, exponent) = one_two_five(step);
     let value = |(digit, exponent): OneTwoFive| format!("{digit}e{exponent}").parse().unwrap_or(step);

@@ -2,16 +2,32 @@
 
 use std::path::{Path, PathBuf};
 
+use super::distributions::{ParameterHistogram, distributions};
 use super::files::{make_folder, write_atomically};
+use super::panels::PanelFigure;
 use super::radar::{RadarChart, RadarSeries, radar_svg};
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
+use super::study_figures::{HeadwayFailures, f1_by_parameters, legend_name, modes, recall_and_precision};
 use super::{csv, tables};
 use crate::criterion::Criterion;
-use crate::parameterization::ParameterizationId;
+use crate::parameterization::ModeShape;
 use crate::scenario::Category;
 use crate::score::{CategoryScores, ClaimResult, ScoreTable, f1};
 use crate::{Error, Result};
+
+/// What the figures of one category need beside the scores.
+#[derive(Debug, Clone)]
+pub struct CategoryPictures {
+    /// Failures by headway.
+    pub headways: HeadwayFailures,
+    /// Distributions of the mined parameters.
+    pub parameters: Vec<ParameterHistogram>,
+    /// Shapes of the decomposition, where there is one.
+    pub modes: Vec<ModeShape>,
+    /// What its first coefficients explain together.
+    pub svd_explained: Vec<f64>,
+}
 
 /// Everything a study says.
 pub struct StudyReport {
@@ -19,6 +35,8 @@ pub struct StudyReport {
     pub scores: ScoreTable,
     /// Claims with their verdicts.
     pub claims: Vec<ClaimResult>,
+    /// One per category of the scores.
+    pub pictures: Vec<CategoryPictures>,
     /// What was run.
     pub run: RunRecord,
     /// Set the paper's published numbers beside.
@@ -57,9 +75,13 @@ impl StudyReport {
             (dir.join("claims.csv"), csv::claims(&self.claims, data)?),
             (dir.join("report.txt"), self.text().into_bytes()),
         ];
-        for category in &self.scores.categories {
-            let name = format!("radar-{}.svg", category.category.key().replace('_', "-"));
-            files.push((dir.join(name), radar_svg(&self.radar(category)).into_bytes()));
+        files.push((dir.join("headways.csv"), self.headways(data)?));
+        for (at, category) in self.scores.categories.iter().enumerate() {
+            files.push((dir.join(file_name("radar", category.category, "svg")), self.radar(category).into_bytes()));
+            for (name, figure) in self.figures(at) {
+                files.push((dir.join(file_name(name, category.category, "svg")), figure.svg().into_bytes()));
+                files.push((dir.join(file_name(name, category.category, "csv")), figure.csv()?));
+            }
         }
         files.push((dir.join("run.json"), self.run.to_json()?));
         if let Some(comparison) = &self.comparison {
@@ -73,32 +95,67 @@ impl StudyReport {
     }
 
     /// F1 per model and criterion (spokes), one polygon per parameterization, as in the paper.
-    fn radar(&self, scores: &CategoryScores) -> RadarChart {
+    pub(super) fn radar(&self, scores: &CategoryScores) -> String {
         let spokes: Vec<_> =
             scores.models.iter().flat_map(|&m| Criterion::ALL.into_iter().map(move |c| (m, c))).collect();
         let series = (1..scores.variants.len()).map(|variant| {
-            let key = &scores.variants[variant];
-            let name = ParameterizationId::find(scores.category, key)
-                .map_or(key.clone(), |id| format!("{key}: {}", id.description));
             let value = |&(model, criterion): &(_, _)| {
                 scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
             };
-            RadarSeries { name, values: spokes.iter().map(value).collect() }
+            RadarSeries { name: legend_name(scores, variant), values: spokes.iter().map(value).collect() }
         });
-        RadarChart {
+        radar_svg(&RadarChart {
             title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
             spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
             series: series.collect(),
-        }
+        })
     }
+
+    /// The other figures of a category, with the beginnings of their files' names; without what there is no data for.
+    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, PanelFigure)> {
+        let (scores, data) = (&self.scores.categories[at], &self.run.data);
+        let mut figures = Vec::new();
+        if scores.variants.len() > 1 {
+            figures.push(("recall-precision", recall_and_precision(scores, data)));
+            figures.push(("f1-by-parameters", f1_by_parameters(scores, data)));
+        }
+        let Some(pictures) = self.pictures.get(at) else { return figures };
+        figures.push(("headways", pictures.headways.figure(scores, data)));
+        if !pictures.parameters.is_empty() {
+            figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
+        }
+        if !pictures.modes.is_empty() {
+            figures.push(("modes", modes(scores, &pictures.modes, &pictures.svd_explained, data)));
+        }
+        figures
+    }
+
+    /// Failures of every variant by headway.
+    fn headways(&self, data: &str) -> Result<Vec<u8>> {
+        let header = ["category", "variant", "headway", "model", "criterion", "failures", "scenarios", "data"];
+        let mut rows = vec![header.map(str::to_owned).to_vec()];
+        for (scores, pictures) in self.scores.categories.iter().zip(&self.pictures) {
+            rows.extend(pictures.headways.rows(scores, data));
+        }
+        csv::text(rows)
+    }
+}
+
+/// Beginnings of the names of the figures' files.
+pub const FIGURES: [&str; 6] = ["radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"];
+
+/// `radar-cut-in.svg`.
+fn file_name(figure: &str, category: Category, ending: &str) -> String {
+    format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
 }
 
 /// Takes away what an earlier run left in the folder and this one does not write: the record first, so that a
 /// folder with a record is whole, then figures and comparisons of other categories.
 fn remove_earlier(dir: &Path, files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
-    let figures = Category::ALL.map(|c| format!("radar-{}.svg", c.key().replace('_', "-")));
-    let ours = figures.into_iter().chain(["reference.csv".to_owned()]).map(|name| dir.join(name));
+    let of = |c: Category| FIGURES.into_iter().flat_map(move |name| ["svg", "csv"].map(|end| file_name(name, c, end)));
+    let figures = Category::ALL.into_iter().flat_map(of);
+    let ours = figures.chain(["reference.csv".to_owned()]).map(|name| dir.join(name));
     let stale = ours.filter(|path| files.iter().all(|(written, _)| written != path));
     for path in std::iter::once(dir.join("run.json")).chain(stale) {
         match std::fs::remove_file(&path) {

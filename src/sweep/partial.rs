@@ -18,7 +18,7 @@ pub const WORST_LANES: usize = 20;
 /// What the serialized form calls itself.
 const FORMAT: &str = "lanesweep partial";
 /// Version of the serialized form.
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 /// Agreement of S' with S over the headways of one unit, variant, model and criterion. For variant 0 (S
 /// against itself) `both` counts the failures of S and `neither` its passes.
@@ -95,6 +95,8 @@ pub struct Partial {
     plan_hash: String,
     /// Ascending by unit, each unit once.
     units: Vec<UnitCounts>,
+    /// Failed lanes over all units, block by block: variant × headway × model × criterion.
+    headway_failures: Vec<u64>,
     worst_limit: usize,
     /// Ascending by (value, lane), `worst_limit` at most.
     worst: Vec<WorstLane>,
@@ -112,6 +114,7 @@ impl Partial {
         Partial {
             plan_hash: plan.hash().to_owned(),
             units: Vec::new(),
+            headway_failures: vec![0; plan.blocks.iter().map(|block| plan.headway_cells(block)).sum()],
             worst_limit,
             worst: Vec::new(),
             valued_lanes: 0,
@@ -141,12 +144,18 @@ impl Partial {
     /// An empty partial with the counts of a chunk.
     fn counting(mut self, plan: &LanePlan, chunk: &Chunk) -> Partial {
         let mut at = 0;
-        for (block, inside) in plan.segments(chunk.units.clone()) {
-            let block = &plan.blocks[block];
+        for (index, inside) in plan.segments(chunk.units.clone()) {
+            let block = &plan.blocks[index];
+            let first_cell: usize = plan.blocks[..index].iter().map(|before| plan.headway_cells(before)).sum();
+            let failures = &mut self.headway_failures[first_cell..first_cell + plan.headway_cells(block)];
             let per_unit = plan.lanes_per_unit(block) as usize;
             for unit in inside {
                 let lanes = &chunk.verdicts[at..at + per_unit];
                 self.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
+                // Lanes lie in the order of the cells: variant, headway, model.
+                for (lane, cells) in lanes.iter().zip(failures.chunks_mut(Criterion::ALL.len())) {
+                    Criterion::ALL.iter().zip(cells).for_each(|(c, cell)| *cell += u64::from(lane.failed(*c)));
+                }
                 at += per_unit;
             }
         }
@@ -186,11 +195,18 @@ impl Partial {
                 "merge every part once",
             ));
         }
+        if self.headway_failures.len() != other.headway_failures.len() {
+            let problem = "the two count failures of different numbers of headways";
+            return Err(Error::input(Place::item("partial result"), problem, "compute these parts again"));
+        }
+        let mut headway_failures = self.headway_failures;
+        headway_failures.iter_mut().zip(other.headway_failures).for_each(|(sum, more)| *sum = sum.saturating_add(more));
         let mut worst = self.worst;
         worst.extend(other.worst);
         Ok(Partial {
             plan_hash: self.plan_hash,
             units,
+            headway_failures,
             worst_limit: self.worst_limit,
             worst: keep_worst(worst, self.worst_limit),
             valued_lanes: self.valued_lanes.saturating_add(other.valued_lanes),
@@ -205,6 +221,16 @@ impl Partial {
     /// The counts, ascending by unit.
     pub fn units(&self) -> &[UnitCounts] {
         &self.units
+    }
+
+    /// Failed lanes of a block, over all units counted: variant × headway × model × criterion, the last innermost.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the counts are not those of this plan.
+    pub fn headway_failures(&self, plan: &LanePlan, block: usize) -> Result<&[u64]> {
+        let first: usize = plan.blocks[..block].iter().map(|before| plan.headway_cells(before)).sum();
+        let cells = self.headway_failures.get(first..first + plan.headway_cells(&plan.blocks[block]));
+        cells.ok_or_else(|| Error::Internal("a partial does not have the headways of its plan".to_owned()))
     }
 
     /// The lanes with the smallest min TTC, ascending; ties by lane. Only lanes whose values were computed
@@ -247,8 +273,34 @@ impl Partial {
         Ok(())
     }
 
-    /// Has every unit the counts that the plan's variants, models and criteria make?
+    /// Has every unit the counts that the plan's variants, models and criteria make, and do those by headway add up to
+    /// the same failures?
     pub fn fits(&self, plan: &LanePlan) -> bool {
+        self.has_every_cell(plan) && (0..plan.blocks.len()).all(|block| self.adds_up(plan, block))
+    }
+
+    fn adds_up(&self, plan: &LanePlan, index: usize) -> bool {
+        let block = &plan.blocks[index];
+        let (models, criteria) = (plan.models.len(), Criterion::ALL.len());
+        let Ok(by_headway) = self.headway_failures(plan, index) else { return false };
+        let mut sums = vec![0_u64; block.variants.len() * models * criteria];
+        for (at, count) in by_headway.iter().enumerate() {
+            let (variant, in_lane) = (at / (plan.headways.len() * models * criteria), at % (models * criteria));
+            let sum = &mut sums[variant * models * criteria + in_lane];
+            *sum = sum.saturating_add(*count);
+        }
+        let first = self.units.partition_point(|unit| unit.unit < block.first_unit);
+        let units = self.units[first..].iter().take_while(|unit| unit.unit < block.first_unit + block.units.len());
+        let mut of_units = vec![0_u64; sums.len()];
+        for unit in units {
+            for (sum, cell) in of_units.iter_mut().zip(&unit.cells) {
+                *sum += u64::from(cell.both) + u64::from(cell.only_s_prime);
+            }
+        }
+        sums == of_units
+    }
+
+    fn has_every_cell(&self, plan: &LanePlan) -> bool {
         let models = plan.models.len();
         self.units.iter().all(|unit| {
             let block = plan.blocks.iter().rev().find(|block| block.first_unit <= unit.unit && !block.units.is_empty());

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use sha2::{Digest, Sha256};
 
+use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::profile::Profile;
 use crate::scenario::{Category, Tables};
@@ -173,6 +174,11 @@ impl LanePlan {
     /// Lanes of one unit of a block.
     pub fn lanes_per_unit(&self, block: &Block) -> u64 {
         (block.variants.len() * self.headways.len() * self.models.len()) as u64
+    }
+
+    /// Number of a block's counts by headway: variants × headways × models × criteria.
+    pub(crate) fn headway_cells(&self, block: &Block) -> usize {
+        self.lanes_per_unit(block) as usize * Criterion::ALL.len()
     }
 
     /// Number of cells: blocks × their variants × models.

@@ -1,0 +1,286 @@
+//! The figures of a study beside the radar charts: recall and precision, failures against the headway, F1 against the
+//! number of parameters, the shapes of a decomposition.
+
+use super::panels::{Guide, Mark, Panel, PanelFigure, PanelSeries};
+use crate::Result;
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::parameterization::{Kind, ModeShape, ParameterizationId};
+use crate::score::{CategoryScores, f1, precision, recall};
+use crate::sweep::{Confusion, Headway, LanePlan, Partial};
+
+/// Failed lanes of one category by headway.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeadwayFailures {
+    headways: Vec<Headway>,
+    /// Variant × headway × model × criterion.
+    failures: Vec<u64>,
+}
+
+impl HeadwayFailures {
+    /// Of a block of a plan.
+    ///
+    /// # Errors
+    /// Where the counts are not those of the plan.
+    pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
+        let failures = partial.headway_failures(plan, block)?.to_vec();
+        Ok(HeadwayFailures { headways: plan.headways.clone(), failures })
+    }
+
+    /// Failed lanes of a variant at a headway; models and criteria by their places in the plan.
+    fn count(&self, models: usize, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
+        let lane = (variant * self.headways.len() + headway) * models + model;
+        self.failures.get(lane * Criterion::ALL.len() + criterion.index()).copied().unwrap_or(0)
+    }
+
+    /// One row per variant, headway, model and criterion.
+    pub fn rows(&self, scores: &CategoryScores, data: &str) -> Vec<Vec<String>> {
+        let models = scores.models.len();
+        let mut rows = Vec::new();
+        for (variant, name) in scores.variants.iter().enumerate() {
+            for (at, headway) in self.headways.iter().enumerate() {
+                for (model, id) in scores.models.iter().enumerate() {
+                    for criterion in Criterion::ALL {
+                        rows.push(vec![
+                            scores.category.key().to_owned(),
+                            name.clone(),
+                            headway.to_string(),
+                            id.name().to_owned(),
+                            criterion.key().to_owned(),
+                            self.count(models, (variant, at, model, criterion)).to_string(),
+                            scores.scenarios.to_string(),
+                            data.to_owned(),
+                        ]);
+                    }
+                }
+            }
+        }
+        rows
+    }
+
+    /// Share of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
+    pub fn figure(&self, scores: &CategoryScores, data: &str) -> PanelFigure {
+        let thw_s = |headway: &Headway| match headway {
+            Headway::ThwS(seconds) => *seconds,
+            Headway::GapM(metres) => *metres,
+        };
+        let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
+        let panel = |(model, id): (usize, &ModelId)| {
+            let series = |criterion: Criterion| {
+                let share = |(at, headway): (usize, &Headway)| {
+                    let failed = self.count(scores.models.len(), (0, at, model, criterion));
+                    (thw_s(headway), 100.0 * failed as f64 / scores.scenarios.max(1) as f64)
+                };
+                let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().map(share).collect();
+                values.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let name = criterion.label().to_owned();
+                PanelSeries { name, mark: Mark::LineAndPoints, values, labels: Vec::new() }
+            };
+            Panel {
+                heading: id.name().to_owned(),
+                x: if is_gap { "initial gap in m" } else { "initial time headway in s" }.to_owned(),
+                y: "failed scenarios in %".to_owned(),
+                y_range: Some((0.0, 100.0)),
+                series: Criterion::ALL.map(series).to_vec(),
+                ..Panel::default()
+            }
+        };
+        PanelFigure {
+            title: format!("{}: failures of the recorded scenarios against the headway", scores.category.label()),
+            subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+            caption: "Share of the recorded scenarios (S) in which the driver model fails the criterion.".to_owned(),
+            panels: scores.models.iter().enumerate().map(panel).collect(),
+        }
+    }
+}
+
+/// Recall and precision of every parameterization, a panel per driver model and criterion.
+pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> PanelFigure {
+    let panel = |model: ModelId, criterion: Criterion| {
+        let series = |variant: usize| {
+            let counts = scores.index(variant, model, criterion).map(|at| scores.cells[at].counts);
+            let of = |share: fn(&Confusion) -> Option<f64>| counts.as_ref().and_then(share).unwrap_or(f64::NAN);
+            let name = legend_name(scores, variant);
+            PanelSeries { name, mark: Mark::Points, values: vec![(of(recall), of(precision))], labels: Vec::new() }
+        };
+        Panel {
+            heading: format!("{}, {}", model.name(), criterion.label()),
+            x: "recall".to_owned(),
+            y: "precision".to_owned(),
+            x_range: Some((0.0, 1.0)),
+            y_range: Some((0.0, 1.0)),
+            series: (1..scores.variants.len()).map(series).collect(),
+            guides: [0.2, 0.4, 0.6, 0.8].map(equal_f1).to_vec(),
+        }
+    };
+    let panels = scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| panel(model, criterion)));
+    PanelFigure {
+        title: format!("{}: recall and precision of S' against S", scores.category.label()),
+        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+        caption: "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of \
+                  their failures that were recorded. Dashed: equal F1, from 0.2 to 0.8. Without a failure on one side a \
+                  share is undefined and has no marker."
+            .to_owned(),
+        panels: panels.collect(),
+    }
+}
+
+/// All pairs of recall and precision with this F1: P = F·R/(2R − F).
+fn equal_f1(f: f64) -> Guide {
+    let least = f / (2.0 - f);
+    let value = |k: u32| {
+        let r = 1.0 + (least - 1.0) * f64::from(k) / 40.0;
+        (r, (f * r / (2.0 * r - f)).min(1.0))
+    };
+    Guide { values: (0..=40).rev().map(value).collect(), label: String::new() }
+}
+
+/// F1 against the number of parameters: its mean over the cells that every parameterization defines, over all criteria
+/// and for each; the front of those that no other beats with as few parameters.
+pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> PanelFigure {
+    let panel = |heading: &str, criteria: &[Criterion]| {
+        let means = mean_f1(scores, criteria);
+        let of = |kind: fn(&Kind) -> bool, name: &str| {
+            let own: Vec<_> = means.iter().filter(|(id, _)| kind(&id.kind)).collect();
+            PanelSeries {
+                name: name.to_owned(),
+                mark: Mark::Points,
+                values: own.iter().map(|(id, mean)| (id.parameters as f64, *mean)).collect(),
+                labels: own.iter().map(|(id, _)| id.key.to_owned()).collect(),
+            }
+        };
+        let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameters as f64, *mean)).collect();
+        let front = PanelSeries {
+            name: "no other is better with as few parameters".to_owned(),
+            mark: Mark::Line,
+            values: pareto_front(&points),
+            labels: Vec::new(),
+        };
+        Panel {
+            heading: heading.to_owned(),
+            x: "parameters beside the headway".to_owned(),
+            y: "mean F1".to_owned(),
+            x_range: Some((1.0, 8.0)),
+            y_range: Some((0.0, 1.05)),
+            series: vec![
+                of(|kind| *kind == Kind::Kinematic, "kinematic"),
+                of(|kind| *kind != Kind::Kinematic, "SVD"),
+                front,
+            ],
+            guides: Vec::new(),
+        }
+    };
+    let mut panels = vec![panel("all criteria", &Criterion::ALL)];
+    panels.extend(Criterion::ALL.map(|criterion| panel(criterion.label(), &[criterion])));
+    PanelFigure {
+        title: format!("{}: F1 against the number of parameters", scores.category.label()),
+        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+        caption: "Mean over the driver models (and criteria) whose F1 every parameterization defines. The fewer \
+                  parameters, the fewer samples a density needs: of two that are equally good the simpler one is \
+                  preferable."
+            .to_owned(),
+        panels,
+    }
+}
+
+/// The mean F1 of every parameterization over the cells that all of them define; none where there is no such cell.
+fn mean_f1(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(ParameterizationId, f64)> {
+    let variants = 1..scores.variants.len();
+    let value = |variant: usize, model: ModelId, criterion: Criterion| {
+        scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
+    };
+    let cells = scores.models.iter().flat_map(|&model| criteria.iter().map(move |&criterion| (model, criterion)));
+    let shared: Vec<_> =
+        cells.filter(|&(m, c)| variants.clone().all(|variant| value(variant, m, c).is_some())).collect();
+    let mean = |variant: usize| {
+        let sum: f64 = shared.iter().filter_map(|&(m, c)| value(variant, m, c)).sum();
+        let id = ParameterizationId::find(scores.category, &scores.variants[variant])?;
+        (!shared.is_empty()).then(|| (id, sum / shared.len() as f64))
+    };
+    variants.clone().filter_map(mean).collect()
+}
+
+/// The points that no other reaches with as small an x, from left to right.
+fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    let mut front: Vec<(f64, f64)> = Vec::new();
+    for point in sorted {
+        if front.last().is_none_or(|last| point.1 > last.1) {
+            front.push(point);
+        }
+    }
+    front
+}
+
+/// The mean scenario and the scenarios along the first directions of a decomposition, and what the directions explain.
+pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], data: &str) -> PanelFigure {
+    let over_time = |values: &[f64]| {
+        let last = values.len().saturating_sub(1).max(1) as f64;
+        values.iter().enumerate().map(|(k, v)| (k as f64 / last, *v)).collect::<Vec<_>>()
+    };
+    let line = |name: String, values: &[f64]| PanelSeries {
+        name,
+        mark: Mark::Line,
+        values: over_time(values),
+        labels: Vec::new(),
+    };
+    let panel = |shape: &ModeShape| {
+        let along = shape.along.iter().enumerate();
+        let moved = along.map(|(j, values)| line(format!("one standard deviation along direction {}", j + 1), values));
+        Panel {
+            heading: shape.quantity.clone(),
+            x: "share of the duration T".to_owned(),
+            y: shape.unit.clone(),
+            x_range: Some((0.0, 1.0)),
+            series: std::iter::once(line("mean scenario".to_owned(), &shape.mean)).chain(moved).collect(),
+            ..Panel::default()
+        }
+    };
+    let shares = explained.iter().enumerate().map(|(k, share)| ((k + 1) as f64, 100.0 * share)).collect();
+    let share = Panel {
+        heading: "explained variance".to_owned(),
+        x: "coefficients".to_owned(),
+        y: "share in %".to_owned(),
+        y_range: Some((0.0, 100.0)),
+        series: vec![PanelSeries { name: String::new(), mark: Mark::Bars(0.8), values: shares, labels: Vec::new() }],
+        ..Panel::default()
+    };
+    PanelFigure {
+        title: format!("{}: what the singular value decomposition keeps", scores.category.label()),
+        subtitle: Some(data.to_owned()),
+        caption:
+            "Lines: the mean of the mined scenarios, and the scenario one standard deviation of a coefficient away \
+                  from it. Bars: share of the scaled variance that the first coefficients explain together."
+                .to_owned(),
+        panels: shapes.iter().map(panel).chain([share]).collect(),
+    }
+}
+
+/// `2: constant acceleration, constant lateral speed`.
+pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
+    let key = &scores.variants[variant];
+    ParameterizationId::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {
+        for f in [0.2, 0.5, 0.8] {
+            for (r, p) in equal_f1(f).values {
+                assert!((0.0..=1.0 + 1e-12).contains(&r) && (0.0..=1.0).contains(&p));
+                assert!((2.0 * r * p / (r + p) - f).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_on_the_front_is_beaten_by_as_few_parameters() {
+        let points = [(3.0, 0.5), (4.0, 0.4), (2.0, 0.3), (3.0, 0.6), (5.0, 0.6), (7.0, 0.9)];
+        assert_eq!(pareto_front(&points), [(2.0, 0.3), (3.0, 0.6), (7.0, 0.9)]);
+        assert!(pareto_front(&[]).is_empty());
+    }
+}
