@@ -72,6 +72,12 @@ pub fn install() {
             if let Err(error) = receive() {
                 tracing::warn!("signals end the program without tidying up: {error}");
             }
+            // At a limit of the size of files (`ulimit -f`) the signal would end the process in the middle of a write;
+            // with it received, the write fails instead, and the error names the file.
+            let at_limit = std::sync::Arc::new(AtomicBool::new(false));
+            if let Err(error) = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, at_limit) {
+                tracing::debug!("a limit of the size of files would end the program: {error}");
+            }
         });
     }
 }

@@ -180,7 +180,7 @@ impl<T: Countable> Work<T> {
 pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
     make_folder(out)?;
     let path = out.join(PLAN_FILE);
-    match std::fs::read(&path) {
+    match crate::input_file::read(&path, super::study_plan::LARGEST_PLAN_BYTES) {
         Ok(there) if there == text => Ok(()),
         Ok(_) => {
             let problem = "this folder holds the plan of another run";
@@ -188,8 +188,10 @@ pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
                 "give another --out, or the flags that the plan was made with; or move the plan and its parts away";
             Err(Error::input(Place::file(path), problem, help))
         }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => crate::report::files::write_atomically(&path, text),
-        Err(e) => Err(Error::io(path, "read", e)),
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
+            crate::report::files::write_atomically(&path, text)
+        }
+        Err(e) => Err(e),
     }
 }
 
