@@ -7,6 +7,7 @@ use clap::Args;
 use super::console::Verbosity;
 use super::source::{self, Source};
 use super::{Exit, console};
+use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
 use crate::scenario::{write_scenarios, write_scenarios_to};
 use crate::{Result, input_file};
@@ -37,6 +38,8 @@ impl Mine {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.output {
             source::refuse_recording(path, &self.dir, "--output")?;
+            // Before the work: a file that cannot be written is known at once.
+            AtomicFile::create(path).map(drop)?;
         }
         let options = source::mining_options(self.mining.as_deref())?;
         let from = Source::Folder(self.dir.clone());

@@ -1,8 +1,8 @@
 //! The score table: per category, parameterization, model and criterion the agreement of S' with S over
 //! (scenario, THW) pairs.
 
-use super::contradiction::contradiction;
 use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws, interval};
+use super::contradiction::contradiction;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::scenario::Category;
