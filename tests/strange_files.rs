@@ -78,14 +78,14 @@ fn readers() -> Vec<Vec<&'static str>> {
         "compare --profile @",
         "sample @",
         "sample --plan @",
-        "sample density.json --proposal @",
+        "sample density.json --estimator is --thw 0.6 --proposal @",
         "sample density.json --profile @",
         "simulate --case-file @",
         "simulate --table @",
         "simulate --scenarios @ --lane a/S/1.0s/FSM",
         "simulate --profile @",
         "conformance @",
-        "conformance table.csv --scenarios @",
+        "conformance --lanes lanes.csv --scenarios @",
         "conformance --lanes @ --scenarios scenarios.jsonl",
         "verify --backend cpu --scenarios @",
         "verify --backend cpu --profile @",
@@ -104,6 +104,7 @@ fn furnish(dir: &Path) {
     let (code, said) =
         lanesweep(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--synth-duration", "60"]);
     assert_eq!(code, 0, "{said}");
+    std::fs::write(dir.join("lanes.csv"), "scenario,param,thw,model\n").unwrap();
     let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
     let (code, said) = lanesweep(dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
     assert_eq!(code, 0, "{said}");
@@ -198,7 +199,7 @@ fn a_line_that_does_not_end_is_given_up_and_named() {
         assert!(said.contains(hint), "{what}: {said}");
     }
     let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("scenarios.jsonl"), vec![b' '; 200 << 20]).unwrap();
+    std::fs::File::create(dir.path().join("scenarios.jsonl")).unwrap().set_len(1 << 40).unwrap();
     let (code, said) = lanesweep(dir.path(), &["study", "--scenarios", "scenarios.jsonl"]);
     assert_eq!(code, 3, "{said}");
     assert!(said.contains("scenarios.jsonl, line 1: the line is longer than"), "{said}");

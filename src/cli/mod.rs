@@ -147,8 +147,8 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
         Ok(Ok(exit)) => return exit,
         Ok(Err(error)) => error,
         Err(_) => Error::Internal(
-            "the program panicked; see the message above. Files that are there are whole; where a run keeps a \
-             journal, what is in it stays"
+            "the program panicked; see the message above. Files that are there are whole; a run that \
+             keeps a journal goes on from it by the same command"
                 .to_owned(),
         ),
     };

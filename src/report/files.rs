@@ -15,8 +15,9 @@ pub fn check_folder(dir: &Path) -> Result<()> {
         match std::fs::metadata(above) {
             Ok(about) if about.is_dir() => return Ok(()),
             Ok(_) => {
-                let why = std::io::Error::new(ErrorKind::NotADirectory, format!("{} is a file", above.display()));
-                return Err(Error::io(dir, "create the folder", why));
+                let why =
+                    if above == dir { "it is a file".to_owned() } else { format!("{} is a file", above.display()) };
+                return Err(Error::io(dir, "create the folder", std::io::Error::new(ErrorKind::NotADirectory, why)));
             }
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
             Err(e) => return Err(Error::io(dir, "create the folder", e)),

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::{Bench, PROGRAM, RUNS, SAMPLE, done, flat, same};
+use super::{Bench, PROGRAM, RUNS, SAMPLE, done, flat, same, shared};
 use crate::common::skipped;
 
 /// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
@@ -42,8 +42,8 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
         cp -r \"$DISK/out\" copy";
     let mut of_journals = 0;
     for (name, run) in RUNS {
-        let whole = bench.whole(name, run);
-        for size in ["4k", "8k", "12k", "40k"] {
+        let whole = shared().join(name);
+        for size in ["4k", "8k", "40k"] {
             let Some(output) = on_a_disk(&bench, size, script, run) else { return };
             let said = flat(&output.stderr);
             assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
@@ -59,7 +59,7 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 #[test]
 fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let bench = Bench::new();
-    let whole = bench.whole("sample", SAMPLE);
+    let whole = shared().join("sample");
     let script = "\
         \"$0\" \"$@\" --out \"$DISK/out\" --stop-after 0.3 >/dev/null; echo stopped $?\n\
         mount -o remount,ro \"$DISK\"\n\
@@ -107,7 +107,7 @@ fn a_folder_without_permission_is_told_and_left_as_it_is() {
         assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0, "{name}");
     }
     mode(&out, 0o755);
-    let whole = bench.whole("study", RUNS[0].1);
+    let whole = shared().join("study");
     done(bench.path(), &[RUNS[0].1, &["--out", "out"]].concat());
     same(&out, &whole, "with permission");
 }
