@@ -135,6 +135,9 @@ fn what_is_not_text_is_refused_with_its_line() {
     }
 }
 
+/// Puts something strange under a name.
+type Put = fn(&Path);
+
 #[test]
 fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
     let dir = tempfile::tempdir().unwrap();
@@ -145,7 +148,7 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
         ("join", "part.json", vec!["sample", "--join", "in", "--out", "out"]),
     ];
     for (what, name, args) in names {
-        let put: [(&str, fn(&Path)); 3] = [
+        let put: [(&str, Put); 3] = [
             ("pipe", pipe),
             ("folder", |path| std::fs::create_dir(path).unwrap()),
             ("device", |path| std::os::unix::fs::symlink("/dev/zero", path).unwrap()),

@@ -152,6 +152,8 @@ impl Desk<'_> {
         }
         let (segments, journal) = work.ledger.finish()?;
         let run_sha256 = self.run_sha256.to_owned();
+        // It was there before the work; where it vanished meanwhile, the part is worth another one.
+        make_folder(self.out)?;
         write_part(&path, &Part { run_sha256, units: work.units, lanes_redone_and_rechecked: lanes, segments })?;
         journal.map_or(Ok(()), Journal::remove)?;
         drop(work.lock);
