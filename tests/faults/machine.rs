@@ -57,6 +57,26 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 }
 
 #[test]
+fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
+    let bench = Bench::new();
+    let synth = ["-q", "synth", "--synth-recordings", "2", "--synth-duration", "20"];
+    done(bench.path(), &[&synth[..], &["whole"]].concat());
+    let size = |name: &str| std::fs::metadata(bench.path().join("whole").join(name)).unwrap().len();
+    // The first fits, the second only to its half.
+    let size = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
+    let script = "\
+        \"$0\" \"$@\" \"$DISK/out\"; echo full $?; ls -A \"$DISK/out\"\n\
+        mount -o remount,size=64m \"$DISK\"\n\
+        \"$0\" \"$@\" \"$DISK/out\"; echo freed $?\n\
+        cp -r \"$DISK/out\" copy";
+    let Some(output) = on_a_disk(&bench, &size, script, &synth) else { return };
+    let said = flat(&output.stderr);
+    assert_eq!(lines(&output), ["full 6", "SYNTHETIC.txt", "freed 0"], "{said}");
+    assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{said}");
+    same(&bench.path().join("copy"), &bench.path().join("whole"), "recordings");
+}
+
+#[test]
 fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let bench = Bench::new();
     let whole = shared().join("sample");
