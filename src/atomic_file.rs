@@ -102,6 +102,15 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
+/// A failure to begin the file. Of a folder that is not there the system says only that something is not.
+fn not_begun(target: &Path, source: std::io::Error) -> Error {
+    if source.kind() != ErrorKind::NotFound {
+        return Error::io(target, "write", source);
+    }
+    let why = format!("there is no folder {}", folder_of(target).display());
+    Error::io(target, "write", std::io::Error::new(ErrorKind::NotFound, why))
+}
+
 /// A failure after the file was begun. The system's "no such file" does not say which: the result's name is new
 /// and the hidden one is unknown to the user.
 fn failed(target: &Path, source: std::io::Error) -> Error {
@@ -163,7 +172,7 @@ impl AtomicFile {
         });
         // The registry is held until the file is in it: an interruption between the two would leave the file.
         let mut registry = live();
-        let file = builder.tempfile_in(folder_of(target)).map_err(|source| Error::io(target, "write", source))?;
+        let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
         registry.insert(file.path().to_path_buf());
         drop(registry);
         let live = Live(file.path().to_path_buf());

@@ -173,6 +173,13 @@ impl Error {
                     "a file is where a folder is needed: choose another path".to_owned()
                 }
                 std::io::ErrorKind::StorageFull => "the disk is full: free some space and run again".to_owned(),
+                std::io::ErrorKind::QuotaExceeded => "your quota is used up: free some space and run again".to_owned(),
+                std::io::ErrorKind::FileTooLarge => {
+                    "files may not become that large here: raise the limit (`ulimit -f`) and run again".to_owned()
+                }
+                std::io::ErrorKind::ReadOnlyFilesystem => {
+                    "the disk is mounted read-only: choose another path, or mount it writable and run again".to_owned()
+                }
                 _ => "check that the disk is present and has space, then run again".to_owned(),
             }),
             Error::Verification(_) => None,

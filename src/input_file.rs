@@ -6,6 +6,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
+
 use crate::{Error, Place, Result};
 
 /// Largest file of settings (profiles, exposures): those that the program writes have a few kilobytes.
@@ -16,12 +18,16 @@ pub(crate) const LARGEST_TABLE_BYTES: u64 = 256 << 20;
 /// Opens a regular file, or a link to one.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a pipe, a device or a socket.
+/// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a folder, a pipe, a device or a socket.
 pub(crate) fn open(path: &Path) -> Result<File> {
     let io = |e| Error::io(path, "read", e);
     // Before opening: to open a pipe is to wait for its writer.
     let kind = std::fs::metadata(path).map_err(io)?.file_type();
-    if !kind.is_file() && !kind.is_dir() {
+    if kind.is_dir() {
+        let problem = "this is a folder; expected a regular file";
+        return Err(Error::input(Place::file(path), problem, "give the path of a file"));
+    }
+    if !kind.is_file() {
         return Err(Error::input(
             Place::file(path),
             "this is a pipe, a device or a socket; expected a regular file",
@@ -62,6 +68,24 @@ pub(crate) fn read_text(path: &Path, largest: u64) -> Result<String> {
     })
 }
 
+/// SHA-256 of a regular file of any size, in hexadecimal; a piece at a time is in memory.
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn sha256(path: &Path) -> Result<String> {
+    let mut file = open(path)?;
+    let mut hash = Sha256::new();
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(crate::sweep::hex(&hash.finalize())),
+            Ok(count) => hash.update(&piece[..count]),
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(Error::io(path, "read", e)),
+        }
+    }
+}
+
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
@@ -85,5 +109,17 @@ mod tests {
         std::os::unix::fs::symlink(&file, &link).unwrap();
         assert_eq!(read(&link, 10).unwrap(), b"0123456789");
         assert!(matches!(read(&link, 9), Err(Error::Input { .. })));
+        assert!(matches!(read(dir.path(), 9), Err(Error::Input { .. })));
+    }
+
+    #[test]
+    fn the_checksum_does_not_depend_on_the_pieces() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("file");
+        for size in [0, 1, (1 << 16) - 1, 1 << 16, (1 << 17) + 3] {
+            let content: Vec<u8> = (0..size).map(|at| (at % 251) as u8).collect();
+            std::fs::write(&path, &content).unwrap();
+            assert_eq!(sha256(&path).unwrap(), crate::sweep::hex(&Sha256::digest(&content)), "{size}");
+        }
     }
 }

@@ -61,7 +61,8 @@ fn deadline() -> Option<Instant> {
     *DEADLINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Receives SIGINT and SIGTERM from now on, on a thread of its own; a second call does nothing. For the
+/// Receives SIGINT and SIGTERM from now on, on a thread of its own, and SIGXFSZ, so that what is written beyond a limit
+/// of the size of files is an error and not the end; a second call does nothing. For the
 /// program's start: a library user keeps the signals to itself by not calling it. Without Unix signals it does
 /// nothing, and the system's own way to end a process stays.
 pub fn install() {
@@ -71,6 +72,12 @@ pub fn install() {
         ONCE.call_once(|| {
             if let Err(error) = receive() {
                 tracing::warn!("signals end the program without tidying up: {error}");
+            }
+            // At a limit of the size of files (`ulimit -f`) the signal would end the process in the middle of a write;
+            // with it received, the write fails instead, and the error names the file.
+            let at_limit = std::sync::Arc::new(AtomicBool::new(false));
+            if let Err(error) = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, at_limit) {
+                tracing::debug!("a limit of the size of files would end the program: {error}");
             }
         });
     }

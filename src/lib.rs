@@ -32,6 +32,7 @@ pub mod scalar;
 pub mod scenario;
 pub mod score;
 pub mod sweep;
+mod toml_file;
 pub mod trajectory;
 pub mod verify;
 

@@ -12,7 +12,7 @@ use crate::{Error, Place, Result};
 pub(crate) struct FolderLock {
     path: PathBuf,
     /// Holds the lock as long as it is open.
-    _file: File,
+    file: File,
 }
 
 impl FolderLock {
@@ -37,20 +37,22 @@ impl FolderLock {
             }
             // The former holder removes its file before it lets go: between opening and locking the name may
             // have gone, and a lock on a file without a name keeps nobody out.
-            if !still_named(path, &file) {
+            if !is_named(path, &file) {
                 continue;
             }
             write_pid(&mut file).map_err(|source| Error::io(path, "write", source))?;
-            return Ok(FolderLock { path: path.to_path_buf(), _file: file });
+            return Ok(FolderLock { path: path.to_path_buf(), file });
         }
     }
 }
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // While the lock is still held, so that nobody else's file can be under that name. A file that stays
-        // is harmless.
-        let _ = std::fs::remove_file(&self.path);
+        // While the lock is still held, so that nobody else's file can be under that name, unless the folder was
+        // taken away and made again. A file that stays is harmless.
+        if is_named(&self.path, &self.file) {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 
@@ -74,7 +76,7 @@ fn held(path: &Path, file: &mut File) -> Error {
 
 /// Whether `path` is the file that is open as `file`.
 #[cfg(unix)]
-fn still_named(path: &Path, file: &File) -> bool {
+pub(crate) fn is_named(path: &Path, file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;
     match (std::fs::metadata(path), file.metadata()) {
         (Ok(named), Ok(open)) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
@@ -84,7 +86,7 @@ fn still_named(path: &Path, file: &File) -> bool {
 
 /// Elsewhere std does not tell; an open file's name is not given away there before it is closed.
 #[cfg(not(unix))]
-fn still_named(_: &Path, _: &File) -> bool {
+pub(crate) fn is_named(_: &Path, _: &File) -> bool {
     true
 }
 
@@ -121,6 +123,22 @@ mod tests {
         }
         drop(lock);
         assert!(!path.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_whose_folder_was_made_anew_does_not_take_the_next_holders_away() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        let path = out.join("run.lock");
+        let first = FolderLock::acquire(&path).unwrap();
+        fs::remove_dir_all(&out).unwrap();
+        fs::create_dir(&out).unwrap();
+        let second = FolderLock::acquire(&path).unwrap();
+        drop(first);
+        assert!(FolderLock::acquire(&path).is_err(), "the second still holds it");
+        drop(second);
     }
 
     #[test]

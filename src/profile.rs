@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile};
-use crate::{Error, Place, Result, input_file};
+use crate::{Error, Place, Result, input_file, toml_file};
 
 /// Which vehicles the ego's driver heeds in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -136,17 +136,8 @@ impl Profile {
     }
 
     fn parse(text: &str, place: &Place) -> Result<Profile> {
-        let profile: Profile = toml::from_str(text).map_err(|e| {
-            let mut place = place.clone();
-            if let Some(span) = e.span() {
-                place.row = Some(1 + text[..span.start].matches('\n').count() as u64);
-            }
-            Error::usage(
-                place,
-                e.message().to_owned(),
-                "compare with configs/profiles/paper.toml, which has every key with its unit",
-            )
-        })?;
+        let help = "compare with configs/profiles/paper.toml, which has every key with its unit";
+        let profile: Profile = toml_file::parse(text, place, help)?;
         profile.check(place)?;
         Ok(profile)
     }

@@ -9,7 +9,7 @@ use crate::driver::ModelId;
 use crate::profile::Profile;
 use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 use crate::sweep::Headway;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file, toml_file};
 
 /// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Args)]
@@ -204,17 +204,12 @@ fn above_zero(value: f64, key: &str) -> Result<f64> {
 
 /// The flags that a TOML file holds.
 pub(super) fn from_toml(path: &Path) -> Result<CaseFlags> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-    toml::from_str(&text).map_err(|e| {
-        let mut place = Place::file(path);
-        place.row = e.span().map(|span| 1 + text[..span.start].matches('\n').count() as u64);
-        Error::usage(place, e.message().to_owned(), "the keys are the flags of `simulate --help` with `_`")
-    })
+    toml_file::read(path, "the keys are the flags of `simulate --help` with `_`")
 }
 
 /// The flags that a row of a CSV table holds; rows count from 1 after the header.
 pub(super) fn from_csv(path: &Path, row: usize) -> Result<CaseFlags> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+    let text = input_file::read_text(path, input_file::LARGEST_TABLE_BYTES)?;
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
     let records = reader.deserialize::<CaseFlags>();

@@ -20,7 +20,7 @@ use crate::parameterization::ParameterizationId;
 use crate::profile::Profile;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
-use crate::report::files::{make_folder, write_atomically};
+use crate::report::files::{check_folder, make_folder, write_atomically};
 use crate::report::sampling::HostRecord;
 use crate::sampling::{
     CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
@@ -122,6 +122,7 @@ impl Compare {
             (None, None) => Source::Generated(self.generator.options()?),
         };
         self.guard_inputs()?;
+        check_folder(&self.out)?;
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe());
         let collection = source.load(&config.mining, verbosity)?;

@@ -15,9 +15,10 @@ use super::synth::GeneratorFlags;
 use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use crate::mining::Collection;
 use crate::parameterization::ParameterizationId;
-use crate::report::{density, files::make_folder};
+use crate::report::density;
+use crate::report::files::{check_folder_of, make_folder};
 use crate::scenario::write_scenarios_to;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// How are the parameters of scenarios distributed?
 ///
@@ -179,6 +180,7 @@ impl Fit {
         inputs.extend(self.scenarios.as_deref().map(ExposureFile::path_of));
         for file in &files {
             source::refuse_overwriting(file, &inputs, "--out")?;
+            check_folder_of(file)?;
         }
         Ok(files)
     }
@@ -197,7 +199,7 @@ impl Fit {
 /// Label, checksum and exposure of the data.
 pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> Result<DataFacts> {
     let scenarios_sha256 = match source {
-        Source::Scenarios(path) => source::checksum(path)?,
+        Source::Scenarios(path) => input_file::sha256(path)?,
         Source::Folder(_) | Source::Generated(_) => {
             // That of the file that `mine` would write: the same scenarios have the same checksum.
             let mut digest = Hashing(Sha256::new());

@@ -7,9 +7,10 @@ use clap::Args;
 use super::console::Verbosity;
 use super::source::{self, Source};
 use super::{Exit, console};
-use crate::Result;
+use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
 use crate::scenario::{write_scenarios, write_scenarios_to};
+use crate::{Result, input_file};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
@@ -37,6 +38,8 @@ impl Mine {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.output {
             source::refuse_recording(path, &self.dir, "--output")?;
+            // Before the work: a file that cannot be written is known at once.
+            AtomicFile::create(path).map(drop)?;
         }
         let options = source::mining_options(self.mining.as_deref())?;
         let from = Source::Folder(self.dir.clone());
@@ -49,7 +52,7 @@ impl Mine {
             Some(path) => {
                 write_scenarios(path, &collection.scenarios)?;
                 if let Some(driven) = Driven::of(&collection) {
-                    let scenarios_sha256 = source::checksum(path)?;
+                    let scenarios_sha256 = input_file::sha256(path)?;
                     let (data, synthetic) = (from.describe(), from.is_synthetic());
                     ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
                 }

@@ -139,20 +139,23 @@ pub fn main() -> ExitCode {
     };
     console::start_log(cli.common.verbosity());
     crate::interrupt::install();
-    // A defect must not look like a crash of the user's making.
-    let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(&cli)));
-    let exit = match ended {
-        Ok(Ok(exit)) => exit,
-        Ok(Err(error)) => {
-            console::complain(&error);
-            Exit::from(&error)
-        }
-        Err(_) => {
-            console::complain(&Error::Internal("the program panicked; see the message above".to_owned()));
-            Exit::Internal
-        }
+    told(|| run(&cli)).into()
+}
+
+/// Does the work and tells the user how it ended. A defect, in any thread that the work waits for, must not look like
+/// a crash of the user's making.
+fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
+    let error = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
+        Ok(Ok(exit)) => return exit,
+        Ok(Err(error)) => error,
+        Err(_) => Error::Internal(
+            "the program panicked; see the message above. Files that are there are whole; a run that \
+             keeps a journal goes on from it by the same command"
+                .to_owned(),
+        ),
     };
-    exit.into()
+    console::complain(&error);
+    Exit::from(&error)
 }
 
 fn run(cli: &Cli) -> Result<Exit> {
@@ -185,10 +188,30 @@ fn run(cli: &Cli) -> Result<Exit> {
 
 #[cfg(test)]
 mod tests {
+    use super::{Exit, told};
     use clap::CommandFactory;
+    use rayon::prelude::*;
 
     #[test]
     fn the_flags_do_not_contradict_one_another() {
         super::Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_panic_in_any_worker_is_a_defect_that_is_told_and_no_crash() {
+        let in_a_task = || {
+            (0..1000).into_par_iter().for_each(|k| assert!(k != 700, "planted"));
+            Ok(Exit::Ok)
+        };
+        let in_a_thread = || {
+            std::thread::scope(|scope| {
+                scope.spawn(|| panic!("planted"));
+            });
+            Ok(Exit::Ok)
+        };
+        assert_eq!(told(in_a_task), Exit::Internal);
+        assert_eq!(told(in_a_thread), Exit::Internal);
+        assert_eq!(told(|| Ok(Exit::Ok)), Exit::Ok, "the pool works on");
+        assert_eq!((0..1000).into_par_iter().sum::<i32>(), 499_500);
     }
 }

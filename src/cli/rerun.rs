@@ -10,7 +10,7 @@ use crate::profile::Profile;
 use crate::report::sampling::RunFacts;
 use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
 use crate::sweep::{Headway, LanePlan};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// What `estimate.json` must say of a run.
 #[derive(Deserialize)]
@@ -38,7 +38,7 @@ pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<Str
         let help = "give the folder (--out) of a `lanesweep sample` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = std::fs::read(&path).map_err(|e| Error::io(&path, "read", e))?;
+    let text = input_file::read(&path, input_file::LARGEST_TABLE_BYTES)?;
     let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
     if run.lanesweep_estimate != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::console::{self, Verbosity};
 use crate::density::DensityModel;
 use crate::parts::Ledger;
-use crate::report::files::{write_atomically, write_atomically_with};
+use crate::report::files::{make_folder, write_atomically, write_atomically_with};
 use crate::report::sampled_rows;
 use crate::report::sampling::{WorstRow, convergence_csv, worst_csv};
 use crate::report::sampling_figures;
@@ -91,6 +91,8 @@ pub(super) fn write(
     run: &CrudeRun,
     counting: &TallyOptions,
 ) -> Result<()> {
+    // It was there before the work; where it vanished meanwhile, the result is worth another one.
+    make_folder(out)?;
     clear(out, &[])?;
     if !run.convergence.is_empty() {
         write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;

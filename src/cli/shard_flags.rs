@@ -158,6 +158,8 @@ impl Desk<'_> {
         }
         let (segments, journal) = work.ledger.finish()?;
         let run_sha256 = self.run_sha256.to_owned();
+        // It was there before the work; where it vanished meanwhile, the part is worth another one.
+        make_folder(self.out)?;
         write_part(&path, &Part { run_sha256, units: work.units, lanes_redone_and_rechecked: lanes, segments })?;
         journal.map_or(Ok(()), Journal::remove)?;
         drop(work.lock);
@@ -186,7 +188,7 @@ impl<T: Countable> Work<T> {
 pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
     make_folder(out)?;
     let path = out.join(PLAN_FILE);
-    match std::fs::read(&path) {
+    match crate::input_file::read(&path, super::study_plan::LARGEST_PLAN_BYTES) {
         Ok(there) if there == text => Ok(()),
         Ok(_) => {
             let problem = "this folder holds the plan of another run";
@@ -194,8 +196,10 @@ pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
                 "give another --out, or the flags that the plan was made with; or move the plan and its parts away";
             Err(Error::input(Place::file(path), problem, help))
         }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => crate::report::files::write_atomically(&path, text),
-        Err(e) => Err(Error::io(path, "read", e)),
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
+            crate::report::files::write_atomically(&path, text)
+        }
+        Err(e) => Err(e),
     }
 }
 

@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
-
 use super::console::{self, Verbosity};
 use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
 use crate::scenario::{Category, Scenario, read_scenarios};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::trajectory::highd;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file, toml_file};
 
 /// What the scenarios of a run are.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,12 +99,6 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     Ok(list)
 }
 
-/// SHA-256 of a file, in hexadecimal.
-pub fn checksum(path: &Path) -> Result<String> {
-    let content = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-    Ok(crate::sweep::hex(&Sha256::digest(content)))
-}
-
 /// Mining options from a TOML file, or the paper's.
 pub fn mining_options(path: Option<&Path>) -> Result<MiningOptions> {
     let Some(path) = path else { return Ok(MiningOptions::default()) };
@@ -117,19 +109,14 @@ pub fn mining_options(path: Option<&Path>) -> Result<MiningOptions> {
 
 /// A TOML file as options; errors name the line.
 pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-    toml::from_str(&text).map_err(|e| {
-        let mut place = Place::file(path);
-        place.row = e.span().map(|span| 1 + text[..span.start].matches('\n').count() as u64);
-        Error::usage(place, e.message().to_owned(), "the keys and their defaults are in the folder `configs`")
-    })
+    toml_file::read(path, "the keys and their defaults are in the folder `configs`")
 }
 
 /// File that `synth` leaves beside its recordings, so that a study on them says what they are.
 pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 
 fn synthetic_marker(dir: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(dir.join(SYNTHETIC_MARKER)).ok()?;
+    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::LARGEST_SETTINGS_BYTES).ok()?;
     text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
 }
 

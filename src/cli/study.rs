@@ -10,19 +10,20 @@ use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
 use super::shard_flags::{Desk, PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
-use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
+use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, compare_reference, finish_study, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
 use crate::parameterization::{ParameterizationOptions, Reduction};
 use crate::report::distributions::parameter_histograms;
+use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::scenario::{Category, Scenario};
 use crate::score::ScoreOptions;
 use crate::sweep::{Backend, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, plan_study};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -101,6 +102,8 @@ impl StudyConfig {
 impl Study {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         self.guard_inputs()?;
+        check_folder(&self.out)?;
+        self.lanes.as_deref().map_or(Ok(()), check_folder_of)?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             let opened = self.backend.open()?;
@@ -109,7 +112,7 @@ impl Study {
                 self.backend.none_but("--reference")?;
             }
             if self.shards.is_part() {
-                let text = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+                let text = input_file::read(path, LARGEST_PLAN_BYTES)?;
                 leave_plan(&self.out, &text)?;
             }
             return self.sweep(&study, &opened, run_sha256, Timings::default(), verbosity);
@@ -169,7 +172,7 @@ impl Study {
             published: self.published,
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
-            scenario_file_sha256: self.scenarios.as_deref().map(source::checksum).transpose()?,
+            scenario_file_sha256: self.scenarios.as_deref().map(input_file::sha256).transpose()?,
             categories: category_facts(&collection, &planned, &config.parameterization)?,
             left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
             recordings: collection.recordings,

@@ -68,13 +68,30 @@ impl Synth {
         let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
         write_atomically(&self.dir.join(SYNTHETIC_MARKER), marker.as_bytes())?;
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
-        for index in 0..options.recordings {
+        let written = (0..options.recordings).try_for_each(|index| {
             let recording = generate_one(&options, index)?;
             highd::write(&self.dir, &recording, &RecordingInfo::default())?;
             bar.inc(1);
-        }
+            Ok(())
+        });
         bar.finish_and_clear();
+        if let Err(error) = written {
+            self.remove(options.recordings);
+            return Err(error);
+        }
         tracing::info!("{} synthetic recordings written to {}", options.recordings, self.dir.display());
         Ok(Exit::Ok)
+    }
+
+    /// Takes away what this run wrote: some of the recordings would be studied as if they were all, and the same
+    /// command would refuse the folder.
+    fn remove(&self, recordings: usize) {
+        for id in (1..=recordings).map(|k| format!("{k:02}")) {
+            let files = HighdFiles::named(&self.dir, &id);
+            for file in [files.tracks, files.tracks_meta, files.recording_meta] {
+                // One that was not written is not there.
+                let _ = std::fs::remove_file(file);
+            }
+        }
     }
 }

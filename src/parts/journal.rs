@@ -12,6 +12,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::lock::is_named;
 use crate::sweep::hex;
 use crate::{Error, Place, Result};
 
@@ -114,7 +115,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// Appends records and brings them to the disk.
     ///
     /// # Errors
-    /// [`Error::Io`]: what was there before stays whole.
+    /// [`Error::Io`]: what was there before stays whole, unless the error says that the file itself is gone.
     pub fn append(&mut self, records: &[T]) -> Result<()> {
         let started = Instant::now();
         let mut text = Vec::new();
@@ -124,12 +125,20 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         for record in records {
             text.extend(line_of(record)?);
         }
-        let io = |e| Error::io(&self.path, "write", e);
-        if self.file.is_none() {
-            self.file = Some(File::create(&self.path).map_err(io)?);
+        match &self.file {
+            // The system would go on writing into a file that nobody finds again.
+            Some(file) if !is_named(&self.path, file) => return Err(self.gone()),
+            Some(_) => {}
+            None => {
+                let created = File::create(&self.path).map_err(|e| match e.kind() {
+                    std::io::ErrorKind::NotFound => self.gone(),
+                    _ => self.failed(e),
+                })?;
+                self.file = Some(created);
+            }
         }
-        if let Some(file) = &mut self.file {
-            file.write_all(&text).and_then(|()| file.sync_data()).map_err(io)?;
+        if let Some(mut file) = self.file.as_ref() {
+            file.write_all(&text).and_then(|()| file.sync_data()).map_err(|e| self.failed(e))?;
         }
         let took = started.elapsed();
         self.spent += took;
@@ -140,6 +149,24 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// Time that appending has taken so far.
     pub fn spent(&self) -> Duration {
         self.spent
+    }
+
+    /// A write that failed leaves a torn record at most.
+    fn failed(&self, source: std::io::Error) -> Error {
+        let kept = "the records before are whole: once this is mended, the same command goes on from them";
+        Error::io(&self.path, "write", std::io::Error::new(source.kind(), format!("{source}; {kept}")))
+    }
+
+    /// The file or its folder was taken away while the run was at work.
+    fn gone(&self) -> Error {
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let what = if folder.is_dir() {
+            "the journal was removed or replaced".to_owned()
+        } else {
+            format!("the folder {} vanished", folder.display())
+        };
+        let why = format!("{what} while the run was at work; what it held is lost: the same command begins anew");
+        Error::io(&self.path, "write", std::io::Error::other(why))
     }
 
     /// The part is finished, or is to be forgotten: takes the file away.
@@ -217,6 +244,34 @@ mod tests {
             journal.append(&[vec![9]]).unwrap();
             let (_, again) = open(&path);
             assert_eq!(again.records.len(), whole + 1, "what is appended after a repair is read");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_journal_that_is_taken_away_in_mid_run_is_told_and_not_written_to_in_vain() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let path = out.join("journal");
+        let told = |what: &str, journal: &mut Journal<Vec<u32>>| {
+            let error = journal.append(&[vec![2]]).unwrap_err();
+            assert!(matches!(error, Error::Io { .. }), "{error}");
+            assert!(error.to_string().contains(what) && error.to_string().contains("begins anew"), "{error}");
+            assert!(!error.help().unwrap().contains("typing"), "{error}");
+        };
+        for has_begun in [true, false] {
+            std::fs::create_dir(&out).unwrap();
+            let mut journal = open(&path).0;
+            if has_begun {
+                journal.append(&[vec![1]]).unwrap();
+                std::fs::remove_file(&path).unwrap();
+                told("removed or replaced", &mut journal);
+                std::fs::write(&path, "another one").unwrap();
+                told("removed or replaced", &mut journal);
+            }
+            std::fs::remove_dir_all(&out).unwrap();
+            told("out vanished", &mut journal);
+            assert!(!out.exists());
         }
     }
 

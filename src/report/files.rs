@@ -1,13 +1,45 @@
 //! Writing the files of a report: each whole or not at all.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use crate::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
+/// Whether a folder is there, or could be made as far as names tell: what is known before the work.
+///
+/// # Errors
+/// [`Error::Io`] naming the file that is where a folder is needed.
+pub fn check_folder(dir: &Path) -> Result<()> {
+    for above in dir.ancestors().filter(|above| !above.as_os_str().is_empty()) {
+        match std::fs::metadata(above) {
+            Ok(about) if about.is_dir() => return Ok(()),
+            Ok(_) => {
+                let why =
+                    if above == dir { "it is a file".to_owned() } else { format!("{} is a file", above.display()) };
+                return Err(Error::io(dir, "create the folder", std::io::Error::new(ErrorKind::NotADirectory, why)));
+            }
+            Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
+            Err(e) => return Err(Error::io(dir, "create the folder", e)),
+        }
+    }
+    Ok(())
+}
+
+/// The same for the folder that a file is to be written to.
+///
+/// # Errors
+/// As [`check_folder`].
+pub fn check_folder_of(file: &Path) -> Result<()> {
+    file.parent().map_or(Ok(()), check_folder)
+}
+
 /// Makes a folder and those above it, where they do not exist.
+///
+/// # Errors
+/// [`Error::Io`].
 pub fn make_folder(dir: &Path) -> Result<()> {
+    check_folder(dir)?;
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create the folder", e))
 }
 

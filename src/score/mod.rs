@@ -6,6 +6,7 @@
 
 mod bootstrap;
 mod claims;
+mod contradiction;
 mod published;
 mod statistic;
 mod table;

@@ -2,6 +2,7 @@
 //! (scenario, THW) pairs.
 
 use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws, interval};
+use super::contradiction::contradiction;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::scenario::Category;
@@ -90,11 +91,21 @@ pub struct ScoreTable {
 /// Scores a complete partial.
 ///
 /// # Errors
-/// If units are missing or the partial belongs to another plan.
+/// [`Error::Input`] if units are missing, the partial belongs to another plan, or its counts contradict themselves or
+/// the plan.
 pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Result<ScoreTable> {
     if !partial.is_complete(plan) {
-        let problem = format!("{} of {} units are there", partial.units().len(), plan.unit_count());
+        let problem = if partial.plan_hash() == plan.hash() {
+            format!("{} of {} units are there", partial.units().len(), plan.unit_count())
+        } else {
+            format!("it belongs to plan {}, not to {}", partial.plan_hash(), plan.hash())
+        };
         return Err(Error::input(Place::item("partial result"), problem, "compute the missing units first"));
+    }
+    // Counts that this program made never fail here; a file may hold anything under a checksum that fits.
+    if let Some(problem) = contradiction(plan, partial) {
+        let help = "compute it again: take the parts and journals of this run away first";
+        return Err(Error::input(Place::item("partial result"), format!("its counts cannot be: {problem}"), help));
     }
     let criteria = Criterion::ALL.len();
     let mut categories = Vec::new();

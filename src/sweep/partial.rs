@@ -273,13 +273,12 @@ impl Partial {
         Ok(())
     }
 
-    /// Has every unit the counts that the plan's variants, models and criteria make, and do those by headway add up to
-    /// the same failures?
-    pub fn fits(&self, plan: &LanePlan) -> bool {
-        self.has_every_cell(plan) && (0..plan.blocks.len()).all(|block| self.adds_up(plan, block))
+    /// Do the counts by headway add up to the failures of the units? The units must fit the plan.
+    pub fn adds_up(&self, plan: &LanePlan) -> bool {
+        (0..plan.blocks.len()).all(|block| self.block_adds_up(plan, block))
     }
 
-    fn adds_up(&self, plan: &LanePlan, index: usize) -> bool {
+    fn block_adds_up(&self, plan: &LanePlan, index: usize) -> bool {
         let block = &plan.blocks[index];
         let (models, criteria) = (plan.models.len(), Criterion::ALL.len());
         let Ok(by_headway) = self.headway_failures(plan, index) else { return false };
@@ -300,7 +299,8 @@ impl Partial {
         sums == of_units
     }
 
-    fn has_every_cell(&self, plan: &LanePlan) -> bool {
+    /// Has every unit the counts that the plan's variants, models and criteria make?
+    pub fn fits(&self, plan: &LanePlan) -> bool {
         let models = plan.models.len();
         self.units.iter().all(|unit| {
             let block = plan.blocks.iter().rev().find(|block| block.first_unit <= unit.unit && !block.units.is_empty());

@@ -23,7 +23,7 @@ pub fn shared(rel: &str) -> Option<PathBuf> {
 }
 
 /// Says that a test is skipped. Past the test harness, which shows the output of failing tests only.
-fn skipped(why: &str) {
+pub fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
 }
 

@@ -48,6 +48,10 @@ pub(super) struct Table {
 /// Read at once from the file: long enough that the disk, not the call, sets the pace.
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
+/// A line of the format has a few hundred bytes. Where none ends within this, the file is another one, or a quotation
+/// mark is not closed.
+const LONGEST_LINE_BYTES: u64 = 1 << 20;
+
 impl Table {
     /// Opens a file and reads its header. `known` are the names that the format gives its columns: a
     /// column that bears one of them is never suggested as another one misspelt.
@@ -240,12 +244,9 @@ impl Table {
     /// Steps to the next line that is not blank.
     fn read_line(&mut self) -> Result<bool> {
         loop {
-            let found = self.reader.read_byte_record(&mut self.record).map_err(|error| match error.into_kind() {
-                csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
-                // Bytes are not decoded and line lengths are free: nothing else is left to go wrong.
-                other => Error::Internal(format!("{}: {other:?}", self.path.display())),
-            })?;
-            if !found {
+            let from = self.reader.position().byte();
+            self.reader.get_mut().line_from = from;
+            if !self.reader.read_byte_record(&mut self.record).map_err(|error| self.unreadable(error))? {
                 return Ok(false);
             }
             // The reader stands on the line after the record, unless no line end closed it.
@@ -256,6 +257,19 @@ impl Table {
             if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
                 return Ok(true);
             }
+        }
+    }
+
+    fn unreadable(&self, error: csv::Error) -> Error {
+        match error.into_kind() {
+            csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
+                Place::file(&self.path).row(self.last_line + 1),
+                format!("no line ends here within {} MiB, nor a quotation mark", LONGEST_LINE_BYTES >> 20),
+                "remove a quotation mark that is not closed; or copy or export the file again",
+            ),
+            csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
+            // Bytes are not decoded and the number of fields is free: nothing else is left to go wrong.
+            other => Error::Internal(format!("{}: {other:?}", self.path.display())),
         }
     }
 
@@ -382,16 +396,25 @@ struct Hashing<R> {
     hash: Sha256,
     bytes: u64,
     at_end: bool,
+    /// Where the line begins that is being read, bytes.
+    line_from: u64,
+    /// That line was given up.
+    is_endless: bool,
 }
 
 impl<R> Hashing<R> {
     fn new(inner: R) -> Self {
-        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false }
+        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
     }
 }
 
 impl<R: Read> Read for Hashing<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        // More is asked for where all that came belongs to the line: it would be held in memory as a whole.
+        if self.bytes - self.line_from.min(self.bytes) > LONGEST_LINE_BYTES {
+            self.is_endless = true;
+            return Err(io::Error::from(io::ErrorKind::InvalidData));
+        }
         let count = self.inner.read(buffer)?;
         let read = &buffer[..count];
         self.hash.update(read);

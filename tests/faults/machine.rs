@@ -1,0 +1,133 @@
+//! Disks that are full or read-only, made in a mount namespace of the test's own: they vanish with its processes.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use super::{Bench, PROGRAM, RUNS, SAMPLE, done, flat, same, shared};
+use crate::common::skipped;
+
+/// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
+fn on_a_disk(bench: &Bench, size: &str, script: &str, args: &[&str]) -> Option<Output> {
+    let disk = bench.path().join("disk");
+    std::fs::create_dir_all(&disk).unwrap();
+    let mount = format!("mount -t tmpfs -o size={size} none \"$DISK\" || exit 99\n");
+    let run = |namespace: &str, script: &str| {
+        let mut command = Command::new("unshare");
+        command.args([namespace, "sh", "-c", script, PROGRAM]).args(args).current_dir(bench.path());
+        command.env("DISK", &disk).env("NO_COLOR", "1").output().ok()
+    };
+    // As root, or as whoever may be root of a namespace of their own.
+    for namespace in ["-m", "-rm"] {
+        if run(namespace, &mount).is_some_and(|output| output.status.success()) {
+            return run(namespace, &format!("{mount}{script}"));
+        }
+    }
+    skipped("needs `unshare -m` and `mount -t tmpfs` (root, or user namespaces)");
+    None
+}
+
+fn lines(output: &Output) -> Vec<String> {
+    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_space() {
+    let bench = Bench::new();
+    // The lock takes a page of 4 KiB: room for nothing else, for a bit of journal, for some results.
+    let script = "\
+        \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo full $?\n\
+        ls -A \"$DISK/out\" | grep -c '^\\.lanesweep'\n\
+        mount -o remount,size=64m \"$DISK\"\n\
+        \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo freed $?\n\
+        cp -r \"$DISK/out\" copy";
+    let mut of_journals = 0;
+    for (name, run) in RUNS {
+        let whole = shared().join(name);
+        for size in ["4k", "8k", "40k"] {
+            let Some(output) = on_a_disk(&bench, size, script, run) else { return };
+            let said = flat(&output.stderr);
+            assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
+            assert!(said.contains("No space left") && said.contains("the disk is full"), "{name}, {size}: {said}");
+            of_journals += u32::from(said.contains(".journal") && said.contains("goes on from them"));
+            same(&bench.path().join("copy"), &whole, &format!("{name}, {size}"));
+            std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
+        }
+    }
+    assert!(of_journals > 0, "no journal met the full disk");
+}
+
+#[test]
+fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
+    let bench = Bench::new();
+    let synth = ["-q", "synth", "--synth-recordings", "2", "--synth-duration", "20"];
+    done(bench.path(), &[&synth[..], &["whole"]].concat());
+    let size = |name: &str| std::fs::metadata(bench.path().join("whole").join(name)).unwrap().len();
+    // The first fits, the second only to its half.
+    let size = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
+    let script = "\
+        \"$0\" \"$@\" \"$DISK/out\"; echo full $?; ls -A \"$DISK/out\"\n\
+        mount -o remount,size=64m \"$DISK\"\n\
+        \"$0\" \"$@\" \"$DISK/out\"; echo freed $?\n\
+        cp -r \"$DISK/out\" copy";
+    let Some(output) = on_a_disk(&bench, &size, script, &synth) else { return };
+    let said = flat(&output.stderr);
+    assert_eq!(lines(&output), ["full 6", "SYNTHETIC.txt", "freed 0"], "{said}");
+    assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{said}");
+    same(&bench.path().join("copy"), &bench.path().join("whole"), "recordings");
+}
+
+#[test]
+fn a_disk_that_becomes_read_only_keeps_what_is_done() {
+    let bench = Bench::new();
+    let whole = shared().join("sample");
+    let script = "\
+        \"$0\" \"$@\" --out \"$DISK/out\" --stop-after 0.3 >/dev/null; echo stopped $?\n\
+        mount -o remount,ro \"$DISK\"\n\
+        \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo kept $?\n\
+        \"$0\" \"$@\" --out \"$DISK/new\" >/dev/null; echo new $?\n\
+        mount -o remount,rw \"$DISK\"\n\
+        \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo writable $?\n\
+        cp -r \"$DISK/out\" copy";
+    let Some(output) = on_a_disk(&bench, "64m", script, SAMPLE) else { return };
+    let said = flat(&output.stderr);
+    assert_eq!(lines(&output), ["stopped 75", "kept 6", "new 6", "writable 0"], "{said}");
+    assert_eq!(said.matches("mounted read-only").count(), 2, "{said}");
+    same(&bench.path().join("copy"), &whole, "read-only");
+}
+
+#[test]
+fn a_folder_without_permission_is_told_and_left_as_it_is() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let bench = Bench::new();
+    let out = bench.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let mode = |path: &Path, mode| std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+    mode(bench.path(), 0o755);
+    mode(&out, 0o555);
+    let is_root = std::fs::metadata(bench.path()).unwrap().uid() == 0;
+    for (name, run) in RUNS {
+        let args = [run, &["--out", "out"]].concat();
+        let mut command = if is_root {
+            // Permissions do not bind root.
+            let mut command = Command::new("setpriv");
+            command.args(["--reuid=65534", "--regid=65534", "--clear-groups", PROGRAM]);
+            command
+        } else {
+            Command::new(PROGRAM)
+        };
+        let Ok(output) = command.args(&args).current_dir(bench.path()).env("NO_COLOR", "1").output() else {
+            return skipped("needs setpriv to be somebody else than root");
+        };
+        let said = flat(&output.stderr);
+        if said.contains("setpriv:") {
+            return skipped("setpriv cannot change the user here, or that user cannot reach the program");
+        }
+        assert_eq!(output.status.code(), Some(6), "{name}: {said}");
+        assert!(said.contains("you have no permission") && said.contains("out"), "{name}: {said}");
+        assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0, "{name}");
+    }
+    mode(&out, 0o755);
+    let whole = shared().join("study");
+    done(bench.path(), &[RUNS[0].1, &["--out", "out"]].concat());
+    same(&out, &whole, "with permission");
+}
