@@ -43,7 +43,7 @@ fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     for entry in std::fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
         let name = PathBuf::from(path.file_name().unwrap());
-        let is_record = ["run.json", "estimate.json"].iter().any(|record| name == Path::new(record));
+        let is_record = ["run.json", "estimate.json", "report.html"].iter().any(|record| name == Path::new(record));
         files.push((name, if is_record { Vec::new() } else { std::fs::read(&path).unwrap() }));
     }
     files.sort();

@@ -15,7 +15,7 @@ fn done(dir: &Path, args: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The results in a folder; of the records only that they are there: they hold times and devices.
+/// The results in a folder; of the records only that they are there (they hold times and devices), of the page all but that.
 fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let paths = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
     let mut files: Vec<(String, Vec<u8>)> = paths
@@ -25,6 +25,11 @@ fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
     for (name, content) in &mut files {
         if ["run.json", "estimate.json"].contains(&name.as_str()) {
             content.clear();
+        }
+        if name == "report.html" {
+            let page = String::from_utf8(std::mem::take(content)).unwrap();
+            let (before, rest) = page.split_once("<!-- host -->").unwrap();
+            *content = [before, rest.split_once("<!-- end of host -->").unwrap().1].concat().into_bytes();
         }
     }
     files.sort();

@@ -83,6 +83,7 @@ impl StudyReport {
                 files.push((dir.join(file_name(name, category.category, "csv")), figure.csv()?));
             }
         }
+        files.push((dir.join("report.html"), self.html()?.into_bytes()));
         files.push((dir.join("run.json"), self.run.to_json()?));
         if let Some(comparison) = &self.comparison {
             files.insert(0, (dir.join("reference.csv"), comparison.csv().into_bytes()));
@@ -146,7 +147,7 @@ impl StudyReport {
 pub const FIGURES: [&str; 6] = ["radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"];
 
 /// `radar-cut-in.svg`.
-fn file_name(figure: &str, category: Category, ending: &str) -> String {
+pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> String {
     format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
 }
 

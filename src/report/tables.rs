@@ -86,7 +86,7 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
     )
 }
 
-fn value(value: Option<f64>, interval: Option<Interval>) -> String {
+pub(super) fn value(value: Option<f64>, interval: Option<Interval>) -> String {
     match (value, interval) {
         (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
         (Some(value), None) => format!("{value:.3}"),

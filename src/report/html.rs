@@ -1,0 +1,166 @@
+//! One self-contained page: words, tables and figures of a run in one file, without a script, and with nothing that is
+//! fetched from elsewhere. What is on it is decided by who fills a [`Page`]; how it looks is in `templates`.
+
+use minijinja::Environment;
+use minijinja::value::Serde;
+use serde::Serialize;
+
+use crate::{Error, Result};
+
+const TEMPLATE: &str = include_str!("templates/report.html");
+const STYLE: &str = include_str!("templates/style.css");
+
+/// A table; the first `texts` columns hold words, the others numbers.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PageTable {
+    /// What it shows.
+    pub caption: String,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// Columns with words.
+    pub texts: usize,
+    /// Rows; a line break in a cell stays one.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A figure with the names of its files beside the page.
+#[derive(Debug, Clone, Serialize)]
+pub struct PageFigure {
+    svg: String,
+    files: Vec<String>,
+}
+
+impl PageFigure {
+    /// From a complete SVG document: it is drawn as wide as the page.
+    pub fn new(svg: &str, files: &[&str]) -> PageFigure {
+        PageFigure { svg: inline(svg), files: files.iter().map(|file| (*file).to_owned()).collect() }
+    }
+}
+
+/// A chapter of the page.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Section {
+    /// Anchor: lower-case letters and dashes.
+    pub id: String,
+    /// Heading.
+    pub title: String,
+    /// What is to be seen; may be empty.
+    pub intro: String,
+    /// Tables, before the figures.
+    pub tables: Vec<PageTable>,
+    /// Figures.
+    pub figures: Vec<PageFigure>,
+    /// Names and values.
+    pub facts: Vec<(String, String)>,
+    /// Names and values that belong to the machine and differ from run to run.
+    pub host: Vec<(String, String)>,
+    /// Headings and long texts that open on a click.
+    pub details: Vec<(String, String)>,
+}
+
+/// The page.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Page {
+    /// Heading.
+    pub title: String,
+    /// Program and version.
+    pub program: String,
+    /// What was run on what, in a sentence.
+    pub lead: String,
+    /// What must not be overlooked.
+    pub warnings: Vec<String>,
+    /// The chapters.
+    pub sections: Vec<Section>,
+}
+
+impl Page {
+    /// The page as a complete HTML document. The same page gives the same bytes.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the template does not fit: a defect of this program.
+    pub fn html(&self) -> Result<String> {
+        #[derive(Serialize)]
+        struct Context<'a> {
+            style: &'a str,
+            #[serde(flatten)]
+            page: &'a Page,
+        }
+        let broken = |e: minijinja::Error| Error::Internal(format!("the report's page cannot be made: {e:#}"));
+        let mut environment = Environment::new();
+        // The name's ending decides that texts are escaped.
+        environment.add_template("report.html", TEMPLATE).map_err(broken)?;
+        let template = environment.get_template("report.html").map_err(broken)?;
+        template.render(Serde(Context { style: STYLE, page: self })).map_err(broken)
+    }
+}
+
+/// An SVG document as an element that scales with the page: a view box in place of width and height.
+fn inline(svg: &str) -> String {
+    let start = svg.find("<svg").unwrap_or(0);
+    let svg = &svg[start..];
+    let Some((tag, rest)) = svg.split_once('>') else { return String::new() };
+    let size = |name: &str| {
+        let (_, value) = tag.split_once(&format!(" {name}=\""))?;
+        value.split_once('"').map(|(value, _)| value.to_owned())
+    };
+    let (Some(width), Some(height)) = (size("width"), size("height")) else { return svg.to_owned() };
+    let tag = tag
+        .replacen(&format!(" width=\"{width}\""), &format!(" viewBox=\"0 0 {width} {height}\" role=\"img\""), 1)
+        .replacen(&format!(" height=\"{height}\""), "", 1);
+    format!("{tag}>{}", rest.trim_end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn page() -> Page {
+        let table = PageTable {
+            caption: "A & B".into(),
+            header: vec!["name".into(), "value".into()],
+            texts: 1,
+            rows: vec![vec!["<script>alert(1)</script>".into(), "1\n[0 2]".into()]],
+        };
+        let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"50\" \
+                   fill=\"#000\"><rect width=\"100%\" height=\"100%\"/></svg>\n";
+        let section = Section {
+            id: "a".into(),
+            title: "Part".into(),
+            tables: vec![table],
+            figures: vec![PageFigure::new(svg, &["a.svg", "a.csv"])],
+            facts: vec![("seed".into(), "1".into())],
+            host: vec![("device".into(), "none".into())],
+            details: vec![("all".into(), "x < y".into())],
+            ..Section::default()
+        };
+        Page { title: "T".into(), sections: vec![section], warnings: vec!["W".into()], ..Page::default() }
+    }
+
+    #[test]
+    fn texts_are_escaped_and_figures_are_not() {
+        let html = page().html().unwrap();
+        assert!(!html.contains("<script"), "{html}");
+        assert!(html.contains("&lt;script&gt;") && html.contains("A &amp; B") && html.contains("x &lt; y"));
+        assert!(
+            html.contains("viewBox=\"0 0 1000 50\" role=\"img\" fill=\"#000\"><rect width=\"100%\" height=\"100%\"/>")
+        );
+        assert!(!html.contains("<?xml"));
+        assert_eq!(html, page().html().unwrap());
+    }
+
+    #[test]
+    fn nothing_is_fetched_from_elsewhere() {
+        let html = page().html().unwrap().replace("http://www.w3.org/2000/svg", "");
+        for outside in ["http:", "https:", "//", "@import", "url(", "<script", "src="] {
+            assert!(!html.contains(outside), "{outside}");
+        }
+    }
+
+    #[test]
+    fn what_belongs_to_the_machine_can_be_cut_out() {
+        let html = page().html().unwrap();
+        let (before, after) = html.split_once("<!-- host -->").unwrap();
+        let (host, after) = after.split_once("<!-- end of host -->").unwrap();
+        assert!(host.contains("device") && !before.contains("device") && !after.contains("device"));
+    }
+}

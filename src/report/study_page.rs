@@ -1,0 +1,322 @@
+//! A study as one page.
+
+use super::html::{Page, PageFigure, PageTable, Section};
+use super::reference::ReferenceComparison;
+use super::study::{StudyReport, file_name};
+use super::tables;
+use crate::criterion::Criterion;
+use crate::mining::RecordingSummary;
+use crate::parameterization::{Kind, ParameterizationId};
+use crate::scenario::Category;
+use crate::score::{CategoryScores, ClaimVerdict, f1, precision, published_failures, published_lvd_f1, recall};
+use crate::{Error, Result};
+
+/// Recordings that are listed; the rest are in `run.json`.
+const MOST_RECORDINGS: usize = 200;
+
+impl StudyReport {
+    /// `report.html`.
+    ///
+    /// # Errors
+    /// None for what this program makes.
+    pub fn html(&self) -> Result<String> {
+        let run = &self.run;
+        let mut warnings = Vec::new();
+        if run.synthetic {
+            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
+        }
+        if !run.left_out.is_empty() {
+            warnings.push(format!("{} parts of the input were left out; see Data.", run.left_out.len()));
+        }
+        if self.published {
+            warnings.push("Published numbers are those of highD: other data agrees in shape at best.".to_owned());
+        }
+        let mut sections = vec![self.data(), self.failures()];
+        for at in 0..self.scores.categories.len() {
+            sections.push(self.category(at));
+        }
+        sections.push(self.claims());
+        sections.extend(self.comparison.as_ref().map(compared));
+        sections.push(self.reproduction()?);
+        let page = Page {
+            title: "Parameterized against recorded scenarios".to_owned(),
+            program: run.program.clone(),
+            lead: format!(
+                "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {} headways, against {} \
+                 driver models, judged by collision, TTC and BTN under profile {}.",
+                sentence(&run.data),
+                run.lanes,
+                self.scores.categories.first().map_or(0, |c| c.simulations / c.scenarios.max(1)),
+                self.scores.categories.first().map_or(0, |c| c.models.len()),
+                run.profile.name
+            ),
+            warnings,
+            sections,
+        };
+        page.html()
+    }
+
+    fn data(&self) -> Section {
+        let run = &self.run;
+        let header = ["scenario", "found", "simulated", "lanes", "ended at the time cap", "F1 undefined (0/0)"];
+        let rows = run.categories.iter().map(|category| {
+            let numbers = [category.found, category.kept, category.lanes, category.capped_lanes, category.undefined_f1];
+            let key = category.category;
+            let label = Category::ALL.into_iter().find(|c| c.key() == key).map_or(key, Category::label);
+            [label.to_owned()].into_iter().chain(numbers.map(|n| n.to_string())).collect()
+        });
+        let counts = table("Mined scenarios, and what became of them", &header, 1, rows.collect());
+        let shown = run.recordings.iter().take(MOST_RECORDINGS);
+        let line = |recording: &RecordingSummary| {
+            let files = recording.files.iter().map(|file| format!("\n  {} {}", file.sha256, file.file));
+            let (hours, kilometres) = (recording.driven_s / 3600.0, recording.driven_m / 1000.0);
+            let counts = format!("{} vehicles, {hours:.2} h and {kilometres:.1} km driven", recording.vehicles);
+            format!("{}: {counts}{}", recording.id, files.collect::<String>())
+        };
+        let mut recordings: Vec<String> = shown.map(line).collect();
+        if run.recordings.len() > MOST_RECORDINGS {
+            recordings.push(format!("… and {} more in run.json", run.recordings.len() - MOST_RECORDINGS));
+        }
+        let mut details = vec![("Thresholds and filters of the mining".to_owned(), toml_text(&run.mining))];
+        if !recordings.is_empty() {
+            details.push((format!("{} recordings with their checksums", run.recordings.len()), recordings.join("\n")));
+        }
+        if !run.left_out.is_empty() {
+            details.push((format!("{} parts left out", run.left_out.len()), run.left_out.join("\n")));
+        }
+        Section {
+            id: "data".to_owned(),
+            title: "Data".to_owned(),
+            intro: sentence(&run.data),
+            tables: vec![counts],
+            details,
+            ..Section::default()
+        }
+    }
+
+    fn failures(&self) -> Section {
+        let mut header = vec!["scenario", "model", "collision", "TTC", "BTN", "simulations", "at the time cap"];
+        if self.published {
+            header.push("published: collision, TTC, BTN (of)");
+        }
+        let mut rows = Vec::new();
+        for scores in &self.scores.categories {
+            for (at, &model) in scores.models.iter().enumerate() {
+                let count = |c: Criterion| scores.index(0, model, c).map_or(0, |i| scores.cells[i].counts.both);
+                let mut row = vec![scores.category.label().to_owned(), model.name().to_owned()];
+                row.extend(Criterion::ALL.map(|c| count(c).to_string()));
+                row.extend([scores.simulations.to_string(), scores.capped[at].to_string()]);
+                if self.published {
+                    let theirs = Criterion::ALL.map(|c| published_failures(scores.category, model, c));
+                    let counts: Vec<String> = theirs.iter().flatten().map(|p| p.failures.to_string()).collect();
+                    let of = theirs.iter().flatten().next().map(|p| p.simulations);
+                    row.push(of.map_or("–".to_owned(), |of| format!("{} ({of})", counts.join(", "))));
+                }
+                rows.push(row);
+            }
+        }
+        Section {
+            id: "failures".to_owned(),
+            title: "Failures of the recorded scenarios".to_owned(),
+            intro: "How often each driver model fails each criterion when the scenarios are replayed as recorded (S)."
+                .to_owned(),
+            tables: vec![table("Failed simulations of S", &header, 2, rows)],
+            ..Section::default()
+        }
+    }
+
+    fn category(&self, at: usize) -> Section {
+        let scores = &self.scores.categories[at];
+        let name = |figure: &str, end: &str| file_name(figure, scores.category, end);
+        let mut figures = vec![PageFigure::new(&self.radar(scores), &[&name("radar", "svg"), "f1.csv"])];
+        for (figure, drawn) in self.figures(at) {
+            figures.push(PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")]));
+        }
+        let key = scores.category.key().replace('_', "-");
+        Section {
+            id: key,
+            title: format!("{}: agreement of S' with S", scores.category.label()),
+            intro: format!(
+                "{} scenarios, {} simulations per model and parameterization. F1 joins recall (share of the recorded \
+                 failures that S' shows) and precision (share of the failures of S' that were recorded); – is \
+                 undefined, because neither side fails.",
+                scores.scenarios, scores.simulations
+            ),
+            tables: vec![self.f1_table(scores), shares_table(scores), variants_table(scores)],
+            figures,
+            ..Section::default()
+        }
+    }
+
+    fn f1_table(&self, scores: &CategoryScores) -> PageTable {
+        let mut header = vec!["model".to_owned(), "criterion".to_owned(), "S fails".to_owned()];
+        header.extend(scores.variants.iter().skip(1).cloned());
+        let mut rows = Vec::new();
+        for &model in &scores.models {
+            for criterion in Criterion::ALL {
+                let Some(s) = scores.index(0, model, criterion) else { continue };
+                let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
+                row.push(scores.cells[s].counts.both.to_string());
+                for variant in 1..scores.variants.len() {
+                    let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
+                    let mut text = cell.map_or("–".to_owned(), |c| tables::value(f1(&c.counts), c.f1_interval));
+                    let theirs = published_lvd_f1(&scores.variants[variant], model, criterion);
+                    if let Some(theirs) = theirs.filter(|_| self.published) {
+                        text.push_str(&format!("\npaper {theirs:.3}"));
+                    }
+                    row.push(text.replace("-", "–"));
+                }
+                rows.push(row);
+            }
+        }
+        let level = 100.0 * self.scores.options.confidence;
+        PageTable { caption: format!("F1 with its {level} % bootstrap interval"), header, texts: 2, rows }
+    }
+
+    fn claims(&self) -> Section {
+        let row = |result: &crate::score::ClaimResult| {
+            let overall = &result.overall;
+            let difference = overall.value.map_or("–".to_owned(), |value| format!("{value:+.3}"));
+            let interval = overall.interval.map_or(String::new(), |i| format!("\n[{:+.3} {:+.3}]", i.low, i.high));
+            let count = |verdict: ClaimVerdict| result.rows.iter().filter(|row| row.verdict == verdict).count();
+            let all = [
+                ClaimVerdict::Holds,
+                ClaimVerdict::Contradicted,
+                ClaimVerdict::Undecided,
+                ClaimVerdict::TooFew,
+                ClaimVerdict::NotRun,
+            ];
+            let cells = all.into_iter().filter(|v| count(*v) > 0).map(|v| format!("{} {}", count(v), v.text()));
+            vec![
+                result.claim.id.to_owned(),
+                result.claim.statement.to_owned(),
+                overall.verdict.text().to_owned(),
+                cells.collect::<Vec<_>>().join("\n"),
+                overall.failures.to_string(),
+                format!("{difference}{interval}"),
+            ]
+        };
+        let header = ["claim", "the paper says", "here it", "cells", "S fails", "difference [interval]"];
+        let rows = self.claims.iter().map(row).collect();
+        Section {
+            id: "claims".to_owned(),
+            title: "The paper's claims on this data".to_owned(),
+            intro: "What de Gelder and Op den Camp found on highD, tested here: the mean over the cells (model and \
+                    criterion) with enough failures, and each cell by itself. Files: claims.csv."
+                .to_owned(),
+            tables: vec![table("Claims", &header, 4, rows)],
+            ..Section::default()
+        }
+    }
+
+    fn reproduction(&self) -> Result<Section> {
+        let run = &self.run;
+        let mut facts = vec![
+            ("program".to_owned(), run.program.clone()),
+            ("profile".to_owned(), run.profile.name.clone()),
+            ("time step".to_owned(), format!("{} s", run.profile.frame.dt_s)),
+            ("seed of the bootstrap".to_owned(), run.score.seed.to_string()),
+            ("SHA-256 of the plan".to_owned(), run.plan_sha256.clone()),
+        ];
+        facts.extend(
+            run.scenario_file_sha256.iter().map(|sha| ("SHA-256 of the scenario file".to_owned(), sha.clone())),
+        );
+        let mut host = vec![("computed by".to_owned(), run.backend.clone())];
+        host.extend(run.device.iter().map(|device| {
+            let exact = if device.exact_path { "exact path" } else { "plain path" };
+            let at = device.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
+            ("device".to_owned(), format!("{} ({}, {}{at}, {exact})", device.name, device.api, device.driver))
+        }));
+        host.push((
+            "checked".to_owned(),
+            match run.sweep.rechecked_lanes {
+                0 => "no lane of a device".to_owned(),
+                lanes => format!("{lanes} lanes of the device computed again on the CPU, all equal"),
+            },
+        ));
+        let seconds = &run.timings;
+        host.push((
+            "seconds".to_owned(),
+            format!(
+                "mining {:.2}, planning {:.2}, lanes {:.2}, scores {:.2}",
+                seconds.mine_s, seconds.plan_s, seconds.sweep_s, seconds.score_s
+            ),
+        ));
+        let record =
+            String::from_utf8(run.to_json()?).map_err(|e| Error::Internal(format!("run.json is no text: {e}")))?;
+        let value: serde_json::Value =
+            serde_json::from_str(&record).map_err(|e| Error::Internal(format!("run.json cannot be read: {e}")))?;
+        let part = |key: &str| serde_json::to_string_pretty(&value[key]).unwrap_or_default();
+        Ok(Section {
+            id: "reproduction".to_owned(),
+            title: "Reproduction".to_owned(),
+            intro: "The same input, profile and seed give the same numbers, on any machine. run.json holds all of it; \
+                    `lanesweep verify` compares a device with the CPU word by word."
+                .to_owned(),
+            facts,
+            host,
+            details: vec![
+                ("Profile".to_owned(), part("profile")),
+                ("Options of the parameterizations".to_owned(), part("parameterization")),
+                ("Options of the scores".to_owned(), part("score")),
+            ],
+            ..Section::default()
+        })
+    }
+}
+
+fn shares_table(scores: &CategoryScores) -> PageTable {
+    let mut header = vec!["model".to_owned(), "criterion".to_owned()];
+    header.extend(scores.variants.iter().skip(1).cloned());
+    let share = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
+    let mut rows = Vec::new();
+    for &model in &scores.models {
+        for criterion in Criterion::ALL {
+            let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
+            for variant in 1..scores.variants.len() {
+                let counts = scores.index(variant, model, criterion).map(|i| scores.cells[i].counts);
+                let both = |c| format!("{} / {}", share(recall(&c)), share(precision(&c)));
+                row.push(counts.map_or("–".to_owned(), both));
+            }
+            rows.push(row);
+        }
+    }
+    PageTable { caption: "Recall / precision".to_owned(), header, texts: 2, rows }
+}
+
+fn variants_table(scores: &CategoryScores) -> PageTable {
+    let known = scores.variants.iter().skip(1).filter_map(|key| ParameterizationId::find(scores.category, key));
+    let rows = known.map(|id| {
+        let kind = if id.kind == Kind::Kinematic { "kinematic" } else { "SVD" };
+        vec![id.key.to_owned(), id.description.to_owned(), kind.to_owned(), id.parameters.to_string()]
+    });
+    let header = ["parameterization", "what is kept", "kind", "parameters beside the headway"];
+    table("Parameterizations", &header, 3, rows.collect())
+}
+
+fn compared(comparison: &ReferenceComparison) -> Section {
+    Section {
+        id: "reference".to_owned(),
+        title: "Lane arithmetic against double precision".to_owned(),
+        details: vec![("Every lane in f32 and in f64".to_owned(), comparison.text())],
+        ..Section::default()
+    }
+}
+
+fn table(caption: &str, header: &[&str], texts: usize, rows: Vec<Vec<String>>) -> PageTable {
+    PageTable {
+        caption: caption.to_owned(),
+        header: header.iter().map(|name| (*name).to_owned()).collect(),
+        texts,
+        rows,
+    }
+}
+
+/// With a full stop at its end.
+fn sentence(text: &str) -> String {
+    if text.ends_with('.') { text.to_owned() } else { format!("{text}.") }
+}
+
+fn toml_text<T: serde::Serialize>(value: &T) -> String {
+    toml::to_string(value).unwrap_or_default()
+}
