@@ -18,6 +18,7 @@ pub mod driver;
 pub mod error;
 pub mod estimate;
 pub mod gpu;
+pub mod grid;
 mod input_file;
 pub mod interrupt;
 mod lock;

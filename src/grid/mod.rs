@@ -1,0 +1,3 @@
+//! Grids of concrete cases: what a map sweeps.
+
+pub mod jrc_case;
