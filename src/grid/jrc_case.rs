@@ -2,6 +2,8 @@
 //! the 0.1 s grid that begins one step after the nominal start, and, in its comparison sweep, a lateral run-up before
 //! it. Conformance replays the JRC's tables with these; maps sweep its grids.
 
+use crate::driver::ModelId;
+use crate::profile::Profile;
 use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 
 /// Length of a vehicle, m.
@@ -16,6 +18,8 @@ pub const CUT_IN_LATERAL_M: f64 = 3.5;
 pub const CUT_OUT_LATERAL_M: f64 = 4.0;
 /// Slowest lane change that has a series, m/s: it takes longer than any run.
 pub const LEAST_LATERAL_MPS: f64 = 1e-3;
+/// Time headway at which a following Reg157 or CCHDM starts, s.
+pub const NATIVE_THW_S: f64 = 2.0;
 /// Speeds of the lateral run-up grow by this per step, m/s (1.5 m/s² at 10 Hz).
 const RUN_UP_STEP_MPS: f64 = 0.15;
 
@@ -100,6 +104,32 @@ pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Cas
             gap_m: front.distance_m - (front.length_m - LENGTH_M) / 2.0,
         }),
         horizon_s: 0.0,
+    }
+}
+
+/// The distance at which a following FSM starts to be unconcerned: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1.
+pub fn native_distance_fsm(profile: &Profile, v: f64) -> f64 {
+    let p = &profile.fsm;
+    v * p.reaction_time_s + v * v / (2.0 * p.comfortable_deceleration_mps2) - v * v / (2.0 * p.lead_deceleration_mps2)
+        + 2.0 * p.margin_m
+}
+
+/// The same of RSS: v ρ + a ρ²/2 + (v + ρ a)²/(2 b) − max(v − b ρ, 0)²/(2 b) + a ρ² with the leader's response.
+pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
+    let p = &profile.rss;
+    let (rho, a, b) = (p.response_time_s, p.max_acceleration_mps2, p.ego_deceleration_mps2);
+    let fast = v + rho * a;
+    let slow = (v - p.other_deceleration_mps2 * rho).max(0.0);
+    v * rho + a * rho * rho / 2.0 + fast * fast / (2.0 * b) - slow * slow / (2.0 * p.other_deceleration_mps2)
+        + a * rho * rho
+}
+
+/// The distance at which a following model starts in the JRC's simulator, m; `speed_mps` is that of both vehicles.
+pub fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64 {
+    match model {
+        ModelId::Fsm => native_distance_fsm(profile, speed_mps),
+        ModelId::Rss => native_distance_rss(profile, speed_mps),
+        _ => NATIVE_THW_S * speed_mps,
     }
 }
 
