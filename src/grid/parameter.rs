@@ -63,7 +63,6 @@ const LANE_CHANGES: &[Category] = &[Category::CutIn, Category::CutOut];
 const CUT_OUT: &[Category] = &[Category::CutOut];
 const KMH: f64 = 3.6;
 
-#[allow(clippy::too_many_arguments)]
 const fn parameter(
     key: &'static str,
     label: &'static str,

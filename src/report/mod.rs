@@ -15,6 +15,8 @@ pub mod failure_map;
 pub mod files;
 pub mod forest;
 pub mod lanes;
+pub mod map;
+pub mod map_sheet;
 pub mod radar;
 pub mod reference;
 pub mod run_record;
