@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
 use super::{Exit, lists};
 use crate::criterion::Criterion;
@@ -16,7 +16,7 @@ use crate::profile::Profile;
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
 use crate::scenario::Category;
-use crate::sweep::SweepSummary;
+use crate::sweep::{Backend, CpuBackend, SweepSummary};
 use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.
@@ -70,6 +70,9 @@ pub struct Map {
     dt: Option<f64>,
     #[command(flatten)]
     backend: BackendFlags,
+    /// Compute in binary64 on the CPU: the reference of the lane arithmetic
+    #[arg(long)]
+    reference: bool,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "lanesweep-map")]
     out: PathBuf,
@@ -101,18 +104,24 @@ impl Map {
             planned.push(self.plan(preset, &profile, against.as_ref())?);
         }
         let plan_s = started.elapsed().as_secs_f64();
-        let opened = self.backend.open()?;
-        let is_jrc = self.preset.is_some() && criterion == Criterion::Collision && profile == Profile::load("jrc-2021")?;
+        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let wide = self.reference.then(CpuBackend::reference);
+        let backend: &dyn Backend = wide.as_ref().map_or_else(|| opened.backend(), |wide| wide);
+        let recheck_seed = opened.device().map(|_| RECHECK_SEED);
+        let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
+        let is_jrc = self.preset.is_some()
+            && criterion == Criterion::Collision
+            && profile == Profile::load(presets::JRC_PROFILE)?;
         let cells: u64 = planned.iter().map(|(_, plan, _)| plan.grid.cell_count() as u64).sum();
         let bar = console::progress(verbosity, cells, "sweeping");
         let started = Instant::now();
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let mut grids = Vec::new();
         for (preset, plan, other) in planned {
-            let map = swept(&plan, &opened, &mut summary)?;
+            let map = swept(&plan, how, &mut summary)?;
             let other = match other {
                 Some((name, plan)) => {
-                    let map = swept(&plan, &opened, &mut summary)?;
+                    let map = swept(&plan, how, &mut summary)?;
                     Some((name, plan, map))
                 }
                 None => None,
@@ -124,7 +133,7 @@ impl Map {
         }
         bar.finish_and_clear();
         let host = MapHost {
-            backend: opened.backend().describe(),
+            backend: backend.describe(),
             device: opened.device(),
             sweep: SweepRecord {
                 rechecked_lanes: summary.rechecked_lanes,
@@ -231,9 +240,7 @@ impl Map {
 /// A grid, its plan, and its name and plan under another profile.
 type Planned = (Preset, GridPlan, Option<(String, GridPlan)>);
 
-fn swept(plan: &GridPlan, opened: &Opened, summary: &mut SweepSummary) -> Result<GridMap> {
-    let recheck_seed = opened.device().map(|_| RECHECK_SEED);
-    let how = MapBackend { backend: opened.backend(), fallback: opened.fallback(), recheck_seed };
+fn swept(plan: &GridPlan, how: MapBackend, summary: &mut SweepSummary) -> Result<GridMap> {
     let (map, of_map) = GridMap::sweep(plan, how)?;
     summary.add(&of_map);
     Ok(map)

@@ -27,8 +27,7 @@ impl GridAxis {
     pub fn parse(category: Category, text: &str, flag: &str) -> Result<GridAxis> {
         const FORM: &str = "write NAME=FROM..TO/STEP or NAME=A,B,C, for instance gap_m=1..60/1";
         let wrong = |problem: String, help: &str| Error::usage(Place::item(flag), problem, help);
-        let (key, values) =
-            text.split_once('=').ok_or_else(|| wrong(format!("`{text}` has no values"), FORM))?;
+        let (key, values) = text.split_once('=').ok_or_else(|| wrong(format!("`{text}` has no values"), FORM))?;
         let parameter = Parameter::find(category, key.trim(), flag)?;
         let number = |part: &str| {
             let value = part.trim().parse::<f64>().ok().filter(|v| v.is_finite());

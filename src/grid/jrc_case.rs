@@ -56,8 +56,7 @@ pub fn run_up_steps(lateral_mps: f64) -> u32 {
 
 /// A leader that decelerates from `initial_mps` to `end_mps` at once; the ego is as fast as it.
 pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
-    let until_s =
-        if deceleration_mps2 > 0.0 { (initial_mps - end_mps).max(0.0) / deceleration_mps2 } else { 0.0 };
+    let until_s = if deceleration_mps2 > 0.0 { (initial_mps - end_mps).max(0.0) / deceleration_mps2 } else { 0.0 };
     let speed = Speed::Kinematic { initial_mps, acceleration_mps2: -deceleration_mps2, until_s };
     Case {
         category: Category::Lvd,

@@ -79,8 +79,7 @@ impl GridMap {
         for part in &plan.parts {
             let lanes = &part.plan;
             let recheck = how.recheck_seed.map(|seed| Recheck::new(lanes, seed, ONE_IN));
-            let options =
-                SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
+            let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
             // Where the part's models stand among all.
             let of_part: Vec<Option<usize>> =
                 lanes.models.iter().map(|model| plan.models.iter().position(|m| m == model)).collect();
@@ -122,12 +121,7 @@ impl GridMap {
     }
 
     /// Where two models' verdicts agree and differ, cell by cell; the second may be of another map of the same grid.
-    pub fn difference(
-        &self,
-        first: usize,
-        (other, second): (&GridMap, usize),
-        criterion: Criterion,
-    ) -> Vec<Agreement> {
+    pub fn difference(&self, first: usize, (other, second): (&GridMap, usize), criterion: Criterion) -> Vec<Agreement> {
         let pairs = self.verdicts[first].iter().zip(&other.verdicts[second]);
         pairs.map(|(a, b)| Agreement::of(a.failed(criterion), b.failed(criterion))).collect()
     }

@@ -42,12 +42,8 @@ impl PlainCase {
     pub fn case(&self, time_cap_s: f64) -> Result<Case> {
         let until_s = self.acceleration_until_s(time_cap_s)?;
         let (lateral, change_s) = self.lateral();
-        let participant = |speed, lateral| Participant {
-            length_m: self.length_m,
-            width_m: self.width_m,
-            speed,
-            lateral,
-        };
+        let participant =
+            |speed, lateral| Participant { length_m: self.length_m, width_m: self.width_m, speed, lateral };
         let ahead = (self.category == Category::CutOut).then(|| Ahead {
             vehicle: participant(Speed::constant(self.ahead_speed_mps), Lateral::Centred),
             gap_m: self.ahead_gap_m,

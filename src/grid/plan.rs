@@ -120,7 +120,9 @@ impl GridPart {
             source.cases.push(case);
             let varies = |parameter: &Parameter| layout == Layout::Cells || !is_distance(parameter);
             let values = grid.values(cell).into_iter().filter(|(parameter, _)| varies(parameter));
-            names.push(values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","));
+            names.push(
+                values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
+            );
         }
         let block = Block {
             category: grid.category(),

@@ -141,7 +141,7 @@ impl MapReport {
         for mapped in &self.grids {
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
-                let what = format!("{} fails {}", model.name(), self.criterion.label());
+                let what = format!("{}, {}", model.name(), self.criterion.label());
                 let sheet = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells);
                 let path = dir.join(format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name())));
                 write_atomically(&path, sheet.svg().as_bytes())?;

@@ -49,6 +49,8 @@ const LABEL: Type = Type { size_px: 17, bold: false, colour: INK };
 /// Space between panels: for the numbers of an axis, and for a panel's name.
 const GUTTER_PX: (f64, f64) = (46.0, 62.0);
 const HATCH_PX: f64 = 7.0;
+/// Overlap of neighbouring rows; the boundary's line is wider.
+const SEAM_PX: f64 = 0.6;
 
 impl Kind {
     /// A cell in which nothing fails, and one in which it does.
@@ -83,7 +85,8 @@ impl MapSheet<'_> {
     pub fn svg(&self) -> String {
         let (mut scene, y) = drawing::page(&self.title, Some(&self.subtitle));
         let y = self.key(&mut scene, y + 12.0);
-        let label = format!("Upwards: {}. Across: {}.", self.grid.y().parameter.title(), self.grid.x().parameter.title());
+        let label =
+            format!("Upwards: {}. Across: {}.", self.grid.y().parameter.title(), self.grid.x().parameter.title());
         let mut top = paragraph(&mut scene, (BORDER_PX, y + 8.0), &label, LABEL, TEXT_WIDTH_PX);
         let panels = self.grid.panels().len();
         let columns = match panels {
@@ -125,8 +128,15 @@ impl MapSheet<'_> {
             Some((vehicle, _)) => vehicle.to_owned(),
             None => key.rsplit_once('_').map_or(key, |(name, _)| name).replace('_', " "),
         };
-        let parts: Vec<String> =
-            axes.map(|(axis, value)| format!("{} {value} {}", word(axis.parameter.key), axis.parameter.unit)).collect();
+        let units: Vec<&str> = self.grid.panel_axes().iter().map(|a| a.parameter.unit).collect();
+        let parts: Vec<String> = axes
+            .enumerate()
+            .map(|(at, (axis, value))| {
+                // A unit stands once where all are the same.
+                let unit = if units[at + 1..].contains(&units[at]) { "" } else { units[at] };
+                format!("{} {value} {unit}", word(axis.parameter.key)).trim_end().to_owned()
+            })
+            .collect();
         parts.join(", ")
     }
 
@@ -139,7 +149,9 @@ impl MapSheet<'_> {
             for j in 0..self.grid.y().len() {
                 for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == number) {
                     let (a, b) = ((x.at(across[from]), y.at(up[j])), (x.at(across[to]), y.at(up[j + 1])));
-                    rect(scene, a, b, Color::from(look.fill), None);
+                    // A little lower than its row, so that no white seam parts it from the one below.
+                    let lower = if j > 0 { a.1 + SEAM_PX } else { a.1 };
+                    rect(scene, (a.0, lower), b, Color::from(look.fill), None);
                     hatching.extend(strokes(look.hatch, a, b));
                 }
             }
@@ -178,7 +190,13 @@ impl MapSheet<'_> {
             x += width_px;
         }
         let y = y + 28.0;
-        paragraph(scene, (BORDER_PX, y), "Black lines: the boundary, between cells of different kinds.", NOTE, TEXT_WIDTH_PX)
+        paragraph(
+            scene,
+            (BORDER_PX, y),
+            "Black lines: the boundary, between cells of different kinds.",
+            NOTE,
+            TEXT_WIDTH_PX,
+        )
     }
 }
 
