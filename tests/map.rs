@@ -414,6 +414,7 @@ fn what_makes_no_map_is_answered_with_what_would() {
         (&[&["--x", "gap_m=0..9999/0.2"], &["--y", "lateral_speed_mps=0.1..1.7/0.01"], &set], "longer steps or fewer"),
         (&[&["--x", "gap_m=-5..60/1"], &y, &set], "at least 0"),
         (&[&["--x", "lateral_speed_mps=1..2/1"], &y, &set], "say the same twice"),
+        (&[&x, &y, &["--panel", "ego_speed_kmh=1..300/0.1"]], "2991 panels"),
         (&[&x, &y], "needs the ego's speed"),
         (&[&x, &["--y", "thw_s=1..2/1"], &set, &["--set", "lateral_speed_mps=1"]], "given twice"),
         (&[&x, &y, &["--set", "ego_speed_kmh=90,100"]], "has 2 values"),

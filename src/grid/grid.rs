@@ -13,6 +13,9 @@ use super::plain_case::{LATERAL_DISTANCE_M, PlainCase};
 /// Cells of a grid at most.
 pub const MOST_CELLS: usize = 1_000_000;
 
+/// Panels of a grid at most: a sheet shows every one.
+pub const MOST_PANELS: usize = 1000;
+
 /// How a point becomes a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -319,9 +322,10 @@ fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(Quantity) -
 /// Every combination of the axes' values, the last axis fastest; one empty combination where there is no axis.
 fn combinations(axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     let count = axes.iter().fold(1_usize, |n, axis| n.saturating_mul(axis.len()));
-    if count > MOST_CELLS {
+    if count > MOST_PANELS {
         let problem = format!("they make {count} panels");
-        return Err(Error::usage(Place::item("--panel"), problem, "give fewer values: a reader looks at some dozens"));
+        let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+        return Err(Error::usage(Place::item("--panel"), problem, help));
     }
     let mut panels = vec![Vec::new()];
     for axis in axes {
