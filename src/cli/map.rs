@@ -106,7 +106,10 @@ impl Map {
         let plan_s = started.elapsed().as_secs_f64();
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let wide = self.reference.then(CpuBackend::reference);
-        let backend: &dyn Backend = wide.as_ref().map_or_else(|| opened.backend(), |wide| wide);
+        let backend: &dyn Backend = match &wide {
+            Some(wide) => wide,
+            None => opened.backend(),
+        };
         let recheck_seed = opened.device().map(|_| RECHECK_SEED);
         let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
         let is_jrc = self.preset.is_some()
