@@ -3,7 +3,7 @@
 //! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
-//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`conformance`] (other simulators' tables),
+//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
 //! [`parts`] (shards, journals, merging), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
 //! good order) and [`cli`].
 
@@ -18,6 +18,7 @@ pub mod driver;
 pub mod error;
 pub mod estimate;
 pub mod gpu;
+pub mod grid;
 mod input_file;
 pub mod interrupt;
 mod lock;

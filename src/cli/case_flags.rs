@@ -6,8 +6,9 @@ use clap::Args;
 use serde::Deserialize;
 
 use crate::driver::ModelId;
+use crate::grid::{LATERAL_DISTANCE_M, PlainCase};
 use crate::profile::Profile;
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+use crate::scenario::{Case, Category};
 use crate::sweep::Headway;
 use crate::{Error, Place, Result, input_file, toml_file};
 
@@ -126,50 +127,36 @@ impl CaseFlags {
         let width_m = above_zero(self.width.unwrap_or(profile.frame.default_width_m), "width")?;
         let initial_mps = at_least(self.speed.unwrap_or(ego_speed_mps), 0.0, "speed")?;
         let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
-        let end_mps = at_least(self.end_speed.unwrap_or(0.0), 0.0, "end_speed")?;
-        let until_s = match (acceleration_mps2, self.end_speed) {
-            (0.0, _) => 0.0,
-            (a, None) if a > 0.0 => profile.frame.time_cap_s,
-            (a, _) if (end_mps - initial_mps) / a < 0.0 => {
-                return Err(Error::usage(
-                    Place::item("end_speed"),
-                    format!("{end_mps} m/s cannot be reached from {initial_mps} m/s with {a} m/s²"),
-                    "change the sign of the acceleration or the end speed",
-                ));
-            }
-            (a, _) => (end_mps - initial_mps) / a,
-        };
-        let distance_m = at_least(self.lateral_distance.unwrap_or(3.5), 0.0, "lateral_distance")?;
-        let (lateral, change_s) = match category {
-            Category::Lvd => (Lateral::Centred, 0.0),
+        let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
+        let lateral_distance_m =
+            at_least(self.lateral_distance.unwrap_or(LATERAL_DISTANCE_M), 0.0, "lateral_distance")?;
+        let lateral_speed_mps = match category {
+            Category::Lvd => 0.0,
             Category::CutIn | Category::CutOut => {
                 let rate = *needed(self.lateral_speed.as_ref(), "lateral_speed", "a speed in m/s")?;
-                let rate = above_zero(rate, "lateral_speed")?;
-                let lateral = if category == Category::CutIn {
-                    Lateral::Kinematic { start_m: distance_m, rate_mps: -rate, end_m: 0.0 }
-                } else {
-                    Lateral::Kinematic { start_m: 0.0, rate_mps: rate, end_m: distance_m }
-                };
-                (lateral, distance_m / rate)
+                above_zero(rate, "lateral_speed")?
             }
         };
-        let ahead = if category == Category::CutOut {
+        let (ahead_gap_m, ahead_speed_mps) = if category == Category::CutOut {
             let gap_m = at_least(*needed(self.ahead_gap.as_ref(), "ahead_gap", "a gap in m")?, 0.0, "ahead_gap")?;
-            let speed = Speed::constant(at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?);
-            Some(Ahead { vehicle: Participant { length_m, width_m, speed, lateral: Lateral::Centred }, gap_m })
+            (gap_m, at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?)
         } else {
-            None
+            (0.0, 0.0)
         };
-        let speed = Speed::Kinematic { initial_mps, acceleration_mps2, until_s };
-        Ok(Case {
+        let plain = PlainCase {
             category,
-            ego_length_m: length_m,
-            ego_width_m: width_m,
             ego_speed_mps,
-            principal: Participant { length_m, width_m, speed, lateral },
-            ahead,
-            horizon_s: until_s.max(change_s).min(profile.frame.time_cap_s),
-        })
+            speed_mps: initial_mps,
+            acceleration_mps2,
+            end_speed_mps,
+            lateral_speed_mps,
+            lateral_distance_m,
+            ahead_speed_mps,
+            ahead_gap_m,
+            length_m,
+            width_m,
+        };
+        plain.case(profile.frame.time_cap_s)
     }
 }
 

@@ -11,6 +11,7 @@ mod environment;
 mod exit;
 mod fit;
 mod lists;
+mod map;
 mod merge;
 mod mine;
 mod rerun;
@@ -94,6 +95,7 @@ enum Verb {
     Merge(merge::Merge),
     Compare(Box<compare::Compare>),
     Synth(synth::Synth),
+    Map(Box<map::Map>),
     Simulate(simulate::Simulate),
     Slurm(slurm::Slurm),
     Conformance(conformance::Conformance),
@@ -178,6 +180,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Merge(verb) => verb.run(),
         Verb::Compare(verb) => verb.run(cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
+        Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),

@@ -3,6 +3,7 @@
 use super::table::Table;
 use super::tally::Tally;
 use crate::driver::DriverProfile;
+use crate::grid::jrc_case::{NATIVE_THW_S, native_distance_fsm, native_distance_rss};
 use crate::profile::Profile;
 use crate::scenario::Category;
 use crate::{Error, Result};
@@ -25,7 +26,7 @@ pub fn compare_functions(table: &Table, profile: &Profile) -> Result<Vec<Tally>>
             "Reg157_ttc_thr_JRC" => reg157.ttc_threshold(v_ego - row.number("v_lead")?),
             "init_dist_FSM" => native_distance_fsm(profile, v_ego),
             "init_dist_RSS" => native_distance_rss(profile, v_ego),
-            "init_dist_CC" => 2.0 * v_ego,
+            "init_dist_CC" => NATIVE_THW_S * v_ego,
             other => {
                 return Err(Error::input(
                     row.place("fn"),
@@ -51,21 +52,4 @@ pub fn compare_functions(table: &Table, profile: &Profile) -> Result<Vec<Tally>>
         tally.value("value", true, Some(ours), Some(theirs), &|| row.place("value").to_string());
     }
     Ok(tallies)
-}
-
-/// The distance at which a following FSM starts to be unconcerned: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1.
-pub fn native_distance_fsm(profile: &Profile, v: f64) -> f64 {
-    let p = &profile.fsm;
-    v * p.reaction_time_s + v * v / (2.0 * p.comfortable_deceleration_mps2) - v * v / (2.0 * p.lead_deceleration_mps2)
-        + 2.0 * p.margin_m
-}
-
-/// The same of RSS: v ρ + a ρ²/2 + (v + ρ a)²/(2 b) − max(v − b ρ, 0)²/(2 b) + a ρ² with the leader's response.
-pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
-    let p = &profile.rss;
-    let (rho, a, b) = (p.response_time_s, p.max_acceleration_mps2, p.ego_deceleration_mps2);
-    let fast = v + rho * a;
-    let slow = (v - p.other_deceleration_mps2 * rho).max(0.0);
-    v * rho + a * rho * rho / 2.0 + fast * fast / (2.0 * b) - slow * slow / (2.0 * p.other_deceleration_mps2)
-        + a * rho * rho
 }

@@ -3,20 +3,12 @@
 use super::table::{Row, Table};
 use super::tally::Tally;
 use crate::driver::ModelId;
+use crate::grid::jrc_case::{self, Front, LEAST_LATERAL_MPS};
 use crate::profile::Profile;
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
+use crate::scenario::{Case, Category, Tables};
 use crate::sweep::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Start, Step};
 use crate::{Error, Result};
 
-/// Nominal vehicle of the JRC's simulator, m.
-const LENGTH_M: f64 = 4.3;
-const WIDTH_M: f64 = 1.9;
-/// Lateral distance that a cut-in covers, m.
-const CUT_IN_LATERAL_M: f64 = 3.5;
-/// Lateral distance that a cut-out covers, m.
-const CUT_OUT_LATERAL_M: f64 = 4.0;
-/// Speeds of the lateral run-up grow by this per step, m/s (1.5 m/s² at 10 Hz).
-const RUN_UP_STEP_MPS: f64 = 0.15;
 /// Instants at which the tables hold the ego's speed and position, s.
 const SPEED_INSTANTS_S: [(&str, f64); 12] = [
     ("v@0.5", 0.5),
@@ -113,22 +105,8 @@ impl Replay {
         let run_up = run_up as u32;
         profile.frame.time_cap_s += f64::from(run_up) * dt;
         profile.cchdm.abort_on_large_ttc = row.text("variant")? == "comparison";
-        let case = Case {
-            category: Category::CutIn,
-            ego_length_m: LENGTH_M,
-            ego_width_m: WIDTH_M,
-            ego_speed_mps: v_ego,
-            principal: Participant {
-                length_m: LENGTH_M,
-                width_m: WIDTH_M,
-                speed: Speed::constant(v_other),
-                lateral: cut_in_lateral(v_lateral, run_up, dt),
-            },
-            ahead: None,
-            horizon_s: 0.0,
-        };
-        // Index m − 1 has the nominal gap; the frame's start shift adds one step.
-        let gap_m = row.number("dist_ref")? - f64::from(run_up) * (v_other - v_ego) * dt;
+        let case = jrc_case::cut_in(v_ego, v_other, v_lateral, run_up, dt);
+        let gap_m = jrc_case::gap_before_run_up(row.number("dist_ref")?, v_ego, v_other, run_up, dt);
         Ok(Replay { model, profile, case, gap_m, run_up })
     }
 
@@ -136,47 +114,19 @@ impl Replay {
         let v0 = row.not_negative("v0_kmh")? / 3.6;
         let v1 = (row.number("v1_kmh")? / 3.6).max(0.0);
         let deceleration = row.not_negative("lead_dec")?;
-        let until_s = if deceleration > 0.0 { (v0 - v1).max(0.0) / deceleration } else { 0.0 };
-        let speed = Speed::Kinematic { initial_mps: v0, acceleration_mps2: -deceleration, until_s };
-        let case = Case {
-            category: Category::Lvd,
-            ego_length_m: LENGTH_M,
-            ego_width_m: WIDTH_M,
-            ego_speed_mps: v0,
-            principal: Participant { length_m: LENGTH_M, width_m: WIDTH_M, speed, lateral: Lateral::Centred },
-            ahead: None,
-            horizon_s: until_s,
-        };
+        let case = jrc_case::lvd(v0, v1, deceleration);
         Ok(Replay { model, profile, case, gap_m: row.number("initial_gap_nominal")?, run_up: 0 })
     }
 
     fn cut_out(row: &Row, profile: Profile, model: ModelId) -> Result<Replay> {
         let dt = profile.frame.dt_s;
         let v0 = row.not_negative("v0_kmh")? / 3.6;
-        let front_length_m = row.not_negative("front_length")?;
-        let case = Case {
-            category: Category::CutOut,
-            ego_length_m: LENGTH_M,
-            ego_width_m: WIDTH_M,
-            ego_speed_mps: v0,
-            principal: Participant {
-                length_m: LENGTH_M,
-                width_m: WIDTH_M,
-                speed: Speed::constant(v0),
-                lateral: cut_out_lateral(lateral_speed(row)?, dt),
-            },
-            ahead: Some(Ahead {
-                vehicle: Participant {
-                    length_m: front_length_m,
-                    width_m: WIDTH_M,
-                    speed: Speed::constant(row.not_negative("vfront_kmh")? / 3.6),
-                    lateral: Lateral::Centred,
-                },
-                // The table measures with two nominal lengths.
-                gap_m: row.number("front_dist")? - (front_length_m - LENGTH_M) / 2.0,
-            }),
-            horizon_s: 0.0,
+        let front = Front {
+            speed_mps: row.not_negative("vfront_kmh")? / 3.6,
+            length_m: row.not_negative("front_length")?,
+            distance_m: row.number("front_dist")?,
         };
+        let case = jrc_case::cut_out(v0, lateral_speed(row)?, front, dt);
         Ok(Replay { model, profile, case, gap_m: row.number("initial_gap_nominal")?, run_up: 0 })
     }
 
@@ -199,9 +149,6 @@ impl Replay {
     }
 }
 
-/// Slowest lane change that is replayed, m/s: it takes longer than any run.
-const LEAST_LATERAL_MPS: f64 = 1e-3;
-
 /// 0 or a speed at which the change ends in a number of samples that can be held.
 fn lateral_speed(row: &Row) -> Result<f64> {
     let value = row.not_negative("vlat")?;
@@ -209,34 +156,6 @@ fn lateral_speed(row: &Row) -> Result<f64> {
         return Ok(value);
     }
     Err(Error::input(row.place("vlat"), format!("{value}"), "expected 0 or at least 0.001 m/s"))
-}
-
-/// Lateral speeds `w`, counted towards the ego: the run-up, one sample at full speed, then the plain change.
-fn cut_in_lateral(v_lateral: f64, run_up: u32, dt: f64) -> Lateral {
-    let m = run_up as usize;
-    let plain = if v_lateral > 0.0 { (10.0 * CUT_IN_LATERAL_M / v_lateral).floor() as usize + 1 } else { 1 };
-    let mut towards: Vec<f64> = (0..m.saturating_sub(1)).map(|k| RUN_UP_STEP_MPS * k as f64).collect();
-    towards.resize(m + plain, v_lateral);
-    let mut position = vec![0.0; towards.len()];
-    if m > 0 {
-        position[m - 1] = CUT_IN_LATERAL_M;
-        for i in (0..m - 1).rev() {
-            position[i] = position[i + 1] + towards[i] * dt;
-        }
-    }
-    let mut y = CUT_IN_LATERAL_M;
-    for i in m..towards.len() {
-        y -= towards[i] * dt;
-        position[i] = y;
-    }
-    Lateral::Sampled { position_m: position, towards_mps: towards }
-}
-
-/// From the lane centre to −4 m, starting at once.
-fn cut_out_lateral(v_lateral: f64, dt: f64) -> Lateral {
-    let steps = if v_lateral > 0.0 { (10.0 * CUT_OUT_LATERAL_M / v_lateral).floor() as usize + 1 } else { 1 };
-    let position: Vec<f64> = (1..=steps).map(|i| -v_lateral * dt * i as f64).collect();
-    Lateral::Sampled { towards_mps: vec![-v_lateral; position.len()], position_m: position }
 }
 
 /// Cut-out: the table's minima are those of the last target over the whole run, also before it was one.

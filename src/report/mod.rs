@@ -17,6 +17,8 @@ pub mod files;
 pub mod forest;
 pub mod html;
 pub mod lanes;
+pub mod map;
+pub mod map_sheet;
 pub mod panels;
 pub mod radar;
 pub mod reference;

@@ -1,0 +1,280 @@
+//! `lanesweep map`: the outcome over two parameters of a category, per panel of others and model.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::backend_flags::BackendFlags;
+use super::console::{self, Verbosity};
+use super::{Exit, lists};
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::grid::presets::{self, Preset};
+use crate::grid::{CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapBackend, PARAMETERS, Parameter};
+use crate::profile::Profile;
+use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
+use crate::report::run_record::SweepRecord;
+use crate::scenario::Category;
+use crate::sweep::{Backend, CpuBackend, SweepSummary};
+use crate::{Error, Place, Result};
+
+/// Seed of the choice of lanes of a device that the CPU computes again.
+const RECHECK_SEED: u64 = 1;
+
+/// Map outcomes over two parameters, and where two models or profiles differ
+///
+/// Every cell is one concrete case. --preset jrc takes the grids of the JRC's evidence; --x, --y, --panel and --set
+/// make any other. Writes a sheet per grid and model (SVG), cells.csv, differences.csv and map.json; the shares go to
+/// stdout.
+#[derive(Debug, Args)]
+#[command(after_help = after_help())]
+pub struct Map {
+    /// Kind of scenario: cut-in, cut-out, lvd
+    #[arg(value_name = "CATEGORY")]
+    category: String,
+    /// Grids: jrc
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
+    preset: Option<String>,
+    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C
+    #[arg(long, value_name = "NAME=RANGE")]
+    x: Option<String>,
+    /// Parameter upwards
+    #[arg(long, value_name = "NAME=RANGE")]
+    y: Option<String>,
+    /// Parameter that parts the panels; several make a panel of every combination
+    #[arg(long, value_name = "NAME=RANGE")]
+    panel: Vec<String>,
+    /// Value that is the same in every cell
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<String>,
+    /// Only panels in which the ego is faster than the other vehicle
+    #[arg(long)]
+    closing: bool,
+    /// Every model starts at the distance at which it follows in the JRC's simulator, instead of gap_m or thw_s
+    #[arg(long)]
+    native_gap: bool,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help = format!("Driver models [default: {}; a preset's own]", ModelId::names()))]
+    models: Vec<String>,
+    /// Criterion of shares, sheets and differences
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
+    criterion: String,
+    /// A model or a profile: maps where it and each of the models differ
+    #[arg(long, value_name = "MODEL|PROFILE")]
+    against: Option<String>,
+    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file [default: paper; with --preset jrc: jrc-2021]
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
+    /// Time step, s [default: the profile's]
+    #[arg(long, value_name = "SECONDS")]
+    dt: Option<f64>,
+    #[command(flatten)]
+    backend: BackendFlags,
+    /// Compute in binary64 on the CPU: the reference of the lane arithmetic
+    #[arg(long)]
+    reference: bool,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-map")]
+    out: PathBuf,
+}
+
+fn after_help() -> String {
+    let names: Vec<&str> = PARAMETERS.iter().map(|p| p.key).collect();
+    format!(
+        "Parameters: {}\n\nExamples:\n  lanesweep map cut-in --preset jrc --out maps\n  lanesweep map cut-in --x \
+         gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 --panel ego_speed_kmh=60,90,120 --panel \
+         other_speed_kmh=30,50 --models FSM,RSS --against un-r157\n  lanesweep map lvd --x \
+         deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM",
+        names.join(", ")
+    )
+}
+
+impl Map {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+        let category = Category::parse(&self.category).ok_or_else(|| {
+            let problem = format!("there is no category `{}`", self.category);
+            Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
+        })?;
+        let criterion = criterion(&self.criterion)?;
+        let profile = self.profile()?;
+        let against = self.against.as_deref().map(|text| against(text, self.dt)).transpose()?;
+        let started = Instant::now();
+        let mut planned = Vec::new();
+        for preset in self.grids(category, &profile)? {
+            planned.push(self.plan(preset, &profile, against.as_ref())?);
+        }
+        let plan_s = started.elapsed().as_secs_f64();
+        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let wide = self.reference.then(CpuBackend::reference);
+        let backend: &dyn Backend = match &wide {
+            Some(wide) => wide,
+            None => opened.backend(),
+        };
+        let recheck_seed = opened.device().map(|_| RECHECK_SEED);
+        let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
+        let is_jrc = self.preset.is_some()
+            && criterion == Criterion::Collision
+            && profile == Profile::load(presets::JRC_PROFILE)?;
+        let cells: u64 = planned.iter().map(|(_, plan, _)| plan.grid.cell_count() as u64).sum();
+        let bar = console::progress(verbosity, cells, "sweeping");
+        let started = Instant::now();
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        let mut grids = Vec::new();
+        for (preset, plan, other) in planned {
+            let map = swept(&plan, how, &mut summary)?;
+            let other = match other {
+                Some((name, plan)) => {
+                    let map = swept(&plan, how, &mut summary)?;
+                    Some((name, plan, map))
+                }
+                None => None,
+            };
+            bar.inc(plan.grid.cell_count() as u64);
+            let known = |model: &ModelId| if is_jrc { preset.known(*model) } else { None };
+            let known_percent = plan.models.iter().map(known).collect();
+            grids.push(MappedGrid { plan, map, known_percent, other });
+        }
+        bar.finish_and_clear();
+        let host = MapHost {
+            backend: backend.describe(),
+            device: opened.device(),
+            sweep: SweepRecord {
+                rechecked_lanes: summary.rechecked_lanes,
+                recheck_seed: RECHECK_SEED,
+                redone_lanes: summary.redone_lanes,
+                device_s: summary.device_s,
+            },
+            threads: rayon::current_num_threads(),
+            plan_s,
+            sweep_s: started.elapsed().as_secs_f64(),
+        };
+        let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
+        let written = report.write(&self.out)?;
+        console::print(&report.text())?;
+        let (count, seconds, host) = (report.simulations(), report.host.sweep_s, &report.host.backend);
+        tracing::info!("{count} simulations in {seconds:.3} s on {host}");
+        tracing::info!("{} files written to {}", written.len(), self.out.display());
+        Ok(Exit::Ok)
+    }
+
+    fn profile(&self) -> Result<Profile> {
+        let otherwise = if self.preset.is_some() { presets::JRC_PROFILE } else { "paper" };
+        with_dt(Profile::load(self.profile.as_deref().unwrap_or(otherwise))?, self.dt)
+    }
+
+    /// The grids that the flags name, with their models.
+    fn grids(&self, category: Category, profile: &Profile) -> Result<Vec<Preset>> {
+        let mut grids = match self.preset.as_deref() {
+            Some("jrc") => presets::jrc(category, profile)?,
+            Some(unknown) => {
+                let problem = format!("there is no preset `{unknown}`");
+                return Err(Error::usage(Place::item("--preset"), problem, presets::NAMES.join(", ")));
+            }
+            None => {
+                let grid = self.own_grid(category)?;
+                vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent: Vec::new() }]
+            }
+        };
+        if !self.models.is_empty() {
+            let models = lists::models(&self.models)?;
+            grids.iter_mut().for_each(|preset| preset.models = models.clone());
+        }
+        Ok(grids)
+    }
+
+    fn own_grid(&self, category: Category) -> Result<Grid> {
+        let axis = |text: &Option<String>, flag: &str| {
+            let text = text.as_deref().ok_or_else(|| {
+                let problem = "it is missing".to_owned();
+                Error::usage(Place::item(flag), problem, "give both --x and --y, or --preset jrc")
+            })?;
+            GridAxis::parse(category, text, flag)
+        };
+        let fixed = |text: &String| -> Result<(&'static Parameter, f64)> {
+            let axis = GridAxis::parse(category, text, "--set")?;
+            match axis.values[..] {
+                [value] => Ok((axis.parameter, value)),
+                _ => {
+                    let problem = format!("`{text}` has {} values", axis.len());
+                    Err(Error::usage(Place::item("--set"), problem, "give one, or make it an axis with --panel"))
+                }
+            }
+        };
+        Grid::new(GridParts {
+            name: category.key().to_owned(),
+            category,
+            x: axis(&self.x, "--x")?,
+            y: axis(&self.y, "--y")?,
+            panel_axes: self
+                .panel
+                .iter()
+                .map(|text| GridAxis::parse(category, text, "--panel"))
+                .collect::<Result<_>>()?,
+            fixed: self.set.iter().map(fixed).collect::<Result<_>>()?,
+            style: CaseStyle::Plain,
+            native_gap: self.native_gap,
+            closing_only: self.closing,
+        })
+    }
+
+    /// The plan of a grid, with the model it is compared with, and the plan under the other profile.
+    fn plan(&self, mut preset: Preset, profile: &Profile, against: Option<&Against>) -> Result<Planned> {
+        if let Some(Against::Model(model)) = against
+            && !preset.models.contains(model)
+        {
+            preset.models.push(*model);
+            preset.models.sort();
+        }
+        let other = match against {
+            Some(Against::Profile(other)) => {
+                // The same cells: a preset's cases follow the other profile's way of making them.
+                let category = preset.grid.category();
+                let same = self.grids(category, other)?.into_iter().find(|p| p.grid.name() == preset.grid.name());
+                let grid = same.map_or_else(|| preset.grid.clone(), |p| p.grid);
+                Some((other.name.clone(), GridPlan::new(grid, other, &preset.models)?))
+            }
+            _ => None,
+        };
+        let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
+        Ok((preset, plan, other))
+    }
+}
+
+/// A grid, its plan, and its name and plan under another profile.
+type Planned = (Preset, GridPlan, Option<(String, GridPlan)>);
+
+fn swept(plan: &GridPlan, how: MapBackend, summary: &mut SweepSummary) -> Result<GridMap> {
+    let (map, of_map) = GridMap::sweep(plan, how)?;
+    summary.add(&of_map);
+    Ok(map)
+}
+
+fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {
+    match dt {
+        Some(dt) => profile.with_dt(dt),
+        None => Ok(profile),
+    }
+}
+
+fn criterion(text: &str) -> Result<Criterion> {
+    let found = Criterion::ALL.into_iter().find(|c| c.key() == text.to_ascii_lowercase());
+    found.ok_or_else(|| {
+        let problem = format!("there is no criterion `{text}`");
+        Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
+    })
+}
+
+/// A model's name, or else a profile.
+fn against(text: &str, dt: Option<f64>) -> Result<Against> {
+    if let Some(model) = ModelId::parse(text) {
+        return Ok(Against::Model(model));
+    }
+    let profile = Profile::load(text).map_err(|error| match error {
+        Error::Usage { place, problem: _, help } if place.item.as_deref() == Some("--profile") => {
+            let problem = format!("there is neither a driver model nor a profile `{text}`");
+            Error::usage(Place::item("--against"), problem, format!("{help}. Models: {}", ModelId::names()))
+        }
+        other => other,
+    })?;
+    Ok(Against::Profile(Box::new(with_dt(profile, dt)?)))
+}

@@ -1,0 +1,22 @@
+//! Grids of concrete cases: what `map` sweeps.
+//!
+//! Here live the parameters and axes, the way from a cell to its case and from a grid to lane plans, the presets, and
+//! the swept map with its differences. Here lives no physics, and no drawing. Cases and plans go to [`crate::sweep`],
+//! maps to [`crate::report`]. The cases of the JRC's simulator also serve [`crate::conformance`].
+
+mod axis;
+#[allow(clippy::module_inception)]
+mod grid;
+pub mod jrc_case;
+mod map;
+mod parameter;
+mod plain_case;
+mod plan;
+pub mod presets;
+
+pub use axis::{GridAxis, MOST_VALUES};
+pub use grid::{CaseStyle, Grid, GridParts, MOST_CELLS, MOST_PANELS};
+pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
+pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
+pub use plain_case::{LATERAL_DISTANCE_M, PlainCase};
+pub use plan::{GridPart, GridPlan};

@@ -1,0 +1,392 @@
+//! A run of `map` in tables and files: shares in the terminal, cells as CSV, sheets as SVG, `map.json`.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::files::{make_folder, write_atomically, write_atomically_with};
+use super::map_sheet::{Kind, MapSheet};
+use super::run_record::{DeviceRecord, SweepRecord};
+use super::tables::{aligned, table};
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
+use crate::profile::Profile;
+use crate::{Error, Result};
+
+/// A swept grid with what is known of it.
+pub struct MappedGrid {
+    /// Grid and plans.
+    pub plan: GridPlan,
+    /// The verdicts.
+    pub map: GridMap,
+    /// Known shares, per cent, by model of the map.
+    pub known_percent: Vec<Option<f64>>,
+    /// The same grid under another profile, with the profile's name.
+    pub other: Option<(String, GridPlan, GridMap)>,
+}
+
+/// What the maps are compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Against {
+    /// Another model of the same map.
+    Model(ModelId),
+    /// The same model under another profile.
+    Profile(Box<Profile>),
+}
+
+/// A whole run.
+pub struct MapReport {
+    /// The grids.
+    pub grids: Vec<MappedGrid>,
+    /// Criterion of shares, sheets and differences.
+    pub criterion: Criterion,
+    /// What they are compared with.
+    pub against: Option<Against>,
+    /// Profile.
+    pub profile: Profile,
+    /// Preset, where it is one.
+    pub preset: Option<String>,
+    /// What computed.
+    pub host: MapHost,
+}
+
+/// What belongs to the machine and not to the result.
+#[derive(Debug, Clone, Serialize)]
+pub struct MapHost {
+    /// What computed the lanes.
+    pub backend: String,
+    /// The device, where one did.
+    pub device: Option<DeviceRecord>,
+    /// How the sweep went.
+    pub sweep: SweepRecord,
+    /// Threads.
+    pub threads: usize,
+    /// Planning, s.
+    pub plan_s: f64,
+    /// Lanes, s.
+    pub sweep_s: f64,
+}
+
+/// A difference between two verdicts on every cell of a grid.
+struct Difference<'a> {
+    grid: &'a Grid,
+    first: String,
+    second: String,
+    model: ModelId,
+    cells: Vec<Agreement>,
+}
+
+impl MapReport {
+    /// Number of simulations, those of the other profile included.
+    pub fn simulations(&self) -> u64 {
+        let of = |mapped: &MappedGrid| {
+            mapped.plan.lane_count() + mapped.other.as_ref().map_or(0, |(_, plan, _)| plan.lane_count())
+        };
+        self.grids.iter().map(of).sum()
+    }
+
+    /// Shares and differences as tables.
+    pub fn text(&self) -> String {
+        let criterion = self.criterion.label();
+        let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
+        let mut header = ["map", "model", "cells", "fail", "share %"].map(str::to_owned).to_vec();
+        if any_known {
+            header.extend(["known %", "difference"].map(str::to_owned));
+        }
+        let mut shares = table(header);
+        for mapped in &self.grids {
+            for (at, model) in mapped.map.models.iter().enumerate() {
+                let (failures, cells) = (mapped.map.failures(at, self.criterion), mapped.map.cell_count());
+                let percent = 100.0 * failures as f64 / cells as f64;
+                let mut row = vec![mapped.plan.grid.name().to_owned(), model.name().to_owned(), cells.to_string()];
+                row.extend([failures.to_string(), format!("{percent:.2}")]);
+                if any_known {
+                    let known = mapped.known_percent[at];
+                    row.push(known.map_or("-".to_owned(), |k| format!("{k:.1}")));
+                    row.push(known.map_or("-".to_owned(), |k| format!("{:+.2}", percent - k)));
+                }
+                shares.add_row(row);
+            }
+        }
+        let mut text = format!(
+            "Share of cells that fail {criterion} under {}, of {} simulations\n{}",
+            self.profile.name,
+            self.simulations(),
+            aligned(shares, 2)
+        );
+        let differences = self.differences();
+        if !differences.is_empty() {
+            let header = ["map", "first", "second", "both pass", "both fail", "only first fails", "only second fails"];
+            let mut table = table(header.map(str::to_owned).to_vec());
+            for difference in &differences {
+                let mut row = vec![difference.grid.name().to_owned(), difference.first.clone()];
+                row.push(difference.second.clone());
+                row.extend(count(&difference.cells).map(|n| n.to_string()));
+                table.add_row(row);
+            }
+            text.push_str(&format!("\nDifferences in {criterion}\n{}", aligned(table, 3)));
+        }
+        text
+    }
+
+    /// Writes every file; gives their paths.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the folder cannot be written.
+    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
+        make_folder(dir)?;
+        let mut written = Vec::new();
+        for mapped in &self.grids {
+            for (at, model) in mapped.map.models.iter().enumerate() {
+                let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
+                let what = format!("{}, {}", model.name(), self.criterion.label());
+                let sheet = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells);
+                let path = dir.join(format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name())));
+                write_atomically(&path, sheet.svg().as_bytes())?;
+                written.push(path);
+            }
+        }
+        let differences = self.differences();
+        for difference in &differences {
+            let cells = difference.cells.iter().map(|kind| *kind as u8).collect();
+            let what = format!("{} against {}, {}", difference.first, difference.second, self.criterion.label());
+            let kinds = Kind::agreements(&difference.first, &difference.second);
+            let sheet = self.sheet(difference.grid, what, kinds, cells);
+            let name = format!(
+                "{}_{}_against_{}.svg",
+                difference.grid.name(),
+                slug(difference.model.name()),
+                slug(&self.against_name())
+            );
+            let path = dir.join(name);
+            write_atomically(&path, sheet.svg().as_bytes())?;
+            written.push(path);
+        }
+        let path = dir.join("cells.csv");
+        write_atomically_with(&path, |out| self.write_cells(out))?;
+        written.push(path);
+        if !differences.is_empty() {
+            let path = dir.join("differences.csv");
+            write_atomically_with(&path, |out| self.write_differences(&differences, out))?;
+            written.push(path);
+        }
+        let path = dir.join("map.json");
+        write_atomically(&path, &self.json()?)?;
+        written.push(path);
+        Ok(written)
+    }
+
+    fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {
+        let fixed: Vec<String> =
+            grid.fixed().iter().map(|(p, value)| format!("{}: {value} {}.", p.label, p.unit)).collect();
+        let mut notes = fixed;
+        if grid.has_native_gap() {
+            notes.push("Initial gap: each model's own distance at the ego's speed (column initial_gap_m).".to_owned());
+        }
+        if grid.style() == CaseStyle::JrcComparison {
+            notes.push("Cases with the lateral run-up of the JRC's comparison sweep.".to_owned());
+        }
+        MapSheet {
+            title: format!("{}: {what}", grid.category().label()),
+            subtitle: format!("Profile {}, map {}", self.profile.name, grid.name()),
+            grid,
+            kinds,
+            cells,
+            notes,
+        }
+    }
+
+    fn against_name(&self) -> String {
+        match &self.against {
+            Some(Against::Model(model)) => model.name().to_owned(),
+            Some(Against::Profile(profile)) => profile.name.clone(),
+            None => String::new(),
+        }
+    }
+
+    fn differences(&self) -> Vec<Difference<'_>> {
+        let mut all = Vec::new();
+        for MappedGrid { plan, map, other, .. } in &self.grids {
+            for (at, &model) in map.models.iter().enumerate() {
+                let name = model.name();
+                let (first, second, cells) = match (&self.against, other) {
+                    (Some(Against::Model(against)), _) if *against != model => {
+                        let Some(second) = map.models.iter().position(|m| m == against) else { continue };
+                        let cells = map.difference(at, (map, second), self.criterion);
+                        (name.to_owned(), against.name().to_owned(), cells)
+                    }
+                    (Some(Against::Profile(_)), Some((profile, _, under_other))) => {
+                        let cells = map.difference(at, (under_other, at), self.criterion);
+                        (format!("{name} under {}", self.profile.name), format!("{name} under {profile}"), cells)
+                    }
+                    _ => continue,
+                };
+                all.push(Difference { grid: &plan.grid, first, second, model, cells });
+            }
+        }
+        all
+    }
+
+    /// One row per cell and model.
+    fn write_cells(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut out = io::BufWriter::new(out);
+        write_header(&mut out, &self.grids, "initial_gap_m,model,collision,ttc,btn,capped,failed")?;
+        for MappedGrid { plan, map, .. } in &self.grids {
+            let profile = &plan.parts[0].plan.profile;
+            for cell in 0..map.cell_count() {
+                let place = place_of(&plan.grid, cell);
+                for (at, &model) in map.models.iter().enumerate() {
+                    let verdicts = map.verdicts(at, cell);
+                    let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(verdicts.failed(c)));
+                    let (capped, failed) = (u8::from(verdicts.capped()), u8::from(verdicts.failed(self.criterion)));
+                    let gap_m = plan.grid.gap_m(cell, model, profile);
+                    writeln!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
+                }
+            }
+        }
+        out.flush()
+    }
+
+    fn write_differences(&self, differences: &[Difference], out: &mut dyn Write) -> io::Result<()> {
+        let mut out = io::BufWriter::new(out);
+        write_header(&mut out, &self.grids, "first,second,difference")?;
+        for Difference { grid, first, second, cells, .. } in differences {
+            for (cell, kind) in cells.iter().enumerate() {
+                writeln!(out, "{},{first},{second},{}", place_of(grid, cell), kind.key())?;
+            }
+        }
+        out.flush()
+    }
+
+    fn json(&self) -> Result<Vec<u8>> {
+        let record = MapRecord {
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            preset: self.preset.as_deref(),
+            criterion: self.criterion.key(),
+            against: self.against.as_ref().map(|_| self.against_name()),
+            simulations: self.simulations(),
+            grids: self.grids.iter().map(|mapped| GridRecord::of(mapped, self.criterion)).collect(),
+            profile: &self.profile,
+            other_profile: match &self.against {
+                Some(Against::Profile(profile)) => Some(profile),
+                _ => None,
+            },
+            host: &self.host,
+        };
+        let mut text = serde_json::to_vec_pretty(&record)
+            .map_err(|e| Error::Internal(format!("map.json cannot be written: {e}")))?;
+        text.push(b'\n');
+        Ok(text)
+    }
+}
+
+/// `map.json`.
+#[derive(Serialize)]
+struct MapRecord<'a> {
+    program: String,
+    preset: Option<&'a str>,
+    criterion: &'static str,
+    against: Option<String>,
+    simulations: u64,
+    grids: Vec<GridRecord<'a>>,
+    profile: &'a Profile,
+    other_profile: Option<&'a Profile>,
+    host: &'a MapHost,
+}
+
+#[derive(Serialize)]
+struct GridRecord<'a> {
+    name: &'a str,
+    category: &'static str,
+    x: AxisRecord<'a>,
+    y: AxisRecord<'a>,
+    panel_parameters: Vec<&'static str>,
+    panels: &'a [Vec<f64>],
+    fixed: Vec<(&'static str, f64)>,
+    cases: CaseStyle,
+    native_gap: bool,
+    cells: usize,
+    shares: Vec<ShareRecord>,
+    plans: Vec<PlanRecord<'a>>,
+}
+
+#[derive(Serialize)]
+struct AxisRecord<'a> {
+    parameter: &'static str,
+    values: &'a [f64],
+}
+
+#[derive(Serialize)]
+struct ShareRecord {
+    model: &'static str,
+    failures: u64,
+    share: f64,
+    known_percent: Option<f64>,
+}
+
+/// A plan: the same hash means the same lanes.
+#[derive(Serialize)]
+struct PlanRecord<'a> {
+    models: Vec<&'static str>,
+    profile: &'a str,
+    lanes: u64,
+    plan_sha256: &'a str,
+}
+
+impl<'a> GridRecord<'a> {
+    fn of(mapped: &'a MappedGrid, criterion: Criterion) -> GridRecord<'a> {
+        let (grid, map) = (&mapped.plan.grid, &mapped.map);
+        fn axis(axis: &GridAxis) -> AxisRecord<'_> {
+            AxisRecord { parameter: axis.parameter.key, values: &axis.values }
+        }
+        let share = |(at, model): (usize, &ModelId)| {
+            let failures = map.failures(at, criterion);
+            let share = failures as f64 / map.cell_count() as f64;
+            ShareRecord { model: model.name(), failures, share, known_percent: mapped.known_percent[at] }
+        };
+        let others = mapped.other.iter().flat_map(|(_, plan, _)| &plan.parts);
+        GridRecord {
+            name: grid.name(),
+            category: grid.category().key(),
+            x: axis(grid.x()),
+            y: axis(grid.y()),
+            panel_parameters: grid.panel_axes().iter().map(|a| a.parameter.key).collect(),
+            panels: grid.panels(),
+            fixed: grid.fixed().iter().map(|(p, value)| (p.key, *value)).collect(),
+            cases: grid.style(),
+            native_gap: grid.has_native_gap(),
+            cells: map.cell_count(),
+            shares: map.models.iter().enumerate().map(share).collect(),
+            plans: (mapped.plan.parts.iter().chain(others))
+                .map(|part| PlanRecord {
+                    models: part.plan.models.iter().map(|m| m.name()).collect(),
+                    profile: &part.plan.profile.name,
+                    lanes: part.plan.lane_count(),
+                    plan_sha256: part.plan.hash(),
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Columns of a cell's place; all grids of a run have the same parameters.
+fn write_header(out: &mut dyn Write, grids: &[MappedGrid], columns: &str) -> io::Result<()> {
+    let keys: Vec<&str> = match grids.first() {
+        Some(mapped) => mapped.plan.grid.values(0).iter().map(|(p, _): &(&Parameter, f64)| p.key).collect(),
+        None => Vec::new(),
+    };
+    writeln!(out, "map,{},{columns}", keys.join(","))
+}
+
+fn place_of(grid: &Grid, cell: usize) -> String {
+    let values: Vec<String> = grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
+    format!("{},{}", grid.name(), values.join(","))
+}
+
+/// A name as a part of a file's name.
+fn slug(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c.to_ascii_lowercase() } else { '_' };
+    name.chars().map(plain).collect()
+}
