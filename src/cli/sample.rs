@@ -17,7 +17,7 @@ use super::shard_flags::ShardFlags;
 use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
-use crate::density::{DensityModel, read_density, write_density};
+use crate::density::{DensityModel, read_density};
 use crate::driver::ModelId;
 use crate::estimate::{Checkpoints, StopRule};
 use crate::parts::kind_of;
@@ -215,10 +215,7 @@ impl Sample {
         let file = run.adaptive()?;
         // A proposal in this folder may be an input: it is read and written on the way.
         sample_lanes::clear(&self.out, &["proposal-"])?;
-        let folder = |name: &str| self.out.join(name);
-        write_density(&folder("density.json"), &run.density)?;
-        crate::report::files::write_atomically(&folder("estimates.csv"), &file.csv()?)?;
-        crate::report::files::write_atomically(&folder("estimate.json"), &file.to_json()?)?;
+        sample_lanes::write_estimates(&self.out, &run.density, &file, Vec::new())?;
         console::print(&file.text())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(Exit::Ok)

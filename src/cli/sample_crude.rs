@@ -11,9 +11,7 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::sample_plan::PlannedSample;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
-use crate::density::write_density;
 use crate::estimate::StopRule;
-use crate::report::files::write_atomically;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
 use crate::sampling::{
     BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
@@ -131,14 +129,12 @@ fn write_run(
     host: HostRecord,
     out: &Path,
 ) -> Result<()> {
-    sample_lanes::write(out, &planned.plan, &planned.density, &crude, &planned.counting())?;
+    let figures = sample_lanes::write(out, &planned.plan, &planned.density, &crude, &planned.counting())?;
     let mut file = EstimateFile::new(&planned.density, planned.run_facts(), crude.rows, host)?;
     file.plan_sha256 = Some(planned.plan.hash().to_owned());
     file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
     file.bootstrap = bootstrap;
-    write_density(&out.join("density.json"), &planned.density)?;
-    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
-    write_atomically(&out.join("estimate.json"), &file.to_json()?)?;
+    sample_lanes::write_estimates(out, &planned.density, &file, figures)?;
     console::print(&file.text())?;
     tracing::info!("results written to {}", out.display());
     Ok(())

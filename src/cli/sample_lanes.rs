@@ -4,11 +4,12 @@ use std::io::Write;
 use std::path::Path;
 
 use super::console::{self, Verbosity};
-use crate::density::DensityModel;
+use crate::density::{DensityModel, write_density};
 use crate::parts::Ledger;
 use crate::report::files::{make_folder, write_atomically, write_atomically_with};
+use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
-use crate::report::sampling::{WorstRow, convergence_csv, worst_csv};
+use crate::report::sampling::{EstimateFile, WorstRow, convergence_csv, worst_csv};
 use crate::report::sampling_figures;
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
@@ -64,7 +65,7 @@ pub(super) fn check_writable(out: &Path) -> Result<()> {
 }
 
 /// Beginnings of the names of all files that a sampling run writes beside its input.
-const OURS: [&str; 5] = ["estimate", "worst.csv", "convergence.", "map-", "proposal-"];
+const OURS: [&str; 7] = ["estimate", "worst.csv", "convergence.", "map-", "proposal-", "headways.", "report.html"];
 
 /// Takes the files of an earlier run out of a folder, so that none stands beside the results of this one; keeps those
 /// whose names begin so.
@@ -75,7 +76,7 @@ pub(super) fn clear(out: &Path, kept: &[&str]) -> Result<()> {
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
         let begins = |list: &[&str]| list.iter().any(|beginning| name.starts_with(beginning));
-        let is_result = [".json", ".csv", ".svg"].iter().any(|ending| name.ends_with(ending));
+        let is_result = [".json", ".csv", ".svg", ".html"].iter().any(|ending| name.ends_with(ending));
         if is_result && begins(&OURS) && !begins(kept) {
             std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "replace", e))?;
         }
@@ -83,21 +84,24 @@ pub(super) fn clear(out: &Path, kept: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Everything of a run but `estimate.json`.
+/// Everything of a run but what [`write_estimates`] writes; returns the figures.
 pub(super) fn write(
     out: &Path,
     plan: &LanePlan,
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
-) -> Result<()> {
+) -> Result<Vec<PageFigure>> {
     // It was there before the work; where it vanished meanwhile, the result is worth another one.
     make_folder(out)?;
     clear(out, &[])?;
+    let mut figures = Vec::new();
     if !run.convergence.is_empty() {
         write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
         let figure = sampling_figures::convergence(density, &run.convergence);
-        write_atomically(&out.join("convergence.svg"), figure.svg().as_bytes())?;
+        let svg = figure.svg();
+        write_atomically(&out.join("convergence.svg"), svg.as_bytes())?;
+        figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
     if counting.worst > 0 {
@@ -138,9 +142,30 @@ pub(super) fn write(
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
             let figure = sampling_figures::failure_map(density, map, model, *id, counting.criterion);
-            write_atomically(&out.join(format!("map-{}.csv", id.name())), figure.csv().as_bytes())?;
-            write_atomically(&out.join(format!("map-{}.svg", id.name())), figure.svg().as_bytes())?;
+            let (name, svg) = (format!("map-{}", id.name()), figure.svg());
+            write_atomically(&out.join(format!("{name}.csv")), figure.csv().as_bytes())?;
+            write_atomically(&out.join(format!("{name}.svg")), svg.as_bytes())?;
+            figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
         }
     }
-    Ok(())
+    Ok(figures)
+}
+
+/// Density, table, page and record; the record comes last, so a folder that has one is whole.
+pub(super) fn write_estimates(
+    out: &Path,
+    density: &DensityModel,
+    file: &EstimateFile,
+    mut figures: Vec<PageFigure>,
+) -> Result<()> {
+    write_density(&out.join("density.json"), density)?;
+    if let Some(figure) = file.headways_figure() {
+        let svg = figure.svg();
+        write_atomically(&out.join("headways.svg"), svg.as_bytes())?;
+        write_atomically(&out.join("headways.csv"), &figure.csv()?)?;
+        figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
+    }
+    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
+    write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
+    write_atomically(&out.join("estimate.json"), &file.to_json()?)
 }

@@ -11,11 +11,10 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use super::weighted_plan::PlannedWeighted;
-use crate::density::write_density;
 use crate::driver::ModelId;
 use crate::estimate::{BlockSums, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
 use crate::parts::{Countable, Ledger};
-use crate::report::files::write_atomically;
+use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
 use crate::{Error, Place, Result, interrupt};
@@ -144,11 +143,11 @@ fn write_run(planned: &PlannedWeighted, tally: Option<WeightedTally>, host: Host
         EstimateRow { model: *model, criterion: facts.criterion, headway: planned.headway_name(), estimate, risk }
     };
     let file = EstimateFile::new(density, planned.run_facts(), tally.sums.iter().map(row).collect(), host)?;
+    // It was there before the work; where it vanished meanwhile, the result is worth another one.
+    make_folder(out)?;
     // A proposal in this folder may be the one that was given.
     sample_lanes::clear(out, &["proposal-"])?;
-    write_density(&out.join("density.json"), density)?;
-    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
-    write_atomically(&out.join("estimate.json"), &file.to_json()?)?;
+    sample_lanes::write_estimates(out, density, &file, Vec::new())?;
     console::print(&file.text())?;
     tracing::info!("results written to {}", out.display());
     Ok(())

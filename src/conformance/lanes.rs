@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use super::table::{Row, Table};
 use super::tally::Tally;
 use crate::driver::ModelId;
-use crate::parameterization::{ParameterizationId, ParameterizationOptions, recorded_case};
+use crate::parameterization::{Kind, ParameterizationId, ParameterizationOptions, recorded_case};
 use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Scenario, Tables};
@@ -57,9 +57,12 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         if !encoded.contains_key(&key) {
             let case = match param {
                 "S" => recorded_case(scenario, dt_s)?,
+                // One by SVD needs the fit of the study that the table came from.
                 _ => ParameterizationId::find(scenario.category, param)
+                    .filter(|id| id.kind == Kind::Kinematic)
                     .ok_or_else(|| {
-                        let problem = format!("{} has no parameterization `{param}`", scenario.category.label());
+                        let problem =
+                            format!("{} has no kinematic parameterization `{param}`", scenario.category.label());
                         Error::input(row.place("param"), problem, "expected S or a kinematic one (1–4, a–d, i, ii)")
                     })?
                     .kinematic_case(scenario, dt_s, &options)?,

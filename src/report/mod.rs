@@ -26,6 +26,7 @@ pub mod run_record;
 pub mod sampled_rows;
 pub mod sampling;
 pub mod sampling_figures;
+mod sampling_page;
 pub mod study;
 pub mod study_figures;
 mod study_page;

@@ -430,7 +430,7 @@ impl EstimateFile {
 
 impl EstimateRow {
     /// Over all headways, where there are several.
-    fn is_overall(&self, all: &[EstimateRow]) -> bool {
+    pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
 }
@@ -537,7 +537,7 @@ fn bootstrap_text(record: &BootstrapRecord) -> String {
 }
 
 /// Three digits, in powers of ten where it is small or large.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
@@ -550,14 +550,14 @@ fn short(value: f64) -> String {
     }
 }
 
-fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
+pub(super) fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
     match kind {
         IntervalKind::RuleOfThree => format!("≤ {}", short(high)),
         _ => format!("{} … {}", short(low), short(high)),
     }
 }
 
-fn rate_text(rate: Option<RiskRate>) -> String {
+pub(super) fn rate_text(rate: Option<RiskRate>) -> String {
     rate.map_or("unknown".to_owned(), |r| {
         if r.estimate > 0.0 {
             format!("{} ({}…{})", short(r.estimate), short(r.low), short(r.high))

@@ -1,0 +1,231 @@
+//! A sampling run as one page.
+
+use super::html::{Page, PageFigure, PageTable, Section};
+use super::panels::{Mark, Panel, PanelFigure, PanelSeries};
+use super::sampling::{EstimateFile, interval_text, rate_text, short};
+use crate::criterion::Criterion;
+use crate::driver::ModelId;
+use crate::sampling::EstimateRow;
+use crate::scenario::Category;
+use crate::sweep::Headway;
+use crate::{Error, Result};
+
+impl EstimateFile {
+    /// `report.html`; the figures are those of the run, made already.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+        let density = &self.density;
+        let mut warnings = Vec::new();
+        if density.provenance.synthetic {
+            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
+        }
+        if !self.given.is_empty() {
+            let list: Vec<String> = self.given.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            let given = list.join(", ");
+            warnings.push(format!("Given {given}: probabilities are conditional, risks are not known."));
+        }
+        if !self.reproducible {
+            warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
+        }
+        let page = Page {
+            title: format!("Probability of failure: {}", self.name()),
+            program: self.program.clone(),
+            lead: format!(
+                "{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
+                self.samples, density.kernels, self.estimator, self.profile.name, density.provenance.data
+            ),
+            warnings,
+            sections: vec![self.estimates_section(), pictures(figures), self.reproduction()?],
+        };
+        page.html()
+    }
+
+    /// `cut-in 2`.
+    fn name(&self) -> String {
+        let category = Category::parse(self.density.category).map_or(self.density.category, Category::label);
+        format!("{category} {}", self.density.parameterization)
+    }
+
+    fn estimates_section(&self) -> Section {
+        let line = |row: &EstimateRow| {
+            let e = &row.estimate;
+            let width = e.relative_half_width;
+            let mut fields = vec![
+                row.model.name().to_owned(),
+                row.criterion.label().to_owned(),
+                row.headway.clone(),
+                e.runs.to_string(),
+                e.failures.to_string(),
+                short(e.probability),
+                interval_text(e.interval.low, e.interval.high, e.interval.kind),
+                if width.is_finite() { format!("{:.1}", 100.0 * width) } else { "–".to_owned() },
+            ];
+            fields.push(rate_text(row.risk.per_hour));
+            fields.push(rate_text(row.risk.per_1000_km));
+            fields.push(e.trust.verdict().to_string());
+            fields
+        };
+        let header = [
+            "model",
+            "criterion",
+            "THW",
+            "runs",
+            "failures",
+            "P",
+            "interval",
+            "± in %",
+            "per hour",
+            "per 1000 km",
+            "verdict",
+        ];
+        let overall: Vec<&EstimateRow> = self.estimates.iter().filter(|r| r.is_overall(&self.estimates)).collect();
+        let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
+        let mut tables = vec![PageTable {
+            caption: format!(
+                "Probability of failure with its {} % interval, and risk where the exposure is known",
+                100.0 * level
+            ),
+            header: header.map(str::to_owned).to_vec(),
+            texts: 3,
+            rows: overall.iter().map(|row| line(row)).collect(),
+        }];
+        let weighted = |row: &&EstimateRow| {
+            let w = row.estimate.weights.as_ref()?;
+            Some(vec![
+                row.model.name().to_owned(),
+                row.criterion.label().to_owned(),
+                short(row.estimate.variance_reduction),
+                format!("{:.0}", w.effective_size),
+                format!("{:.0}", w.effective_size_failures),
+                format!("{:.2}", 100.0 * w.largest_share_failures),
+                format!("{:.4} ± {:.4}", w.mean_weight, w.mean_weight_error),
+            ])
+        };
+        let weights: Vec<Vec<String>> = overall.iter().filter_map(weighted).collect();
+        if !weights.is_empty() {
+            let header = [
+                "model",
+                "criterion",
+                "variance reduction",
+                "effective sample size",
+                "of the failures",
+                "largest weight's share in %",
+                "mean weight",
+            ];
+            let caption = "Weights: how much of the sample counts".to_owned();
+            tables.push(PageTable { caption, header: header.map(str::to_owned).to_vec(), texts: 2, rows: weights });
+        }
+        let said = overall.iter().flat_map(|row| {
+            let name = format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);
+            row.estimate.trust.warnings.iter().map(move |warning| (name.clone(), warning.to_string()))
+        });
+        Section {
+            id: "estimates".to_owned(),
+            title: "Estimates".to_owned(),
+            intro: format!(
+                "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
+                 Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from \
+                 data. Every headway of its own is in estimates.csv.",
+                short(1.0 / self.density.kernels.max(1) as f64),
+                self.density.kernels
+            ),
+            tables,
+            facts: said.collect(),
+            ..Section::default()
+        }
+    }
+
+    /// Probability over the headway, a panel per model; `None` where there is one headway only.
+    pub fn headways_figure(&self) -> Option<PanelFigure> {
+        let thw_s = |row: &EstimateRow| {
+            let of = |headway: &&Headway| headway.to_string() == row.headway;
+            match self.plan_headways.iter().find(of) {
+                Some(Headway::ThwS(seconds)) => Some(*seconds),
+                _ => None,
+            }
+        };
+        let panel = |&model: &ModelId| {
+            let series = |criterion: Criterion| {
+                let own = self.estimates.iter().filter(|row| row.model == model && row.criterion == criterion);
+                let point = |row: &EstimateRow| thw_s(row).map(|thw| (thw, 100.0 * row.estimate.probability));
+                let mut values: Vec<(f64, f64)> = own.filter_map(point).collect();
+                values.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let name = criterion.label().to_owned();
+                PanelSeries { name, mark: Mark::LineAndPoints, values, labels: Vec::new() }
+            };
+            Panel {
+                heading: model.name().to_owned(),
+                x: "initial time headway in s".to_owned(),
+                y: "probability of failure in %".to_owned(),
+                y_range: Some((0.0, 100.0)),
+                series: Criterion::ALL.map(series).into_iter().filter(|s| !s.values.is_empty()).collect(),
+                ..Panel::default()
+            }
+        };
+        let headways = self.plan_headways.iter().filter(|headway| matches!(headway, Headway::ThwS(_))).count();
+        (headways > 1).then(|| PanelFigure {
+            title: format!("{}: probability of failure against the headway", self.name()),
+            subtitle: Some(self.density.provenance.data.clone()),
+            caption: "Each headway of its own; intervals are in estimates.csv.".to_owned(),
+            panels: self.models.iter().map(panel).collect(),
+        })
+    }
+
+    fn reproduction(&self) -> Result<Section> {
+        let mut facts = vec![
+            ("program".to_owned(), self.program.clone()),
+            ("estimator".to_owned(), self.estimator.to_owned()),
+            ("points".to_owned(), self.points.to_owned()),
+            ("seed".to_owned(), self.seed.to_string()),
+            ("profile".to_owned(), self.profile.name.clone()),
+            ("time step".to_owned(), format!("{} s", self.profile.frame.dt_s)),
+            ("SHA-256 of the density".to_owned(), self.density.sha256.clone()),
+        ];
+        facts.extend(self.plan_sha256.iter().map(|sha| ("SHA-256 of the plan".to_owned(), sha.clone())));
+        if let Some(draws) = &self.draws {
+            let percent = 100.0 * draws.rejected_share;
+            let text = format!(
+                "{} samples, {} lanes, {percent:.2} % of the draws invalid and drawn again, {} samples void, \
+                 {} lanes at the time cap",
+                draws.samples, draws.lanes, draws.voids, draws.capped_lanes
+            );
+            facts.push(("draws".to_owned(), text));
+        }
+        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
+        host.extend(self.host.device.iter().map(|device| {
+            let path = if device.exact_path { "exact path" } else { "plain path" };
+            ("device".to_owned(), format!("{} ({}, {}, {path})", device.name, device.api, device.driver))
+        }));
+        host.push((
+            "checked".to_owned(),
+            format!("{} lanes of a device computed again on the CPU", self.host.rechecked_lanes),
+        ));
+        host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
+        let profile = serde_json::to_string_pretty(&self.profile)
+            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
+        Ok(Section {
+            id: "reproduction".to_owned(),
+            title: "Reproduction".to_owned(),
+            intro: "The same density, flags and seed give the same numbers, on any machine, whole or in shards. \
+                    estimate.json holds all of it; `lanesweep simulate --from` reruns a lane."
+                .to_owned(),
+            facts,
+            host,
+            details: vec![("Profile".to_owned(), profile)],
+            ..Section::default()
+        })
+    }
+}
+
+fn pictures(figures: Vec<PageFigure>) -> Section {
+    let none = "This estimator has no figure of its own.";
+    Section {
+        id: "figures".to_owned(),
+        title: "Figures".to_owned(),
+        intro: if figures.is_empty() { none } else { "" }.to_owned(),
+        figures,
+        ..Section::default()
+    }
+}
