@@ -22,6 +22,7 @@ mod sample_lanes;
 mod sample_plan;
 mod shard_flags;
 mod simulate;
+mod simulate_lanes;
 mod slurm;
 mod source;
 mod study;

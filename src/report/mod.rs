@@ -23,4 +23,7 @@ pub mod sampling;
 pub mod sampling_figures;
 pub mod study;
 pub mod tables;
+pub mod trace_figure;
+mod trace_panels;
+pub mod trace_table;
 pub mod verification;
