@@ -114,7 +114,7 @@ impl Simulate {
             reference: None,
         };
         let traced = flags.models()?.into_iter().map(traced).collect();
-        Ok(Lanes { traced, origin: format!("profile {}, f64, a case of one's own", profile.name), synthetic: false })
+        Ok(Lanes { traced, origin: format!("profile {}, f64, a case of flags", profile.name), synthetic: false })
     }
 
     fn flags(&self) -> Result<CaseFlags> {

@@ -106,7 +106,7 @@ fn find_run(dir: &Path, key: &str) -> Result<Run> {
     }
     if estimate.exists() {
         let (_, plan, density) = super::rerun::run_of(dir)?;
-        return Ok(Run::Sample(plan, density.synthetic));
+        return Ok(Run::Sample(plan, density.provenance.synthetic));
     }
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
@@ -116,7 +116,7 @@ fn find_run(dir: &Path, key: &str) -> Result<Run> {
     match kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?.as_str() {
         sample_plan::KIND => {
             let sample = PlannedSample::read(&plan)?.0;
-            Ok(Run::Sample(sample.plan, sample.density.synthetic))
+            Ok(Run::Sample(sample.plan, sample.density.provenance.synthetic))
         }
         // Its reader refuses every other kind.
         _ => Ok(Run::Study(PlannedStudy::read(&plan)?.0)),
