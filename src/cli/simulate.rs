@@ -25,10 +25,12 @@ use crate::{Error, Place, Result};
 /// variants (--compare) stand below one another in the CSV and together on the figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
-#[command(after_help = "Examples:\n  lanesweep simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw \
+#[command(
+    after_help = "Examples:\n  lanesweep simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw \
                         1.2 --lateral-speed 1.0 --plot case.svg\n  lanesweep simulate --from lanesweep-out --lane \
                         01_cut_in_81_74_836/2/1.2s/RSS --compare S --plot lane.svg\n  lanesweep simulate --scenarios \
-                        scenarios.jsonl --lane 01_cut_in_81_74_836/S/1.2s/RSS")]
+                        scenarios.jsonl --lane 01_cut_in_81_74_836/S/1.2s/RSS"
+)]
 pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
@@ -57,6 +59,9 @@ pub struct Simulate {
     /// Also draw speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Where the figure's time ends, s [default: 2 s after the last change]
+    #[arg(long, value_name = "SECONDS", requires = "plot")]
+    until: Option<f64>,
     #[command(flatten)]
     profile: ProfileFlags,
 }
@@ -71,7 +76,7 @@ impl Simulate {
             if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
                 make_folder(dir)?;
             }
-            write_atomically(path, figure(&lanes).svg().as_bytes())?;
+            write_atomically(path, figure(&lanes, self.until).svg().as_bytes())?;
         }
         console::print(&trace_table::csv(&named))?;
         for lane in &lanes.traced {
@@ -129,6 +134,10 @@ impl Simulate {
     /// The figure must be one and must replace no input.
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
+        if let Some(until) = self.until.filter(|until| !(*until > 0.0 && *until < 1e9)) {
+            let problem = format!("{until} s is no end of a time axis");
+            return Err(Error::usage(Place::item("--until"), problem, "give seconds above 0"));
+        }
         if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
             let problem = format!("{} is no name of an SVG file", plot.display());
             let help = "give a name that ends in .svg; `rsvg-convert` makes PNG and PDF of it";
@@ -137,9 +146,10 @@ impl Simulate {
         let inputs = [&self.case_file, &self.table, &self.scenarios];
         let inputs: Vec<PathBuf> = inputs.into_iter().flatten().cloned().collect();
         refuse_overwriting(plot, &inputs, "--plot")?;
-        let is_of_run = |dir: &Path| plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p })
-            == Some(dir)
-            && plot.file_name().and_then(|name| name.to_str()).is_some_and(super::shard_flags::is_result);
+        let is_of_run = |dir: &Path| {
+            plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
+                && plot.file_name().and_then(|name| name.to_str()).is_some_and(super::shard_flags::is_result)
+        };
         if self.from.as_deref().is_some_and(is_of_run) {
             let problem = format!("{} is a result of the run", plot.display());
             return Err(Error::usage(Place::item("--plot"), problem, "choose another name"));
@@ -148,7 +158,7 @@ impl Simulate {
     }
 }
 
-fn figure(lanes: &Lanes) -> TraceFigure<'_> {
+fn figure(lanes: &Lanes, until_s: Option<f64>) -> TraceFigure<'_> {
     let first = &lanes.traced[0];
     let category = first.trace.category.label();
     let title = match lanes.traced.len() {
@@ -160,7 +170,7 @@ fn figure(lanes: &Lanes) -> TraceFigure<'_> {
     };
     let synthetic = if lanes.synthetic && !lanes.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
     let series = lanes.traced.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
-    TraceFigure { title, subtitle: Some(format!("{synthetic}{}", lanes.origin)), series }
+    TraceFigure { title, subtitle: Some(format!("{synthetic}{}", lanes.origin)), series, until_s }
 }
 
 /// How a lane ended, in words.

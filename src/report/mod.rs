@@ -26,4 +26,6 @@ pub mod tables;
 pub mod trace_figure;
 mod trace_panels;
 pub mod trace_table;
+#[cfg(test)]
+mod trace_tests;
 pub mod verification;

@@ -8,7 +8,7 @@ use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 use super::axis::{Axis, number};
 use super::drawing::{
-    self, FONTS, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, plain, rect, text,
+    self, FONTS, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, rect, text,
 };
 use super::trace_panels::{Curve, Level, Owner, Panel, PanelMark, Reach, Shown};
 use crate::sweep::{Mark, Trace};
@@ -31,6 +31,8 @@ pub struct TraceFigure<'a> {
     pub subtitle: Option<String>,
     /// The lanes.
     pub series: Vec<TraceSeries<'a>>,
+    /// Where time ends, s; otherwise 2 s after the last change.
+    pub until_s: Option<f64>,
 }
 
 /// Width of a column of the sheet, px: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
@@ -51,11 +53,11 @@ const MARK_PX: f64 = 5.0;
 impl TraceFigure<'_> {
     /// The figure as a complete SVG document, 540 px wide (1080 px for a cut-out) and as high as its panels need.
     ///
-    /// Time runs from 0 to 2 s after the last change; a note says so where the lanes go on. TTC is shown up to ten times
+    /// A note says so where the lanes go on after the last time that is shown. TTC is shown up to ten times
     /// its threshold, BTN up to 2.5 times. Texts are XML-escaped; control characters become U+FFFD. The same figure
     /// gives the same bytes. Nothing fails: without lanes only the texts remain.
     pub fn svg(&self) -> String {
-        let shown = Shown::of(&self.series);
+        let shown = Shown::of(&self.series, self.until_s);
         let columns = shown.columns();
         let sheet = Sheet { width_px: COLUMN_PX * columns.len() as f64, looks: self.looks() };
         let mut scene = Scene::new(sheet.width_px, 0.0);
@@ -93,9 +95,11 @@ impl TraceFigure<'_> {
 
     /// Names, marks and worst values of the series; returns the y below.
     fn table(&self, scene: &mut Scene, sheet: &Sheet, top: f64) -> f64 {
-        let right = sheet.width_px - MARGIN_PX;
         let columns = [Mark::Reaction.label(), Mark::Braking.label(), Mark::Contact.label(), "min TTC", "max BTN"];
-        let at = |column: usize| right - CELL_PX * (columns.len() - column) as f64;
+        let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
+        let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
+        let most = sheet.width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
+        let at = |column: usize| most.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
         let mut y = top + CELL.line_px();
         for (column, head) in columns.iter().enumerate() {
             text(scene, (at(column), top + f64::from(CELL.size_px)), head, HINT, TextAnchor::Start);
@@ -106,7 +110,6 @@ impl TraceFigure<'_> {
             group(scene, "class=\"legend\"", None);
             scene.elements.push(look.line(path_data(&[(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)], false)));
             scene.elements.push(Primitive::GroupEnd);
-            let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
             let below = paragraph(scene, (name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
             for (column, mark) in Mark::ALL.into_iter().enumerate() {
                 let Some(step) = series.trace.step_of(mark) else {
@@ -148,7 +151,7 @@ impl TraceFigure<'_> {
         let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         if end_s > shown.until_s {
             let (until, end) = (thousandths(shown.until_s), thousandths(end_s));
-            notes.push(format!("After {until} s nothing but positions changes; the lanes go on, the longest to {end} s."));
+            notes.push(format!("The lanes go on after {until} s, the longest to {end} s."));
         }
         notes
     }
@@ -173,16 +176,21 @@ impl Sheet {
         let across = (left + LEFT_PX, left + COLUMN_PX - MARGIN_PX);
         let labels = place_labels(lines, time, across);
         let rows = labels.iter().map(|label| label.row + 1).max().unwrap_or(0);
-        let first = top + rows as f64 * HINT.line_px();
-        let mut y = first;
-        let mut bottom = first;
+        let (mut y, mut bottom) = (top, top);
         for (k, panel) in panels.iter().enumerate() {
-            let down = (y + NAME.line_px() + 3.0, y + NAME.line_px() + 3.0 + panel.height_px);
-            text(scene, (across.0, down.0 - 6.0), panel.title, NAME, TextAnchor::Start);
-            text(scene, (across.1, down.0 - 6.0), &panel.hint, HINT, TextAnchor::End);
+            let title_bottom = y + NAME.line_px() + 3.0;
+            text(scene, (across.0, title_bottom - 6.0), panel.title, NAME, TextAnchor::Start);
+            text(scene, (across.1, title_bottom - 6.0), &panel.hint, HINT, TextAnchor::End);
+            // The labels of the lines through all panels stand above the first plot.
+            let above = if k == 0 { rows as f64 * CELL.line_px() } else { 0.0 };
+            let down = (title_bottom + above, title_bottom + above + panel.height_px);
+            for label in labels.iter().filter(|_| k == 0) {
+                let baseline = title_bottom + (label.row + 1) as f64 * CELL.line_px() - 4.0;
+                text(scene, (label.text_x, baseline), &label.words, CELL, label.anchor);
+            }
             // In pieces, so that no title is crossed.
             for label in &labels {
-                let from = if k == 0 { top + label.row as f64 * HINT.line_px() + 4.0 } else { down.0 };
+                let from = if k == 0 { title_bottom + label.row as f64 * CELL.line_px() + 2.0 } else { down.0 };
                 group(scene, &format!("class=\"mark-line {}\"", label.mark.label()), None);
                 let d = path_data(&[(label.x, from), (label.x, down.1)], false);
                 scene.elements.push(path(d, None, Color::from(INK), 1.0, dash_of(label.mark)));
@@ -191,10 +199,6 @@ impl Sheet {
             self.panel(scene, panel, time, across, down, k + 1 == panels.len());
             bottom = down.1;
             y = down.1 + 5.0;
-        }
-        for label in &labels {
-            let row_bottom = top + (label.row + 1) as f64 * HINT.line_px();
-            text(scene, (label.text_x, row_bottom - 3.0), &label.words, CELL, label.anchor);
         }
         text(scene, (across.1, bottom + 36.0), "Time (s)", NAME, TextAnchor::End);
         bottom + 40.0
@@ -210,7 +214,7 @@ impl Sheet {
         is_last: bool,
     ) {
         let value = Axis::exactly(panel.reach.ends(), (down.1, down.0));
-        let rows = if panel.height_px < 70.0 { 2 } else { 4 };
+        let rows = if panel.height_px < 70.0 { 2 } else { 5 };
         value.draw_left(scene, across, rows, true);
         let time_ticks = time.ticks(8);
         for tick in &time_ticks {
@@ -236,11 +240,13 @@ impl Sheet {
             area(scene, &upper.chain(lower).collect::<Vec<_>>(), self.colour(band.owner), 0.18);
         }
         for curve in &panel.curves {
-            group(scene, &format!("class=\"series\" data-panel=\"{}\"", plain(panel.title)), None);
+            group(scene, "class=\"series\"", None);
             self.curve(scene, curve, time, &value);
             scene.elements.push(Primitive::GroupEnd);
         }
+        group(scene, &format!("class=\"frame\" data-panel=\"{}\"", panel.title), None);
         rect(scene, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
+        scene.elements.push(Primitive::GroupEnd);
         for mark in &panel.marks {
             self.mark(scene, mark, (time.at(mark.at.0), value.at(mark.at.1)));
         }
@@ -336,7 +342,7 @@ fn place_labels(lines: &[(Mark, f64)], time: &Axis, across: (f64, f64)) -> Vec<L
     let mut labels = Vec::new();
     for &(mark, at_s) in lines {
         let words = format!("{} {} s", mark.label(), thousandths(at_s));
-        let (x, width) = (time.at(at_s), HINT.text_px(&words));
+        let (x, width) = (time.at(at_s), CELL.text_px(&words));
         let is_right = x + 4.0 + width <= across.1;
         let (from, to) = if is_right { (x, x + 4.0 + width) } else { (x - 4.0 - width, x) };
         let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(a, b)| to + 6.0 < a || from - 6.0 > b);
@@ -357,9 +363,7 @@ fn without_inner_points(places: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     for (k, &(x, y)) in places.iter().enumerate() {
         let is_inner = match (kept.last(), places.get(k + 1)) {
-            (Some(&(x0, y0)), Some(&(x1, y1))) if x1 > x0 => {
-                (y0 + (y1 - y0) * (x - x0) / (x1 - x0) - y).abs() < 0.004
-            }
+            (Some(&(x0, y0)), Some(&(x1, y1))) if x1 > x0 => (y0 + (y1 - y0) * (x - x0) / (x1 - x0) - y).abs() < 0.004,
             _ => false,
         };
         if !is_inner {

@@ -110,11 +110,12 @@ pub(super) struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    /// All that changes: lanes may go on for long after their last event.
-    pub fn of(series: &'a [TraceSeries<'a>]) -> Self {
+    /// Up to a time, or all that changes: lanes may go on for long after their last event.
+    pub fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         let last_s = series.iter().map(|s| last_change_s(s.trace)).fold(0.0, f64::max) + REST_S;
-        Shown { series, until_s: if last_s < 0.8 * end_s { last_s } else { end_s } }
+        let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });
+        Shown { series, until_s: until_s.clamp(0.0, end_s) }
     }
 
     /// The columns of the sheet: one, or one per other vehicle where there are two.
@@ -154,7 +155,7 @@ impl<'a> Shown<'a> {
         let mut curves = Vec::new();
         let mut is_shared = true;
         for vehicle in 0..vehicles {
-            for (owner, trace) in self.motions(vehicle) {
+            for (owner, trace) in self.courses(vehicle, &|other| other.v_mps) {
                 is_shared &= owner == Owner::All;
                 let speed = |other: &TracedVehicle| other.is_present.then_some((other.v_mps, true));
                 curves.extend(runs(owner, self.steps(trace), &|step| speed(&step.others[vehicle])));
@@ -276,7 +277,7 @@ impl<'a> Shown<'a> {
     fn lateral(&self, vehicle: usize) -> Panel {
         let (mut curves, mut bands) = (Vec::new(), Vec::new());
         let ego_half_m = self.first(|trace| trace.ego_width_m) / 2.0;
-        for (owner, trace) in self.motions(vehicle) {
+        for (owner, trace) in self.courses(vehicle, &|other| other.y_m) {
             let half_m = trace.widths_m[vehicle] / 2.0;
             let centre = |step: &TracedStep| {
                 let other = &step.others[vehicle];
@@ -311,11 +312,18 @@ impl<'a> Shown<'a> {
         self.series.first().map_or(1.0, |s| value(s.trace))
     }
 
-    /// The different motions of a vehicle and whose they are; those of one motion show it as long as the longest.
-    fn motions(&self, vehicle: usize) -> Vec<(Owner, &'a Trace)> {
+    /// The different courses of a value of a vehicle and whose they are; where lanes share one, that of the longest.
+    fn courses(&self, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Vec<(Owner, &'a Trace)> {
+        let at = |step: &TracedStep| {
+            let other = &step.others[vehicle];
+            (value(other), other.is_present)
+        };
+        let is_one = |a: &Trace, b: &Trace| {
+            a.widths_m[vehicle] == b.widths_m[vehicle] && a.steps.iter().zip(&b.steps).all(|(a, b)| at(a) == at(b))
+        };
         let mut found: Vec<(Owner, &Trace)> = Vec::new();
         for (k, series) in self.series.iter().enumerate().filter(|(_, s)| s.trace.vehicles > vehicle) {
-            match found.iter_mut().find(|(_, other)| moves_alike(other, series.trace, vehicle)) {
+            match found.iter_mut().find(|(_, other)| is_one(other, series.trace)) {
                 Some((_, longest)) if longest.steps.len() < series.trace.steps.len() => *longest = series.trace,
                 Some(_) => {}
                 None => found.push((Owner::Series(k), series.trace)),
@@ -358,16 +366,6 @@ impl<'a> Shown<'a> {
         marks.retain(|mark| usize::from(self.series[mark.series].trace.outcome.contact_with) == vehicle);
         marks
     }
-}
-
-/// Does a vehicle move alike in both, as long as both last?
-fn moves_alike(a: &Trace, b: &Trace, vehicle: usize) -> bool {
-    let place = |step: &TracedStep| {
-        let other = step.others[vehicle];
-        (other.v_mps, other.y_m, other.is_present)
-    };
-    a.widths_m[vehicle] == b.widths_m[vehicle]
-        && a.steps.iter().zip(&b.steps).all(|(a, b)| place(a) == place(b))
 }
 
 /// The last time at which anything but positions changes or the worst value is seen, s.
@@ -423,7 +421,8 @@ fn below(curve: Curve, top: f64) -> Vec<Curve> {
     let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     let crossing = |(t1, v1): (f64, f64), (t2, v2): (f64, f64)| {
         // Towards infinity it is the step's end that crosses.
-        let share = if v2.is_finite() && v1.is_finite() { (top - v1) / (v2 - v1) } else { f64::from(u8::from(v1 <= top)) };
+        let share =
+            if v2.is_finite() && v1.is_finite() { (top - v1) / (v2 - v1) } else { f64::from(u8::from(v1 <= top)) };
         (t1 + share * (t2 - t1), top)
     };
     let mut before: Option<(f64, f64)> = None;

@@ -59,6 +59,5 @@ fn write_step(text: &mut String, trace: &Trace, step: &TracedStep, vehicles: usi
 fn write_vehicle(text: &mut String, other: &TracedVehicle) {
     let TracedVehicle { x_m, y_m, v_mps, gap_m, lateral_gap_m, ttc_s, btn, pfs, cfs, is_present, is_judged } = other;
     let (present, judged) = (u8::from(*is_present), u8::from(*is_judged));
-    let _ =
-        write!(text, ",{x_m},{y_m},{v_mps},{gap_m},{lateral_gap_m},{ttc_s},{btn},{pfs},{cfs},{present},{judged}");
+    let _ = write!(text, ",{x_m},{y_m},{v_mps},{gap_m},{lateral_gap_m},{ttc_s},{btn},{pfs},{cfs},{present},{judged}");
 }
