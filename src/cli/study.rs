@@ -66,7 +66,7 @@ pub struct Study {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Leave the plan in --out (run-plan.json), so that `simulate --from` can run each lane again: auto (up to 256 MiB,
-    /// some 15,000 scenarios), always, never
+    /// some 12,000 scenarios), always, never
     #[arg(long, value_name = "WHEN", value_enum, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
