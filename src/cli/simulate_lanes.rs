@@ -93,20 +93,20 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked) -> Res
 }
 
 enum Run {
-    Study(PlannedStudy),
+    Study(Box<PlannedStudy>),
     /// With whether its density is of synthetic data.
-    Sample(LanePlan, bool),
+    Sample(Box<LanePlan>, bool),
 }
 
 /// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
 fn find_run(dir: &Path, key: &str) -> Result<Run> {
     let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
     if run.exists() && !(estimate.exists() && key.starts_with('#')) {
-        return study_of(dir, &run).map(Run::Study);
+        return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));
     }
     if estimate.exists() {
         let (_, plan, density) = super::rerun::run_of(dir)?;
-        return Ok(Run::Sample(plan, density.provenance.synthetic));
+        return Ok(Run::Sample(Box::new(plan), density.provenance.synthetic));
     }
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
@@ -116,10 +116,10 @@ fn find_run(dir: &Path, key: &str) -> Result<Run> {
     match kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?.as_str() {
         sample_plan::KIND => {
             let sample = PlannedSample::read(&plan)?.0;
-            Ok(Run::Sample(sample.plan, sample.density.provenance.synthetic))
+            Ok(Run::Sample(Box::new(sample.plan), sample.density.provenance.synthetic))
         }
         // Its reader refuses every other kind.
-        _ => Ok(Run::Study(PlannedStudy::read(&plan)?.0)),
+        _ => Ok(Run::Study(Box::new(PlannedStudy::read(&plan)?.0))),
     }
 }
 

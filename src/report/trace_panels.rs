@@ -374,7 +374,8 @@ fn last_change_s(trace: &Trace) -> f64 {
         let of = |other: &TracedVehicle| (other.v_mps, other.y_m, other.is_present, other.is_judged);
         (step.v_ego_mps, step.is_unsafe, step.others.each_ref().map(of))
     };
-    let changes = trace.steps.windows(2).filter(|pair| state(&pair[0]) != state(&pair[1])).map(|pair| pair[1].time_s);
+    let mut changes =
+        trace.steps.windows(2).filter(|pair| state(&pair[0]) != state(&pair[1])).map(|pair| pair[1].time_s);
     let worst = |value: &dyn Fn(&TracedVehicle) -> f64| {
         let of = |step: &TracedStep| {
             let judged = step.others[..trace.vehicles].iter().filter(|other| other.is_judged);
@@ -385,7 +386,7 @@ fn last_change_s(trace: &Trace) -> f64 {
     };
     let worst = [worst(&|other| other.ttc_s), worst(&|other| -other.btn)];
     let marks = Mark::ALL.map(|mark| trace.step_of(mark).map(|step| trace.time_s(step)));
-    changes.last().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
+    changes.next_back().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
 }
 
 /// A value over time as runs without a gap, cut also where thin begins or ends; such neighbours share a point.
