@@ -32,7 +32,7 @@ use crate::{Error, Place, Result};
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "config" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
-    "lanes" | "compare_reference" => arg.conflicts_with_all(["shard", "plan_only"]),
+    "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
