@@ -184,10 +184,6 @@ impl Sheet {
             // The labels of the lines through all panels stand above the first plot.
             let above = if k == 0 { rows as f64 * CELL.line_px() } else { 0.0 };
             let down = (title_bottom + above, title_bottom + above + panel.height_px);
-            for label in labels.iter().filter(|_| k == 0) {
-                let baseline = title_bottom + (label.row + 1) as f64 * CELL.line_px() - 4.0;
-                text(scene, (label.text_x, baseline), &label.words, CELL, label.anchor);
-            }
             // In pieces, so that no title is crossed.
             for label in &labels {
                 let from = if k == 0 { title_bottom + label.row as f64 * CELL.line_px() + 2.0 } else { down.0 };
@@ -195,6 +191,16 @@ impl Sheet {
                 let d = path_data(&[(label.x, from), (label.x, down.1)], false);
                 scene.elements.push(path(d, None, Color::from(INK), 1.0, dash_of(label.mark)));
                 scene.elements.push(Primitive::GroupEnd);
+            }
+            for label in labels.iter().filter(|_| k == 0) {
+                let row_bottom = title_bottom + (label.row + 1) as f64 * CELL.line_px();
+                // On white: lines of other labels pass behind.
+                let (from, to) = label.text_px;
+                let white = Color::from("#ffffff");
+                rect(scene, (from - 1.0, row_bottom - CELL.line_px() + 1.0), (to + 1.0, row_bottom - 1.0), white, None);
+                let x = if label.is_right { from } else { to };
+                let anchor = if label.is_right { TextAnchor::Start } else { TextAnchor::End };
+                text(scene, (x, row_bottom - 4.0), &label.words, CELL, anchor);
             }
             self.panel(scene, panel, time, across, down, k + 1 == panels.len());
             bottom = down.1;
@@ -331,8 +337,9 @@ struct Label {
     mark: Mark,
     words: String,
     x: f64,
-    text_x: f64,
-    anchor: TextAnchor,
+    /// The text, right or left of its line, from and to.
+    text_px: (f64, f64),
+    is_right: bool,
     row: usize,
 }
 
@@ -344,16 +351,14 @@ fn place_labels(lines: &[(Mark, f64)], time: &Axis, across: (f64, f64)) -> Vec<L
         let words = format!("{} {} s", mark.label(), thousandths(at_s));
         let (x, width) = (time.at(at_s), CELL.text_px(&words));
         let is_right = x + 4.0 + width <= across.1;
-        let (from, to) = if is_right { (x, x + 4.0 + width) } else { (x - 4.0 - width, x) };
+        let (from, to) = if is_right { (x + 4.0, x + 4.0 + width) } else { (x - 4.0 - width, x - 4.0) };
         let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(a, b)| to + 6.0 < a || from - 6.0 > b);
         let row = taken.iter().position(free).unwrap_or(taken.len());
         if row == taken.len() {
             taken.push(Vec::new());
         }
         taken[row].push((from, to));
-        let anchor = if is_right { TextAnchor::Start } else { TextAnchor::End };
-        let text_x = if is_right { x + 4.0 } else { x - 4.0 };
-        labels.push(Label { mark, words, x, text_x, anchor, row });
+        labels.push(Label { mark, words, x, text_px: (from, to), is_right, row });
     }
     labels
 }
