@@ -28,7 +28,9 @@ fn results(dir: &Path) -> Vec<(String, String)> {
     for entry in std::fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if name == "plan.json" || (name.starts_with("part-") && name.ends_with(".json")) {
+        if ["plan.json", "run-plan.json"].contains(&name.as_str())
+            || (name.starts_with("part-") && name.ends_with(".json"))
+        {
             continue;
         }
         let mut content = std::fs::read_to_string(&path).unwrap();
@@ -88,6 +90,8 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     same(&dir.join("whole"), &dir.join("three"));
     // More shards than units, from one plan: the data are not read again.
     done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
+    let read = |path: &str| std::fs::read(dir.join(path)).unwrap();
+    assert!(read("whole/run-plan.json") == read("plan/plan.json"), "the plan that a whole run leaves is the same file");
     for shard in 0..100 {
         let shard = format!("{shard}/100");
         done(

@@ -19,7 +19,7 @@ pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME")]
     category: Option<String>,
-    #[arg(long, value_name = "NAME", help = format!("Driver model: {}", ModelId::names()))]
+    #[arg(long, value_name = "LIST", help = format!("Driver models, separated by commas: {}, or all", ModelId::names()))]
     model: Option<String>,
     /// Initial speed of the ego, m/s
     #[arg(long, value_name = "MPS")]
@@ -96,12 +96,33 @@ impl CaseFlags {
         })
     }
 
-    pub(super) fn model(&self) -> Result<ModelId> {
-        let text = needed(self.model.as_ref(), "model", &format!("one of {}", ModelId::names()))?;
-        ModelId::parse(text).ok_or_else(|| {
-            let problem = format!("there is no model `{text}`");
-            Error::usage(Place::item("model"), problem, format!("use one of {}", ModelId::names()))
-        })
+    /// Does it say anything of the case itself?
+    pub(super) fn says_a_case(&self) -> bool {
+        CaseFlags { model: None, ..self.clone() } != CaseFlags::default()
+    }
+
+    /// The models that are named; `None` where none is.
+    pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
+        self.model.as_ref().map(|_| self.models()).transpose()
+    }
+
+    /// At least one model, each once, in the order given.
+    pub(super) fn models(&self) -> Result<Vec<ModelId>> {
+        let text = needed(self.model.as_ref(), "model", &format!("one of {}, or all", ModelId::names()))?;
+        if text.trim() == "all" {
+            return Ok(ModelId::ALL.to_vec());
+        }
+        let mut models = Vec::new();
+        for name in text.split(',').map(str::trim) {
+            let model = ModelId::parse(name).ok_or_else(|| {
+                let problem = format!("there is no model `{name}`");
+                Error::usage(Place::item("model"), problem, format!("use one of {}, or all", ModelId::names()))
+            })?;
+            if !models.contains(&model) {
+                models.push(model);
+            }
+        }
+        Ok(models)
     }
 
     pub(super) fn headway(&self) -> Result<Headway> {

@@ -24,6 +24,7 @@ mod sample_plan;
 mod sample_weighted;
 mod shard_flags;
 mod simulate;
+mod simulate_lanes;
 mod slurm;
 mod source;
 mod study;

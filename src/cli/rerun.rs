@@ -57,18 +57,10 @@ pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<Str
     Ok((facts, read_density(&dir.join("density.json"))?, run.plan_sha256))
 }
 
-/// The plan of the sampling run that wrote this folder.
+/// The plan of the sampling run that wrote this folder, with what the run was asked for and its density.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Input`] where the folder does not hold a run of crude Monte Carlo, whole and unchanged.
-pub(super) fn plan_of(dir: &Path) -> Result<LanePlan> {
-    Ok(run_of(dir)?.1)
-}
-
-/// The same with what the run was asked for and its density.
-///
-/// # Errors
-/// As [`plan_of`].
 pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
     let (facts, density, plan_sha256) = facts_of(dir)?;
     let wrong = |problem: String| {

@@ -31,9 +31,13 @@ pub struct ShardFlags {
 /// Name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";
 
+/// Name of the plan that a run in one piece leaves in its folder, for its lanes to be run again. Another name than that
+/// of a run in parts, whose processes share their plan and hold no common lock.
+pub const RUN_PLAN_FILE: &str = "run-plan.json";
+
 /// Beginnings of the names that a whole run or a merge writes under its lock. Others in the same folder may be some
 /// other command's, at work.
-const RESULTS: [&str; 18] = [
+const RESULTS: [&str; 19] = [
     "claims.csv",
     "convergence.",
     "density.json",
@@ -50,6 +54,7 @@ const RESULTS: [&str; 18] = [
     "reference.csv",
     "report.html",
     "report.txt",
+    "run-plan.json",
     "run.json",
     "worst.csv",
 ];

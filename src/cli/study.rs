@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
-use super::shard_flags::{Desk, PLAN_FILE, ShardFlags, leave_plan};
+use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
 use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, compare_reference, finish_study, run_units, write_lanes};
@@ -34,7 +34,7 @@ use crate::{Error, Place, Result, input_file};
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "config" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
-    "lanes" | "compare_reference" => arg.conflicts_with_all(["shard", "plan_only"]),
+    "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
@@ -67,6 +67,10 @@ pub struct Study {
     /// Seed of the bootstrap [default: 157]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Leave the plan in --out (run-plan.json), so that `simulate --from` can run each lane again: auto (up to 256 MiB,
+    /// some 12,000 scenarios), always, never
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t = KeepPlan::Auto)]
+    keep_plan: KeepPlan,
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
@@ -78,6 +82,28 @@ pub struct Study {
     profile: ProfileFlags,
     #[command(flatten)]
     generator: GeneratorFlags,
+}
+
+/// When a run in one piece leaves its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum KeepPlan {
+    /// Unless it is large.
+    Auto,
+    /// However large.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl KeepPlan {
+    /// Largest plan that is left, bytes.
+    fn most_bytes(self) -> Option<u64> {
+        match self {
+            KeepPlan::Auto => Some(256 << 20),
+            KeepPlan::Always => Some(LARGEST_PLAN_BYTES),
+            KeepPlan::Never => None,
+        }
+    }
 }
 
 /// The study file.
@@ -227,16 +253,31 @@ impl Study {
             swept,
             timings,
         };
+        self.leave_plan(study)?;
         let exit = finish_study(study, &partial, comparison, host, &self.out)?;
         work.forget()?;
         Ok(exit)
     }
 
+    /// For `simulate --from`. Under the run's lock.
+    fn leave_plan(&self, study: &PlannedStudy) -> Result<()> {
+        let Some(most_bytes) = self.keep_plan.most_bytes() else { return Ok(()) };
+        if study.keep(&self.out.join(RUN_PLAN_FILE), most_bytes)?.is_none() {
+            tracing::info!(
+                "the plan is not left in {}: it has more than {} MiB; --keep-plan always leaves it, for `simulate --from`",
+                self.out.display(),
+                most_bytes >> 20
+            );
+        }
+        Ok(())
+    }
+
     /// The lane table must replace neither an input nor another result.
     fn guard_inputs(&self) -> Result<()> {
         let Some(lanes) = &self.lanes else { return Ok(()) };
-        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json", PLAN_FILE];
-        let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).to_vec();
+        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
+        let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
+        let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         others.extend(self.scenarios.clone());
         others.extend(self.config.clone());
         others.extend(self.shards.plan.clone());

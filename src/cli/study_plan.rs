@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::mining::{MiningOptions, RecordingSummary};
 use crate::parameterization::{ModeShape, ParameterizationOptions};
-use crate::parts::{read_sealed, seal};
+use crate::parts::{read_sealed, seal, sealed_size, write_sealed};
 use crate::report::distributions::ParameterHistogram;
+use crate::report::files::write_atomically_with;
 use crate::score::ScoreOptions;
 use crate::sweep::{LanePlan, PlanContent};
 use crate::{Place, Result};
@@ -66,6 +67,17 @@ impl PlannedStudy {
     /// As the text of a plan file, with the hash of the run.
     pub fn seal(&self) -> Result<(Vec<u8>, String)> {
         seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? })
+    }
+
+    /// Writes the plan file, unless it would be larger; gives its size where it was written.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn keep(&self, path: &Path, most_bytes: u64) -> Result<Option<u64>> {
+        let content = StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? };
+        let Some((bytes, sha256)) = sealed_size(KIND, &content, most_bytes)? else { return Ok(None) };
+        write_atomically_with(path, |out| write_sealed(out, KIND, &content, &sha256))?;
+        Ok(Some(bytes))
     }
 
     /// From a plan file, with the hash of the run.

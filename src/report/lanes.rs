@@ -31,7 +31,7 @@ impl Digits {
 }
 
 /// A key as a CSV field.
-fn quoted(key: &str) -> String {
+pub(super) fn quoted(key: &str) -> String {
     if key.contains([',', '"', '\n', '\r']) { format!("\"{}\"", key.replace('"', "\"\"")) } else { key.to_owned() }
 }
 

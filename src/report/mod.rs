@@ -31,4 +31,9 @@ pub mod study;
 pub mod study_figures;
 mod study_page;
 pub mod tables;
+pub mod trace_figure;
+mod trace_panels;
+pub mod trace_table;
+#[cfg(test)]
+mod trace_tests;
 pub mod verification;

@@ -24,6 +24,7 @@ mod run;
 mod runner;
 mod simd;
 mod study;
+mod trace;
 mod units;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
@@ -44,4 +45,5 @@ pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use run::{SweepOptions, SweepSummary, chunks, sweep};
 pub use runner::LaneRunner;
 pub use study::{StudyOptions, StudyPlan, plan_study};
+pub use trace::{Mark, Trace, TracedStep, TracedVehicle};
 pub use units::Units;

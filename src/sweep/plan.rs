@@ -35,6 +35,15 @@ impl Headway {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
     }
 
+    /// From its text, `1.2s` or `30m`; `2.0s`, as tables have it, is `2s`.
+    pub fn parse(text: &str) -> Option<Headway> {
+        let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+        match text.strip_suffix('s') {
+            Some(seconds) => number(seconds).map(Headway::ThwS),
+            None => number(text.strip_suffix('m')?).map(Headway::GapM),
+        }
+    }
+
     /// As a lane starts, rounded once.
     pub fn start<R: crate::scalar::Real>(self) -> Start<R> {
         match self {
@@ -255,7 +264,8 @@ impl LanePlan {
         let [model, headway, variant, unit] = parts[..] else { return None };
         let model = ModelId::parse(model)?;
         let model = self.models.iter().position(|m| *m == model)?;
-        let headway = self.headways.iter().position(|h| h.to_string() == headway)?;
+        let headway = Headway::parse(headway)?;
+        let headway = self.headways.iter().position(|h| *h == headway)?;
         self.blocks.iter().enumerate().find_map(|(at, block)| {
             let unit = block.units.find(unit)?;
             let variant = block.variants.iter().position(|v| v == variant)?;

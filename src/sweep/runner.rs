@@ -41,8 +41,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self.run_case(key.block, &case, &tables, self.starts[key.headway], self.plan.models[key.model])
     }
 
+    /// The plan whose lanes it runs.
+    pub(super) fn plan(&self) -> &'p LanePlan {
+        self.plan
+    }
+
     /// A case and the tables that it points into.
-    fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+    pub(super) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
         match self.plan.generator() {
             Some(generator) => {
                 let mut tables = Tables::default();

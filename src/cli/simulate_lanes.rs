@@ -1,0 +1,234 @@
+//! The lanes of a `simulate` that names one by its key: of a study's folder, of a sampling run's, or of a scenario file.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::sample_plan::{self, PlannedSample};
+use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
+use super::study_plan::{self, PlannedStudy};
+use crate::driver::ModelId;
+use crate::parts::kind_of;
+use crate::profile::Profile;
+use crate::scalar::Real;
+use crate::scenario::read_scenarios;
+use crate::sweep::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, StudyOptions, Trace, plan_study};
+use crate::{Error, Place, Result, input_file};
+
+/// Which lanes are asked for: one by its key, and others of the same scenario and headway beside it.
+pub(super) struct Asked<'a> {
+    pub key: &'a str,
+    /// Instead of the key's own model.
+    pub models: Option<Vec<ModelId>>,
+    /// Variants before the key's own one: S, keys of parameterizations, or `all`.
+    pub compare: &'a [String],
+}
+
+/// A lane that has been run.
+pub(super) struct Traced {
+    /// The lane's key; without one what tells it from the others.
+    pub key: String,
+    /// Name on a sheet with others.
+    pub name: String,
+    pub trace: Trace,
+    /// The same lane in f64, where the trace is in the lane arithmetic of a finished run.
+    pub reference: Option<Outcome<f64>>,
+}
+
+/// Lanes that have been run, and what a reader should know of all of them.
+pub(super) struct Lanes {
+    pub traced: Vec<Traced>,
+    /// What they are of, in a few words.
+    pub origin: String,
+    pub synthetic: bool,
+}
+
+/// Lanes of a finished run, in its own arithmetic.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] for a folder without a run's plan, or with another's; [`Error::Usage`] for a lane
+/// that the run does not have.
+pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
+    match find_run(dir, asked.key)? {
+        Run::Study(study) => {
+            let facts = &study.facts;
+            let traced = if facts.reference {
+                traced::<f64>(&study.plan, asked, false)?
+            } else {
+                traced::<f32>(&study.plan, asked, true)?
+            };
+            let arithmetic = if facts.reference { "f64" } else { "f32" };
+            let origin = format!("profile {}, {arithmetic}, {}", study.plan.profile.name, facts.data);
+            Ok(Lanes { traced, origin, synthetic: facts.synthetic })
+        }
+        Run::Sample(plan, synthetic) => {
+            let key = find(&plan, asked.key)?;
+            if plan.generator().is_some_and(|generator| generator.draw(key.unit).is_void()) {
+                let help = "no draw of it was valid: take another";
+                return Err(Error::usage(Place::item("--lane"), "this sample is void", help));
+            }
+            let origin = format!("profile {}, f32, sampled", plan.profile.name);
+            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic })
+        }
+    }
+}
+
+/// Lanes of a scenario file, in f64. A scenario that the filters dropped can be looked at too, and any headway.
+///
+/// # Errors
+/// As [`read_scenarios`]; [`Error::Usage`] for a lane that the file does not have.
+pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked) -> Result<Lanes> {
+    let mut scenarios = read_scenarios(path)?;
+    let id = asked.key.rsplitn(4, '/').last().unwrap_or(asked.key);
+    if let Some(wanted) = scenarios.iter_mut().find(|s| s.id == id) {
+        wanted.kept = true;
+    }
+    let mut options = StudyOptions::default();
+    if let Some(headway) = asked.key.rsplit('/').nth(1).and_then(Headway::parse) {
+        options.headways = vec![headway];
+    }
+    let plan = plan_study(&scenarios, profile, &options)?.plan;
+    let origin = format!("profile {}, f64, scenarios of {}", profile.name, path.display());
+    Ok(Lanes { traced: traced::<f64>(&plan, asked, false)?, origin, synthetic: false })
+}
+
+enum Run {
+    Study(Box<PlannedStudy>),
+    /// With whether its density is of synthetic data.
+    Sample(Box<LanePlan>, bool),
+}
+
+/// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
+fn find_run(dir: &Path, key: &str) -> Result<Run> {
+    let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
+    if run.exists() && !(estimate.exists() && key.starts_with('#')) {
+        return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));
+    }
+    if estimate.exists() {
+        let (_, plan, density) = super::rerun::run_of(dir)?;
+        return Ok(Run::Sample(Box::new(plan), density.provenance.synthetic));
+    }
+    let plan = dir.join(PLAN_FILE);
+    if !plan.exists() {
+        let help = "give the folder (--out) of a `lanesweep study` or `lanesweep sample`";
+        return Err(Error::input(Place::file(dir), "there is no run here", help));
+    }
+    match kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?.as_str() {
+        sample_plan::KIND => {
+            let sample = PlannedSample::read(&plan)?.0;
+            Ok(Run::Sample(Box::new(sample.plan), sample.density.provenance.synthetic))
+        }
+        // Its reader refuses every other kind.
+        _ => Ok(Run::Study(Box::new(PlannedStudy::read(&plan)?.0))),
+    }
+}
+
+/// The study whose record this is: the plan beside it that has the record's hash.
+fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
+    #[derive(Deserialize)]
+    struct Recorded {
+        plan_sha256: String,
+    }
+    let wrong = |problem: String| {
+        Error::input(
+            Place::file(run),
+            problem,
+            "make the plan again with the study's own command and `--plan-only`, into this folder; a study leaves it \
+             there by itself up to 256 MiB, and with `--keep-plan always`",
+        )
+    };
+    let text = input_file::read(run, input_file::LARGEST_TABLE_BYTES)?;
+    let recorded: Recorded =
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no record of a study: {e}")))?;
+    let plans: Vec<PathBuf> =
+        [RUN_PLAN_FILE, PLAN_FILE].iter().map(|name| dir.join(name)).filter(|path| path.exists()).collect();
+    for path in &plans {
+        // Another verb's plan may stand in the same folder.
+        if kind_of(path, study_plan::LARGEST_PLAN_BYTES)? == study_plan::KIND {
+            let study = PlannedStudy::read(path)?.0;
+            if study.plan.hash() == recorded.plan_sha256 {
+                return Ok(study);
+            }
+        }
+    }
+    Err(wrong(match plans.first() {
+        None => "there is no plan of its lanes beside it".to_owned(),
+        Some(path) => format!("{} is not the plan that it records", path.display()),
+    }))
+}
+
+fn find(plan: &LanePlan, key: &str) -> Result<LaneKey> {
+    plan.parse_key(key).ok_or_else(|| {
+        let example = plan.key(0).map_or(String::new(), |key| format!(", for instance {}", plan.key_text(&key)));
+        Error::usage(
+            Place::item("--lane"),
+            format!("there is no lane `{key}`"),
+            format!("a key is scenario/variant/headway/model, as errors and tables print it{example}"),
+        )
+    })
+}
+
+/// Runs what is asked for: variants, and for each of them models.
+fn traced<R: Real>(plan: &LanePlan, asked: &Asked, with_reference: bool) -> Result<Vec<Traced>> {
+    let key = find(plan, asked.key)?;
+    let variants = variants(plan, &key, asked.compare)?;
+    let models = match &asked.models {
+        None => vec![key.model],
+        Some(list) => list.iter().map(|id| model(plan, *id)).collect::<Result<_>>()?,
+    };
+    let runner = LaneRunner::<R>::new(plan);
+    let reference = with_reference.then(|| LaneRunner::<f64>::new(plan));
+    let mut all = Vec::new();
+    for &variant in &variants {
+        for &model in &models {
+            let key = LaneKey { variant, model, ..key };
+            let (of, by) = (&plan.blocks[key.block].variants[variant], plan.models[model].name());
+            let name = match (variants.len() > 1, models.len() > 1) {
+                (true, true) => format!("{of}, {by}"),
+                (true, false) => of.clone(),
+                _ => by.to_owned(),
+            };
+            let reference = reference.as_ref().map(|runner| runner.run(&key));
+            all.push(Traced { key: plan.key_text(&key), name, trace: runner.trace(&key), reference });
+        }
+    }
+    Ok(all)
+}
+
+fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
+    plan.models.iter().position(|m| *m == id).ok_or_else(|| {
+        let there: Vec<&str> = plan.models.iter().map(|m| m.name()).collect();
+        let problem = format!("{} is not a model of this run", id.name());
+        Error::usage(Place::item("--model"), problem, format!("use {}", there.join(", ")))
+    })
+}
+
+/// Those to compare with, in the plan's order of variants, then the lane's own.
+fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
+    let names = &plan.blocks[key.block].variants;
+    let mut variants = Vec::new();
+    for name in compare.iter().map(|name| name.trim()) {
+        match names.iter().position(|n| n == name) {
+            Some(at) => variants.push(at),
+            None if name == "all" => variants.extend(0..names.len()),
+            None => {
+                let problem = format!("this lane's scenario has no variant `{name}`");
+                let help = format!("use {} or `all`", names.join(", "));
+                return Err(Error::usage(Place::item("--compare"), problem, help));
+            }
+        }
+    }
+    variants.sort_unstable();
+    variants.dedup();
+    variants.retain(|variant| *variant != key.variant);
+    if variants.is_empty() && !compare.is_empty() {
+        let problem = "this is the lane itself: there is nothing to compare it with";
+        let others = names.iter().enumerate().filter(|(at, _)| *at != key.variant).map(|(_, name)| name.as_str());
+        let help = format!("name other variants: {}", others.collect::<Vec<_>>().join(", "));
+        return Err(Error::usage(Place::item("--compare"), problem, help));
+    }
+    // S first, wherever it comes from: the others are read against it.
+    variants.push(key.variant);
+    variants.sort_by_key(|variant| *variant != 0);
+    Ok(variants)
+}
