@@ -228,7 +228,6 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "synth @",
         "slurm --array 2 --out @ -- study",
         "merge @",
-        "sample --join @",
         "simulate --from @ --lane a/S/1.0s/FSM",
     ];
     for command in commands {

@@ -145,7 +145,6 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
     let names = [
         ("merge", "plan.json", vec!["merge", "in"]),
         ("rerun", "estimate.json", vec!["simulate", "--from", "in", "--lane", "a/S/1.0s/FSM"]),
-        ("join", "part.json", vec!["sample", "--join", "in", "--out", "out"]),
     ];
     for (what, name, args) in names {
         let put: [(&str, Put); 3] = [

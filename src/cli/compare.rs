@@ -21,6 +21,7 @@ use crate::profile::Profile;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
 use crate::report::files::{check_folder, make_folder, write_atomically};
+use crate::report::html::PageFigure;
 use crate::report::sampling::HostRecord;
 use crate::sampling::{
     CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
@@ -234,13 +235,17 @@ impl Compare {
         let text = file.text();
         write_atomically(&self.out.join("compare.csv"), &file.csv()?)?;
         write_atomically(&self.out.join("compare.txt"), text.as_bytes())?;
+        let mut figures = Vec::new();
         for comparison in &file.categories {
             for criterion in Criterion::ALL {
                 let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
                 let figure = compare_figures::rates(file, comparison, criterion);
-                write_atomically(&self.out.join(name), figure.svg().as_bytes())?;
+                let svg = figure.svg();
+                write_atomically(&self.out.join(&name), svg.as_bytes())?;
+                figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
             }
         }
+        write_atomically(&self.out.join("report.html"), file.html(figures)?.as_bytes())?;
         write_atomically(&self.out.join("compare.json"), &file.to_json()?)?;
         console::print(&text)?;
         tracing::info!("results written to {}", self.out.display());

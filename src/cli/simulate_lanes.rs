@@ -100,6 +100,7 @@ enum Run {
 
 /// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
 fn find_run(dir: &Path, key: &str) -> Result<Run> {
+    crate::report::files::check_folder(dir)?;
     let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
     if run.exists() && !(estimate.exists() && key.starts_with('#')) {
         return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::html::{Page, PageFigure, Section};
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::criterion::Criterion;
@@ -178,6 +179,59 @@ impl CompareFile {
             text.push_str("\nSYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
+    }
+
+    /// The comparison as one page; the figures are made already.
+    ///
+    /// # Errors
+    /// None for what this program makes.
+    pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+        let mut warnings = Vec::new();
+        if self.synthetic {
+            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
+        }
+        if !self.left_out.is_empty() {
+            warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
+        }
+        let rates = Section {
+            id: "rates".to_owned(),
+            title: "Rates and their ratios".to_owned(),
+            text: self.text(),
+            ..Section::default()
+        };
+        let pictures = Section { id: "figures".to_owned(), title: "Figures".to_owned(), figures, ..Section::default() };
+        let facts = [
+            ("program", self.program.clone()),
+            ("profile", self.profile.clone()),
+            ("seed", self.seed.to_string()),
+            ("samples of each density", self.samples.to_string()),
+            ("SHA-256 of the scenarios", self.scenarios_sha256.clone()),
+            ("SHA-256 of the plan of S and S'", self.study_plan_sha256.clone()),
+        ];
+        let host = [
+            ("computed by", self.host.backend.clone()),
+            ("seconds", format!("{:.2} on {} threads", self.host.seconds, self.host.threads)),
+        ];
+        let named = |(name, value): (&str, String)| (name.to_owned(), value);
+        let reproduction = Section {
+            id: "reproduction".to_owned(),
+            title: "Reproduction".to_owned(),
+            intro:
+                "The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of \
+                    it."
+                .to_owned(),
+            facts: facts.into_iter().map(named).collect(),
+            host: host.into_iter().map(named).collect(),
+            ..Section::default()
+        };
+        let page = Page {
+            title: "Rates of failure: recorded, replayed, drawn".to_owned(),
+            program: self.program.clone(),
+            lead: self.data.clone(),
+            warnings,
+            sections: vec![rates, pictures, reproduction],
+        };
+        page.html()
     }
 
     /// How to read a cell.

@@ -46,6 +46,8 @@ pub struct Section {
     pub title: String,
     /// What is to be seen; may be empty.
     pub intro: String,
+    /// A text whose columns stand below one another; may be empty.
+    pub text: String,
     /// Tables, before the figures.
     pub tables: Vec<PageTable>,
     /// Figures.
@@ -161,6 +163,7 @@ mod tests {
         let html = page().html().unwrap();
         let (before, after) = html.split_once("<!-- host -->").unwrap();
         let (host, after) = after.split_once("<!-- end of host -->").unwrap();
-        assert!(host.contains("device") && !before.contains("device") && !after.contains("device"));
+        let name = "<dt>device<";
+        assert!(host.contains(name) && !before.contains(name) && !after.contains(name));
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::files::{make_folder, write_atomically, write_atomically_with};
+use super::html::{Page, PageFigure, Section};
 use super::map_sheet::{Kind, MapSheet};
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};
@@ -137,14 +138,18 @@ impl MapReport {
     /// [`Error::Io`] where the folder cannot be written.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
         make_folder(dir)?;
-        let mut written = Vec::new();
+        let (mut written, mut figures) = (Vec::new(), Vec::new());
+        let file_of =
+            |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         for mapped in &self.grids {
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
                 let what = format!("{}, {}", model.name(), self.criterion.label());
                 let sheet = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells);
                 let path = dir.join(format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name())));
-                write_atomically(&path, sheet.svg().as_bytes())?;
+                let svg = sheet.svg();
+                write_atomically(&path, svg.as_bytes())?;
+                figures.push(PageFigure::new(&svg, &[&file_of(&path), "cells.csv"]));
                 written.push(path);
             }
         }
@@ -161,9 +166,14 @@ impl MapReport {
                 slug(&self.against_name())
             );
             let path = dir.join(name);
-            write_atomically(&path, sheet.svg().as_bytes())?;
+            let svg = sheet.svg();
+            write_atomically(&path, svg.as_bytes())?;
+            figures.push(PageFigure::new(&svg, &[&file_of(&path), "differences.csv"]));
             written.push(path);
         }
+        let path = dir.join("report.html");
+        write_atomically(&path, self.html(figures)?.as_bytes())?;
+        written.push(path);
         let path = dir.join("cells.csv");
         write_atomically_with(&path, |out| self.write_cells(out))?;
         written.push(path);
@@ -176,6 +186,60 @@ impl MapReport {
         write_atomically(&path, &self.json()?)?;
         written.push(path);
         Ok(written)
+    }
+
+    /// The run as one page.
+    fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+        let profile = serde_json::to_string_pretty(&self.profile)
+            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
+        let shares = Section {
+            id: "shares".to_owned(),
+            title: "Shares".to_owned(),
+            intro: "Known shares are those of the JRC's evidence.".to_owned(),
+            text: self.text(),
+            ..Section::default()
+        };
+        let sheets = Section { id: "maps".to_owned(), title: "Maps".to_owned(), figures, ..Section::default() };
+        let hashes = self.grids.iter().flat_map(|mapped| {
+            let parts = mapped.plan.parts.iter();
+            parts.map(|part| {
+                (format!("SHA-256 of the plan of {}", mapped.plan.grid.name()), part.plan.hash().to_owned())
+            })
+        });
+        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
+        host.extend(
+            self.host
+                .device
+                .iter()
+                .map(|device| ("device".to_owned(), format!("{} ({}, {})", device.name, device.api, device.driver))),
+        );
+        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
+        let reproduction = Section {
+            id: "reproduction".to_owned(),
+            title: "Reproduction".to_owned(),
+            intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
+                .to_owned(),
+            facts: [("program".to_owned(), program.clone()), ("profile".to_owned(), self.profile.name.clone())]
+                .into_iter()
+                .chain(hashes)
+                .collect(),
+            host,
+            details: vec![("Profile".to_owned(), profile)],
+            ..Section::default()
+        };
+        let page = Page {
+            title: "Outcomes over a grid".to_owned(),
+            program,
+            lead: format!(
+                "{} simulations: {} over a grid of parameters, profile {}.",
+                self.simulations(),
+                self.criterion.label(),
+                self.profile.name
+            ),
+            warnings: Vec::new(),
+            sections: vec![shares, sheets, reproduction],
+        };
+        page.html()
     }
 
     fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {

@@ -1,0 +1,132 @@
+//! The page of a run: whole, readable and small, however little or much the run has to say.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+
+fn lanesweep(dir: &Path, args: &[&str]) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    let output = command.current_dir(dir).arg("-q").args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The page in a folder, after what holds of every page.
+fn page(dir: &Path) -> String {
+    let html = std::fs::read_to_string(dir.join("report.html")).unwrap();
+    assert!(html.len() < 5_000_000, "{} bytes", html.len());
+    let (mut open, mut ids) = (Vec::new(), Vec::new());
+    for part in html.split('<').skip(1) {
+        let Some((tag, _)) = part.split_once('>') else { panic!("`<{part}` has no end") };
+        let name = tag.split_whitespace().next().unwrap();
+        if let Some((_, id)) = tag.split_once(" id=\"") {
+            ids.push(id.split('"').next().unwrap());
+        }
+        match name.strip_prefix('/') {
+            Some(name) => assert_eq!(open.pop(), Some(name), "in {tag}"),
+            None if name.starts_with('!') || tag.ends_with('/') || ["meta", "link", "br"].contains(&name) => {}
+            None => open.push(name),
+        }
+    }
+    assert!(open.is_empty(), "{open:?} are not closed");
+    let mut distinct = ids.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    assert_eq!(distinct.len(), ids.len(), "anchors of the same name");
+    for anchor in html.split("href=\"#").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+        assert!(ids.contains(&anchor), "{anchor} leads nowhere");
+    }
+    let local = html.replace("http://www.w3.org/2000/svg", "");
+    for outside in ["http:", "https:", "<script", "@import", "url(", "src="] {
+        assert!(!local.contains(outside), "{outside}");
+    }
+    assert!(!html.contains("NaN") && !html.contains(">inf<"));
+    html
+}
+
+/// Scenarios of the generator, as lines of a scenario file.
+fn scenarios(dir: &Path) -> Vec<String> {
+    lanesweep(dir, &["synth", "recordings", "--synth-recordings", "2", "--synth-duration", "240"]);
+    lanesweep(dir, &["mine", "recordings", "-o", "all.jsonl"]);
+    let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
+    let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();
+    assert!(kept.len() > 20);
+    kept
+}
+
+fn study(dir: &Path, name: &str, lines: &[String]) -> (PathBuf, String) {
+    std::fs::write(dir.join("some.jsonl"), lines.join("\n") + "\n").unwrap();
+    lanesweep(dir, &["study", "--scenarios", "some.jsonl", "--backend", "cpu", "--out", name]);
+    let out = dir.join(name);
+    let html = page(&out);
+    (out, html)
+}
+
+#[test]
+fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
+    let dir = tempfile::tempdir().unwrap();
+    lanesweep(dir.path(), &["study", "--synth-recordings", "2", "--published", "--backend", "cpu", "--out", "s"]);
+    let out = dir.path().join("s");
+    let html = page(&out);
+    for said in
+        ["SYNTHETIC DATA", "Failed simulations of S", "published", "Pareto", "SHA-256 of the plan", "seed", "Claims"]
+    {
+        assert!(said == "Pareto" || html.contains(said), "{said}");
+    }
+    for figure in ["radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"] {
+        for category in ["cut-in", "cut-out", "lvd"] {
+            let name = format!("{figure}-{category}.svg");
+            assert!(html.contains(&format!("<code>{name}</code>")), "{name}");
+        }
+    }
+    let files: Vec<&str> = html.split("<code>").skip(1).map(|rest| rest.split('<').next().unwrap()).collect();
+    assert!(files.len() >= 36);
+    for file in files {
+        assert!(std::fs::metadata(out.join(file)).unwrap().len() > 0, "{file}");
+    }
+    assert_eq!(html.matches("<svg").count(), 18);
+}
+
+#[test]
+fn little_data_makes_a_readable_page_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let all = scenarios(dir.path());
+    let of = |category: &str| -> Vec<String> {
+        all.iter().filter(|line| line.contains(&format!("\"category\":\"{category}\""))).cloned().collect()
+    };
+    // One scenario: too few for a decomposition; nothing of the other categories.
+    let one = of("cut_in")[..1].to_vec();
+    let (out, html) = study(dir.path(), "one", &one);
+    assert!(html.contains("cut-in: agreement") && !html.contains("LVD: agreement"));
+    assert!(!out.join("modes-cut-in.svg").exists() && out.join("parameters-cut-in.svg").exists());
+    // Where nothing fails F1 is undefined, and said to be.
+    assert!(html.contains("<td>–</td>"), "an undefined F1 has a dash");
+    // None of one category.
+    let mut two = of("cut_in");
+    two.extend(of("lvd"));
+    let (out, html) = study(dir.path(), "two", &two);
+    assert!(html.contains("LVD: agreement") && !html.contains("cut-out: agreement"));
+    assert!(!out.join("radar-cut-out.svg").exists());
+}
+
+#[test]
+fn sampling_runs_maps_and_comparisons_have_their_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let fit = ["fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2", "--no-comparison"];
+    lanesweep(dir, &[&fit[..], &["--out", "d"]].concat());
+    let sample = ["sample", "d/cut-in-2.json", "--backend", "cpu", "--samples", "3000"];
+    lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());
+    let html = page(&dir.join("mc"));
+    for said in ["convergence.svg", "headways.csv", "map-FSM.svg", "SHA-256 of the density", "verdict"] {
+        assert!(html.contains(said), "{said}");
+    }
+    let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--pilot", "1000", "--out", "is"];
+    lanesweep(dir, &[&sample[..], &is].concat());
+    assert!(page(&dir.join("is")).contains("effective sample size"));
+    // The page of an earlier run does not stay beside the results of a later one.
+    lanesweep(dir, &[&sample[..], &["--thw", "1", "--out", "mc"]].concat());
+    assert!(!dir.join("mc/headways.csv").exists());
+    let map = ["map", "cut-in", "--x", "gap_m=5..60/5", "--y", "lateral_speed_mps=0.2..1.8/0.4", "--set"];
+    lanesweep(dir, &[&map[..], &["ego_speed_kmh=90", "--set", "other_speed_kmh=50", "--out", "map"]].concat());
+    assert!(page(&dir.join("map")).contains("Share of cells"));
+}
