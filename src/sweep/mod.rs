@@ -16,6 +16,7 @@ mod lane;
 mod lane_case;
 mod lane_step;
 mod outcome;
+mod packed_counts;
 mod partial;
 mod plan;
 mod plan_file;

@@ -74,6 +74,7 @@ pub struct UnitCounts {
     /// Unit, counted over all blocks.
     pub unit: u64,
     /// One per variant × model × criterion.
+    #[serde(with = "super::packed_counts")]
     pub cells: Vec<Confusion>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u32>,
