@@ -14,6 +14,8 @@ mod lists;
 mod map;
 mod merge;
 mod mine;
+#[cfg(test)]
+mod plan_mutations;
 mod rerun;
 mod sample;
 mod sample_adaptive;

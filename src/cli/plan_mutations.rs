@@ -1,0 +1,116 @@
+//! Plan files that were changed and sealed again: an error or a plan that can be used, never a panic. The readers of
+//! the library have the same test, with more inputs, in `tests/mutated_inputs.rs`.
+
+use std::path::Path;
+
+use serde_json::value::RawValue;
+
+use super::sample_plan::{self, PlannedSample, SampleFacts};
+use super::study_plan::{self, PlannedStudy};
+use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
+use crate::criterion::Criterion;
+use crate::density::{DataFacts, DensityModel, FitOptions};
+use crate::driver::ModelId;
+use crate::mining::{MiningOptions, mine_generated};
+use crate::parameterization::{ParameterizationId, ParameterizationOptions};
+use crate::parts::seal;
+use crate::profile::Profile;
+use crate::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
+use crate::scenario::Category;
+use crate::score::ScoreOptions;
+use crate::sweep::{Headway, StudyOptions, plan_study};
+use crate::trajectory::generator::GeneratorOptions;
+use crate::{Error, Result};
+
+#[path = "../../tests/mutated_inputs/mutate.rs"]
+mod mutate;
+
+/// Changed files of each kind.
+const INPUTS: u64 = 1500;
+
+#[test]
+fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
+    let generator = GeneratorOptions { recordings: 2, duration_s: 240.0, ..GeneratorOptions::default() };
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let profile = Profile::load("paper").unwrap();
+    let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
+    let id = ParameterizationId::find(Category::CutIn, "2").unwrap();
+    let density = DensityModel::fit(id, &scenarios, &facts, &options).unwrap().model;
+    let headway = Headway::ThwS(0.6);
+    let plan_options = SamplePlanOptions {
+        samples: 1000,
+        seed: 1,
+        source: SampleSource::Random,
+        models: ModelId::ALL.to_vec(),
+        headways: SampleHeadways::Each(vec![headway]),
+    };
+    let map = MapAxes::of(&density, "v_ego_mps", "v_target_mps").unwrap();
+    let crude = SampleFacts { map: Some(map), worst: 3, ..SampleFacts::new(&plan_options, &profile, &[]) };
+    let crude = PlannedSample::new(density.clone(), crude).unwrap().facts;
+    let proposal = density.mixture().unwrap();
+    let weighted = WeightedFacts {
+        density: String::new(),
+        proposal: String::new(),
+        defence: 0.1,
+        profile: profile.clone(),
+        models: ModelId::ALL.to_vec(),
+        headway: Some(headway),
+        criterion: Criterion::Collision,
+        samples: 1000,
+        seed: 1,
+        level: 0.95,
+    };
+    let weighted = PlannedWeighted::new(density, proposal, weighted).unwrap().facts;
+    let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
+    let study = PlannedStudy {
+        plan: plan_study(&few, &profile, &StudyOptions::default()).unwrap().plan,
+        facts: study_plan::StudyFacts {
+            data: "synthetic".into(),
+            synthetic: true,
+            published: false,
+            reference: false,
+            incomplete: false,
+            scenario_file_sha256: None,
+            recordings: Vec::new(),
+            left_out: Vec::new(),
+            categories: Vec::new(),
+            mining: MiningOptions::default(),
+            parameterization: ParameterizationOptions::default(),
+            score: ScoreOptions::default(),
+        },
+    };
+    let text = |facts: serde_json::Result<String>| facts.unwrap();
+    let crude = text(serde_json::to_string(&crude));
+    try_all(sample_plan::KIND, &crude, &|path| PlannedSample::read(path).map(drop));
+    let weighted = text(serde_json::to_string(&weighted));
+    try_all(weighted_plan::KIND, &weighted, &|path| PlannedWeighted::read(path).map(drop));
+    let study: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
+    try_all(study_plan::KIND, &study["content"].to_string(), &|path| PlannedStudy::read(path).map(drop));
+}
+
+/// Content as it is and changed, each with a checksum that fits.
+fn try_all(kind: &str, content: &str, read: &dyn Fn(&Path) -> Result<()>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("plan.json");
+    let read_sealed = |content: &str| {
+        let content: Box<RawValue> = serde_json::from_str(content).ok()?;
+        std::fs::write(&path, seal(kind, &content).unwrap().0).unwrap();
+        Some(read(&path))
+    };
+    let seeds = [content.as_bytes().to_vec()];
+    let (mut accepted, mut refused) = (0, 0);
+    for input in 0..INPUTS {
+        let changed = mutate::mutated(&mut mutate::Dice(input), &seeds, &seeds);
+        match std::str::from_utf8(&changed).ok().and_then(read_sealed) {
+            Some(Ok(())) => accepted += 1,
+            Some(Err(error)) => {
+                assert!(!matches!(error, Error::Internal(_)), "input {input} of {kind}: {error}");
+                refused += 1;
+            }
+            // No JSON: the seal itself would be broken.
+            None => {}
+        }
+    }
+    assert!(accepted + refused > INPUTS / 4, "{kind}: {accepted} accepted, {refused} refused");
+}
