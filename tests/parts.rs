@@ -133,8 +133,10 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
         assert!(out.is_empty(), "{out}");
     };
     std::fs::create_dir(dir.join("empty")).unwrap();
-    refused(&["merge", "empty"], 6, &["plan.json"]);
-    refused(&["merge", "nowhere"], 6, &["plan.json"]);
+    refused(&["merge", "empty"], 3, &["plan.json is missing"]);
+    refused(&["merge", "nowhere"], 3, &["no such folder"]);
+    std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
+    refused(&["merge", "empty"], 3, &["a run in one piece"]);
     let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
     shard("0/3", "p");
     shard("2/3", "p");

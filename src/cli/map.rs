@@ -98,6 +98,18 @@ impl Map {
         let criterion = criterion(&self.criterion)?;
         let profile = self.profile()?;
         let against = self.against.as_deref().map(|text| against(text, self.dt)).transpose()?;
+        let is_itself = match &against {
+            Some(Against::Profile(other)) => **other == profile,
+            Some(Against::Model(model)) => matches!(&lists::models(&self.models)?[..], [one] if one == model),
+            None => false,
+        };
+        if is_itself {
+            let problem = format!(
+                "`{}` is what is run anyway: there is nothing to compare",
+                self.against.as_deref().unwrap_or("")
+            );
+            return Err(Error::usage(Place::item("--against"), problem, "name another model or profile"));
+        }
         let started = Instant::now();
         let mut planned = Vec::new();
         for preset in self.grids(category, &profile)? {

@@ -11,6 +11,7 @@ use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
 use crate::lock::FolderLock;
 use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
+use crate::report::files::check_folder;
 use crate::report::run_record::Timings;
 use crate::sweep::{Partial, SweepSummary};
 use crate::{Error, Place, Result};
@@ -30,8 +31,31 @@ pub struct Merge {
 }
 
 impl Merge {
+    /// Why there is nothing to merge.
+    fn no_parts(&self) -> Error {
+        let has = |name: &str| self.dir.join(name).exists();
+        let names = || std::fs::read_dir(&self.dir).into_iter().flatten().flatten().map(|entry| entry.file_name());
+        let (problem, help) = if !self.dir.is_dir() {
+            ("there is no such folder", "check the path for typing errors")
+        } else if has("run.json") || has("estimate.json") {
+            ("there is nothing to merge: this is the result of a run in one piece", "give the folder of a run in parts")
+        } else if names().any(|name| name.to_string_lossy().ends_with(".journal")) {
+            (
+                "there is nothing to merge: a run in one piece was interrupted here",
+                "run its command again: it continues",
+            )
+        } else {
+            ("there is nothing to merge: plan.json is missing", "give the folder that the parts were written to")
+        };
+        Error::input(Place::file(&self.dir), problem, help)
+    }
+
     pub fn run(&self) -> Result<Exit> {
         let plan = self.dir.join(PLAN_FILE);
+        check_folder(&self.dir)?;
+        if !plan.exists() {
+            return Err(self.no_parts());
+        }
         let kind = kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?;
         let _lock = FolderLock::acquire(&self.dir.join("run.lock"))?;
         crate::atomic_file::clear_stale(&self.dir, is_result);

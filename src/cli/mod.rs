@@ -25,6 +25,7 @@ mod sample_lanes;
 mod sample_plan;
 mod sample_weighted;
 mod shard_flags;
+mod shell;
 mod simulate;
 mod simulate_lanes;
 mod slurm;
@@ -104,6 +105,8 @@ enum Verb {
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
     Devices(devices::Devices),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 /// Profile flags of every verb that simulates.
@@ -189,6 +192,8 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(cli.common.verbosity()),
         Verb::Devices(verb) => verb.run(),
+        Verb::Completions(verb) => verb.run(),
+        Verb::Man(verb) => verb.run(),
     }
 }
 

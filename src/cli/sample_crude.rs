@@ -19,6 +19,9 @@ use crate::sampling::{
 use crate::sweep::{ONE_IN, Recheck};
 use crate::{Error, Place, Result, interrupt};
 
+/// A condition that so few scenarios are near is outside the data.
+const FEW_SCENARIOS: f64 = 5.0;
+
 /// Samples what was planned: the whole run, or a shard of it.
 pub(super) fn run(
     flags: &Sample,
@@ -44,7 +47,13 @@ pub(super) fn run(
     if !planned.facts.given.is_empty() {
         let left = conditional(&planned.density, &planned.facts.given)?.effective_scenarios;
         let of = planned.density.kde.points().len();
-        tracing::info!("{left:.1} of {of} scenarios are near the given values");
+        if left < FEW_SCENARIOS {
+            tracing::warn!(
+                "only {left:.1} of {of} scenarios are near the given values: what follows is the kernels', not data"
+            );
+        } else {
+            tracing::info!("{left:.1} of {of} scenarios are near the given values");
+        }
     }
     let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: plan.unit_count() };
     if desk.is_done::<SampleTally>()? {

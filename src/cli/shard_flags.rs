@@ -138,6 +138,9 @@ impl Desk<'_> {
             Some(stem) => name.strip_suffix(".json") == Some(stem),
             None => is_result(name),
         });
+        if let Some(stem) = &stem {
+            self.warn_of_another_split(stem);
+        }
         let units = self.units();
         let mut ledger = Ledger::new(units.clone(), cuts);
         if is_journalled {
@@ -150,6 +153,23 @@ impl Desk<'_> {
             }
         }
         Ok(Work { units, ledger, lock })
+    }
+
+    /// Parts of two splits double one another: better said before the work than by the merge.
+    fn warn_of_another_split(&self, stem: &str) {
+        let split = |name: &str| name.strip_prefix("part-")?.split_once("-of-").map(|(_, count)| count.to_owned());
+        let Some(ours) = split(stem) else { return };
+        let names = std::fs::read_dir(self.out).into_iter().flatten().flatten();
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        let other = |name: &String| {
+            let stem = name.strip_suffix(".json").unwrap_or("");
+            split(stem).is_some_and(|count| count != ours)
+        };
+        if let Some(name) = names.into_iter().find(other) {
+            tracing::warn!(
+                "{name} in this folder is of a run cut into another number of shards: they cannot be merged"
+            );
+        }
     }
 
     /// Writes the part and takes its journal away.

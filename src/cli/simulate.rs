@@ -91,7 +91,7 @@ impl Simulate {
             return Err(Error::usage(
                 Place::item("--lane"),
                 "the lane is a whole case: the other flags would not be heeded",
-                "leave the case's flags out, or --scenarios and --lane",
+                "leave the case's flags out, or --lane with its --scenarios or --from",
             ));
         }
         let asked = Asked { key, models: self.case.named_models()?, compare: &self.compare };
@@ -136,7 +136,7 @@ impl Simulate {
         let Some(plot) = &self.plot else { return Ok(()) };
         if let Some(until) = self.until.filter(|until| !(*until > 0.0 && *until < 1e9)) {
             let problem = format!("{until} s is no end of a time axis");
-            return Err(Error::usage(Place::item("--until"), problem, "give seconds above 0"));
+            return Err(Error::usage(Place::item("--until"), problem, "give seconds above 0 and below 10^9"));
         }
         if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
             let problem = format!("{} is no name of an SVG file", plot.display());

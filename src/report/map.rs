@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::files::{make_folder, write_atomically, write_atomically_with};
-use super::html::{Page, PageFigure, Section};
+use super::html::PageFigure;
 use super::map_sheet::{Kind, MapSheet};
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};
@@ -183,63 +183,17 @@ impl MapReport {
             written.push(path);
         }
         let path = dir.join("map.json");
-        write_atomically(&path, &self.json()?)?;
+        let names: Vec<String> = written.iter().map(|path| file_of(path)).collect();
+        for stale in earlier_files(&path).into_iter().filter(|name| !names.contains(name)) {
+            let stale = dir.join(stale);
+            match std::fs::remove_file(&stale) {
+                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(Error::io(stale, "remove", e)),
+                _ => {}
+            }
+        }
+        write_atomically(&path, &self.json(names)?)?;
         written.push(path);
         Ok(written)
-    }
-
-    /// The run as one page.
-    fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
-        let profile = serde_json::to_string_pretty(&self.profile)
-            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
-        let shares = Section {
-            id: "shares".to_owned(),
-            title: "Shares".to_owned(),
-            intro: "Known shares are those of the JRC's evidence.".to_owned(),
-            text: self.text(),
-            ..Section::default()
-        };
-        let sheets = Section { id: "maps".to_owned(), title: "Maps".to_owned(), figures, ..Section::default() };
-        let hashes = self.grids.iter().flat_map(|mapped| {
-            let parts = mapped.plan.parts.iter();
-            parts.map(|part| {
-                (format!("SHA-256 of the plan of {}", mapped.plan.grid.name()), part.plan.hash().to_owned())
-            })
-        });
-        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
-        host.extend(
-            self.host
-                .device
-                .iter()
-                .map(|device| ("device".to_owned(), format!("{} ({}, {})", device.name, device.api, device.driver))),
-        );
-        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
-        let reproduction = Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
-            intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
-                .to_owned(),
-            facts: [("program".to_owned(), program.clone()), ("profile".to_owned(), self.profile.name.clone())]
-                .into_iter()
-                .chain(hashes)
-                .collect(),
-            host,
-            details: vec![("Profile".to_owned(), profile)],
-            ..Section::default()
-        };
-        let page = Page {
-            title: "Outcomes over a grid".to_owned(),
-            program,
-            lead: format!(
-                "{} simulations: {} over a grid of parameters, profile {}.",
-                self.simulations(),
-                self.criterion.label(),
-                self.profile.name
-            ),
-            warnings: Vec::new(),
-            sections: vec![shares, sheets, reproduction],
-        };
-        page.html()
     }
 
     fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {
@@ -324,7 +278,7 @@ impl MapReport {
         out.flush()
     }
 
-    fn json(&self) -> Result<Vec<u8>> {
+    fn json(&self, files: Vec<String>) -> Result<Vec<u8>> {
         let record = MapRecord {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             preset: self.preset.as_deref(),
@@ -337,6 +291,7 @@ impl MapReport {
                 Some(Against::Profile(profile)) => Some(profile),
                 _ => None,
             },
+            files,
             host: &self.host,
         };
         let mut text = serde_json::to_vec_pretty(&record)
@@ -344,6 +299,22 @@ impl MapReport {
         text.push(b'\n');
         Ok(text)
     }
+}
+
+/// What an earlier run left beside its record: sheets and tables by their names alone, so that nothing outside the
+/// folder is meant. A record that cannot be read names nothing.
+fn earlier_files(record: &Path) -> Vec<String> {
+    #[derive(serde::Deserialize)]
+    struct Earlier {
+        files: Vec<String>,
+    }
+    let text = crate::input_file::read(record, 64 << 20).unwrap_or_default();
+    let earlier: Earlier = serde_json::from_slice(&text).unwrap_or(Earlier { files: Vec::new() });
+    let is_ours = |name: &String| {
+        let is_name = Path::new(name).file_name().is_some_and(|file| file == name.as_str());
+        is_name && (name.ends_with(".svg") || name.ends_with(".csv"))
+    };
+    earlier.files.into_iter().filter(is_ours).collect()
 }
 
 /// `map.json`.
@@ -357,6 +328,8 @@ struct MapRecord<'a> {
     grids: Vec<GridRecord<'a>>,
     profile: &'a Profile,
     other_profile: Option<&'a Profile>,
+    /// Beside this one.
+    files: Vec<String>,
     host: &'a MapHost,
 }
 

@@ -6,15 +6,14 @@ use serde::Serialize;
 
 use super::run_record::DeviceRecord;
 use super::tables::{aligned, table};
-use crate::criterion::Criterion;
 use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
 use crate::profile::Profile;
-use crate::sampling::{BootstrapRecord, Checkpoint, EstimateRow, RiskRate, SampleTally, WorstSample};
+use crate::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::sweep::generated::ATTEMPTS;
-use crate::sweep::{Headway, LanePlan, Outcome};
+use crate::sweep::{Headway, LanePlan};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -350,82 +349,6 @@ impl EstimateFile {
         }
         aligned(rows, 2)
     }
-
-    /// `estimates.csv`.
-    ///
-    /// # Errors
-    /// None for what this program made.
-    pub fn csv(&self) -> Result<Vec<u8>> {
-        let header = [
-            "category",
-            "parameterization",
-            "estimator",
-            "model",
-            "criterion",
-            "headway",
-            "runs",
-            "failures",
-            "probability",
-            "low",
-            "high",
-            "level",
-            "interval",
-            "relative_half_width",
-            "coefficient_of_variation",
-            "variance_reduction",
-            "ess",
-            "ess_failures",
-            "largest_weight_share",
-            "mean_weight",
-            "risk_per_hour",
-            "risk_per_hour_sd",
-            "risk_per_hour_low",
-            "risk_per_hour_high",
-            "risk_per_1000_km",
-            "risk_per_1000_km_sd",
-            "risk_per_1000_km_low",
-            "risk_per_1000_km_high",
-            "verdict",
-            "data",
-        ];
-        let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for row in &self.estimates {
-            let e = &row.estimate;
-            let weight = |f: fn(&crate::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
-            let rate = |r: Option<RiskRate>| {
-                [r.map(|r| r.estimate), r.map(|r| r.standard_deviation), r.map(|r| r.low), r.map(|r| r.high)]
-            };
-            let mut fields = vec![
-                self.density.category.to_owned(),
-                self.density.parameterization.clone(),
-                self.estimator.to_owned(),
-                row.model.name().to_owned(),
-                row.criterion.key().to_owned(),
-                row.headway.clone(),
-                e.runs.to_string(),
-                e.failures.to_string(),
-            ];
-            let numbers = [Some(e.probability), Some(e.interval.low), Some(e.interval.high), Some(e.interval.level)];
-            fields.extend(numbers.map(number));
-            fields.push(kind_name(e.interval.kind).to_owned());
-            let numbers = [
-                Some(e.relative_half_width),
-                Some(e.coefficient_of_variation),
-                Some(e.variance_reduction),
-                weight(|w| w.effective_size),
-                weight(|w| w.effective_size_failures),
-                weight(|w| w.largest_share_failures),
-                weight(|w| w.mean_weight),
-            ];
-            fields.extend(numbers.map(number));
-            fields.extend(rate(row.risk.per_hour).map(number));
-            fields.extend(rate(row.risk.per_1000_km).map(number));
-            fields.push(e.trust.verdict().to_string());
-            fields.push(self.density.provenance.data.clone());
-            rows.push(fields);
-        }
-        super::csv::text(rows)
-    }
 }
 
 impl EstimateRow {
@@ -433,93 +356,6 @@ impl EstimateRow {
     pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
-}
-
-/// `convergence.csv`.
-///
-/// # Errors
-/// None for what this program made.
-pub fn convergence_csv(checkpoints: &[Checkpoint]) -> Result<Vec<u8>> {
-    let mut rows = vec![["samples", "model", "criterion", "probability", "low", "high"].map(str::to_owned).to_vec()];
-    for checkpoint in checkpoints {
-        for row in &checkpoint.rows {
-            rows.push(vec![
-                checkpoint.samples.to_string(),
-                row.model.name().to_owned(),
-                row.criterion.key().to_owned(),
-                row.probability.to_string(),
-                row.interval[0].to_string(),
-                row.interval[1].to_string(),
-            ]);
-        }
-    }
-    super::csv::text(rows)
-}
-
-/// One of the worst lanes, with what it was.
-pub struct WorstRow<'a> {
-    /// Place among the model's worst, from 1.
-    pub rank: usize,
-    /// The lane and its limit state.
-    pub lane: WorstSample,
-    /// Its key.
-    pub key: String,
-    /// Its sample index.
-    pub sample: u64,
-    /// Driver model.
-    pub model: ModelId,
-    /// Headway, s, where it is one of the plan's or a parameter.
-    pub headway: String,
-    /// Its point.
-    pub point: Vec<f64>,
-    /// Its outcome.
-    pub outcome: &'a Outcome<f64>,
-}
-
-/// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
-///
-/// # Errors
-/// None for what this program made.
-pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> Result<Vec<u8>> {
-    let mut header: Vec<String> =
-        ["model", "rank", "lane", "sample", "headway", "criterion", "limit_state"].map(str::to_owned).to_vec();
-    header.extend(
-        [
-            "collision",
-            "ttc",
-            "btn",
-            "min_ttc_s",
-            "max_btn",
-            "min_gap_m",
-            "impact_speed_mps",
-            "impact_closing_speed_mps",
-        ]
-        .map(str::to_owned),
-    );
-    header.extend(parameters.iter().cloned());
-    let mut table = vec![header];
-    for row in rows {
-        let o = row.outcome;
-        let mut fields = vec![
-            row.model.name().to_owned(),
-            row.rank.to_string(),
-            row.key.clone(),
-            row.sample.to_string(),
-            row.headway.clone(),
-            criterion.key().to_owned(),
-            row.lane.value.to_string(),
-        ];
-        fields.extend(Criterion::ALL.map(|c| u8::from(o.verdicts.failed(c)).to_string()));
-        let values = [o.min_ttc, o.max_btn, o.min_gap, o.impact_speed, o.impact_closing_speed];
-        fields.extend(values.map(|v| number(Some(v))));
-        fields.extend(row.point.iter().map(f64::to_string));
-        table.push(fields);
-    }
-    super::csv::text(table)
-}
-
-fn number(value: Option<f64>) -> String {
-    value.filter(|v| v.is_finite()).map_or(String::new(), |v| v.to_string())
 }
 
 /// The data's share of the uncertainty.
@@ -565,14 +401,4 @@ pub(super) fn rate_text(rate: Option<RiskRate>) -> String {
             format!("≤ {}", short(r.high))
         }
     })
-}
-
-fn kind_name(kind: IntervalKind) -> &'static str {
-    match kind {
-        IntervalKind::Wilson => "wilson",
-        IntervalKind::ClopperPearson => "clopper_pearson",
-        IntervalKind::RuleOfThree => "rule_of_three",
-        IntervalKind::LogStudent => "log_student",
-        IntervalKind::Nothing => "nothing",
-    }
 }

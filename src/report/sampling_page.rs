@@ -202,7 +202,9 @@ impl EstimateFile {
             "checked".to_owned(),
             format!("{} lanes of a device computed again on the CPU", self.host.rechecked_lanes),
         ));
-        host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
+        if self.host.seconds > 0.0 {
+            host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
+        }
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         Ok(Section {

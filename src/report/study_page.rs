@@ -2,6 +2,7 @@
 
 use super::html::{Page, PageFigure, PageTable, Section};
 use super::reference::ReferenceComparison;
+use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
 use crate::criterion::Criterion;
@@ -235,13 +236,12 @@ impl StudyReport {
             },
         ));
         let seconds = &run.timings;
-        host.push((
-            "seconds".to_owned(),
-            format!(
-                "mining {:.2}, planning {:.2}, lanes {:.2}, scores {:.2}",
-                seconds.mine_s, seconds.plan_s, seconds.sweep_s, seconds.score_s
-            ),
-        ));
+        // Parts that were merged have times of their own, which nobody has added up.
+        if seconds.sweep_s > 0.0 {
+            let Timings { mine_s, plan_s, sweep_s, score_s } = seconds;
+            let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
+            host.push(("seconds".to_owned(), text));
+        }
         let record =
             String::from_utf8(run.to_json()?).map_err(|e| Error::Internal(format!("run.json is no text: {e}")))?;
         let value: serde_json::Value =

@@ -264,8 +264,10 @@ impl LanePlan {
         let [model, headway, variant, unit] = parts[..] else { return None };
         let model = ModelId::parse(model)?;
         let model = self.models.iter().position(|m| *m == model)?;
-        let headway = Headway::parse(headway)?;
-        let headway = self.headways.iter().position(|h| *h == headway)?;
+        // As it is written first: a random plan's gap may be negative, which nobody may ask for.
+        let written = self.headways.iter().position(|h| h.to_string() == headway);
+        let meant = || Headway::parse(headway).and_then(|meant| self.headways.iter().position(|h| *h == meant));
+        let headway = written.or_else(meant)?;
         self.blocks.iter().enumerate().find_map(|(at, block)| {
             let unit = block.units.find(unit)?;
             let variant = block.variants.iter().position(|v| v == variant)?;

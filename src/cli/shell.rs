@@ -1,0 +1,67 @@
+//! `lanesweep completions` and `lanesweep man`: what a shell and `man` need to know, from the command's own definition.
+
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use super::{Cli, Exit, console};
+use crate::report::files::{make_folder, write_atomically};
+use crate::{Error, Result};
+
+/// Print the completions for a shell
+///
+/// Where a shell looks for them differs: bash reads files in ~/.local/share/bash-completion/completions, fish in
+/// ~/.config/fish/completions, zsh in a folder of its $fpath (there the file is called _lanesweep).
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep completions bash")]
+pub struct Completions {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    shell: Shell,
+}
+
+impl Completions {
+    pub fn run(&self) -> Result<Exit> {
+        let mut text = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "lanesweep", &mut text);
+        let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
+        console::print(&text)?;
+        Ok(Exit::Ok)
+    }
+}
+
+/// Write the manual pages into a folder
+///
+/// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, …
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep man man1")]
+pub struct Man {
+    /// Folder of the pages
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+}
+
+impl Man {
+    pub fn run(&self) -> Result<Exit> {
+        make_folder(&self.dir)?;
+        let mut program = Cli::command();
+        // Global flags and versions reach the verbs.
+        program.build();
+        let verbs: Vec<clap::Command> = program.get_subcommands().filter(|verb| !verb.is_hide_set()).cloned().collect();
+        let pages = std::iter::once(("lanesweep".to_owned(), program)).chain(verbs.into_iter().map(|verb| {
+            let name = format!("lanesweep-{}", verb.get_name());
+            (name, verb)
+        }));
+        let mut written = 0;
+        for (name, command) in pages {
+            let mut page = Vec::new();
+            let unwritten = |e: std::io::Error| Error::Internal(format!("a manual page cannot be made: {e}"));
+            clap_mangen::Man::new(command).render(&mut page).map_err(unwritten)?;
+            write_atomically(&self.dir.join(format!("{name}.1")), &page)?;
+            written += 1;
+        }
+        tracing::info!("{written} pages written to {}", self.dir.display());
+        Ok(Exit::Ok)
+    }
+}

@@ -1,0 +1,65 @@
+//! A run of `map` as one page.
+
+use super::html::{Page, PageFigure, Section};
+use super::map::MapReport;
+use crate::{Error, Result};
+
+impl MapReport {
+    /// The run as one page.
+    pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+        let profile = serde_json::to_string_pretty(&self.profile)
+            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
+        let shares = Section {
+            id: "shares".to_owned(),
+            title: "Shares".to_owned(),
+            intro: if self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some)) {
+                "Known shares are those of the JRC's evidence.".to_owned()
+            } else {
+                String::new()
+            },
+            text: self.text(),
+            ..Section::default()
+        };
+        let sheets = Section { id: "maps".to_owned(), title: "Maps".to_owned(), figures, ..Section::default() };
+        let hashes = self.grids.iter().flat_map(|mapped| {
+            let parts = mapped.plan.parts.iter();
+            parts.map(|part| {
+                (format!("SHA-256 of the plan of {}", mapped.plan.grid.name()), part.plan.hash().to_owned())
+            })
+        });
+        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
+        host.extend(
+            self.host
+                .device
+                .iter()
+                .map(|device| ("device".to_owned(), format!("{} ({}, {})", device.name, device.api, device.driver))),
+        );
+        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
+        let reproduction = Section {
+            id: "reproduction".to_owned(),
+            title: "Reproduction".to_owned(),
+            intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
+                .to_owned(),
+            facts: [("program".to_owned(), program.clone()), ("profile".to_owned(), self.profile.name.clone())]
+                .into_iter()
+                .chain(hashes)
+                .collect(),
+            host,
+            details: vec![("Profile".to_owned(), profile)],
+            ..Section::default()
+        };
+        let page = Page {
+            title: "Outcomes over a grid".to_owned(),
+            program,
+            lead: format!(
+                "{} simulations: {} over a grid of parameters, profile {}.",
+                self.simulations(),
+                self.criterion.label(),
+                self.profile.name
+            ),
+            warnings: Vec::new(),
+            sections: vec![shares, sheets, reproduction],
+        };
+        page.html()
+    }
+}

@@ -1,0 +1,81 @@
+//! Completions and manual pages: for every shell and every verb, and a reader that goes away is no error.
+#![cfg(unix)]
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+fn lanesweep(dir: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lanesweep")).current_dir(dir).args(args).output().unwrap()
+}
+
+fn text(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// The verbs as the program's own help lists them.
+fn verbs(dir: &Path) -> Vec<String> {
+    let help = text(&lanesweep(dir, &["--help"]));
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let verbs = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let verbs: Vec<String> = verbs.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect();
+    assert!(verbs.len() >= 14, "{help}");
+    verbs
+}
+
+#[test]
+fn completions_of_every_shell_know_every_verb_and_bash_can_read_its_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let verbs = verbs(dir.path());
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = text(&lanesweep(dir.path(), &["completions", shell]));
+        for verb in verbs.iter().filter(|verb| *verb != "help") {
+            assert!(script.contains(verb.as_str()), "{shell}: {verb}");
+        }
+        if shell == "bash" {
+            let path = dir.path().join("completions");
+            std::fs::write(&path, script).unwrap();
+            assert!(Command::new("bash").arg("-n").arg(&path).status().unwrap().success());
+        }
+    }
+    assert_eq!(lanesweep(dir.path(), &["completions", "tcsh"]).status.code(), Some(2));
+}
+
+#[test]
+fn every_verb_has_a_manual_page() {
+    let dir = tempfile::tempdir().unwrap();
+    text(&lanesweep(dir.path(), &["man", "man1"]));
+    for verb in verbs(dir.path()).iter().filter(|verb| *verb != "help") {
+        let page = std::fs::read_to_string(dir.path().join(format!("man1/lanesweep-{verb}.1"))).unwrap();
+        assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS") && page.contains(".SH OPTIONS"), "{verb}");
+        assert!(page.contains("Example"), "{verb} has no example");
+    }
+    assert!(dir.path().join("man1/lanesweep.1").exists());
+}
+
+#[test]
+fn the_help_of_every_verb_says_what_it_is_for_and_ends_with_an_example() {
+    let dir = tempfile::tempdir().unwrap();
+    for verb in verbs(dir.path()).iter().filter(|verb| *verb != "help") {
+        let help = text(&lanesweep(dir.path(), &[verb, "--help"]));
+        assert!(help.lines().next().is_some_and(|line| line.len() > 15), "{verb}: {help}");
+        let (_, examples) = help.split_once("\nExample").unwrap_or_else(|| panic!("{verb} ends with no example"));
+        assert!(examples.contains(&format!("lanesweep {verb}")), "{verb}: {examples}");
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let dir = tempfile::tempdir().unwrap();
+    for args in [&["--help"][..], &["completions", "zsh"], &["study", "--synth-recordings", "1", "--backend", "cpu"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+        let mut child =
+            command.current_dir(dir.path()).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let mut said = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{args:?}: {said}");
+        assert!(!said.contains("panicked"), "{said}");
+    }
+}
