@@ -67,11 +67,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
         } else if name == "report.html" {
             // All but what tells of the machine.
             let page = |folder: &str| String::from_utf8(read(folder)).unwrap();
-            let parts = ["cpu", "device"].map(|folder| {
-                let page = page(folder);
-                let (before, rest) = page.split_once("<!-- host -->").unwrap();
-                [before, rest.split_once("<!-- end of host -->").unwrap().1].concat()
-            });
+            let parts = ["cpu", "device"].map(|folder| common::page::without_host(&page(folder)));
             assert!(parts[0] == parts[1] && page("device").contains("exact path"));
         } else {
             assert!(read("cpu") == read("device"), "{}", name.display());

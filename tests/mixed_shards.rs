@@ -28,8 +28,7 @@ fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
         }
         if name == "report.html" {
             let page = String::from_utf8(std::mem::take(content)).unwrap();
-            let (before, rest) = page.split_once("<!-- host -->").unwrap();
-            *content = [before, rest.split_once("<!-- end of host -->").unwrap().1].concat().into_bytes();
+            *content = common::page::without_host(&page).into_bytes();
         }
     }
     files.sort();

@@ -28,12 +28,7 @@ impl MapReport {
             })
         });
         let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
-        host.extend(
-            self.host
-                .device
-                .iter()
-                .map(|device| ("device".to_owned(), format!("{} ({}, {})", device.name, device.api, device.driver))),
-        );
+        host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
         let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
         let reproduction = Section {
             id: "reproduction".to_owned(),

@@ -59,6 +59,15 @@ pub struct DeviceRecord {
     pub exact_path: bool,
 }
 
+impl DeviceRecord {
+    /// In one line, as pages show it.
+    pub(super) fn line(&self) -> String {
+        let path = if self.exact_path { "exact path" } else { "plain path" };
+        let at = self.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
+        format!("{} ({}, {}{at}, {path})", self.name, self.api, self.driver)
+    }
+}
+
 /// How the sweep went.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepRecord {

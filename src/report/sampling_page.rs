@@ -194,10 +194,7 @@ impl EstimateFile {
             facts.push(("draws".to_owned(), text));
         }
         let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
-        host.extend(self.host.device.iter().map(|device| {
-            let path = if device.exact_path { "exact path" } else { "plain path" };
-            ("device".to_owned(), format!("{} ({}, {}, {path})", device.name, device.api, device.driver))
-        }));
+        host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
         host.push((
             "checked".to_owned(),
             format!("{} lanes of a device computed again on the CPU", self.host.rechecked_lanes),

@@ -9,7 +9,7 @@ use crate::criterion::Criterion;
 use crate::mining::RecordingSummary;
 use crate::parameterization::{Kind, ParameterizationId};
 use crate::scenario::Category;
-use crate::score::{CategoryScores, ClaimVerdict, f1, precision, published_failures, published_lvd_f1, recall};
+use crate::score::{CategoryScores, ClaimVerdict, precision, recall};
 use crate::{Error, Result};
 
 /// Recordings that are listed; the rest are in `run.json`.
@@ -98,24 +98,9 @@ impl StudyReport {
     fn failures(&self) -> Section {
         let mut header = vec!["scenario", "model", "collision", "TTC", "BTN", "simulations", "at the time cap"];
         if self.published {
-            header.push("published: collision, TTC, BTN (of)");
+            header.push("published (of)");
         }
-        let mut rows = Vec::new();
-        for scores in &self.scores.categories {
-            for (at, &model) in scores.models.iter().enumerate() {
-                let count = |c: Criterion| scores.index(0, model, c).map_or(0, |i| scores.cells[i].counts.both);
-                let mut row = vec![scores.category.label().to_owned(), model.name().to_owned()];
-                row.extend(Criterion::ALL.map(|c| count(c).to_string()));
-                row.extend([scores.simulations.to_string(), scores.capped[at].to_string()]);
-                if self.published {
-                    let theirs = Criterion::ALL.map(|c| published_failures(scores.category, model, c));
-                    let counts: Vec<String> = theirs.iter().flatten().map(|p| p.failures.to_string()).collect();
-                    let of = theirs.iter().flatten().next().map(|p| p.simulations);
-                    row.push(of.map_or("–".to_owned(), |of| format!("{} ({of})", counts.join(", "))));
-                }
-                rows.push(row);
-            }
-        }
+        let rows = tables::failure_rows(&self.scores, self.published);
         Section {
             id: "failures".to_owned(),
             title: "Failures of the recorded scenarios".to_owned(),
@@ -139,7 +124,7 @@ impl StudyReport {
             title: format!("{}: agreement of S' with S", scores.category.label()),
             intro: format!(
                 "{} scenarios, {} simulations per model and parameterization. F1 joins recall (share of the recorded \
-                 failures that S' shows) and precision (share of the failures of S' that were recorded); – is \
+                 failures that S' shows) and precision (share of the failures of S' that were recorded); - is \
                  undefined, because neither side fails.",
                 scores.scenarios, scores.simulations
             ),
@@ -152,24 +137,7 @@ impl StudyReport {
     fn f1_table(&self, scores: &CategoryScores) -> PageTable {
         let mut header = vec!["model".to_owned(), "criterion".to_owned(), "S fails".to_owned()];
         header.extend(scores.variants.iter().skip(1).cloned());
-        let mut rows = Vec::new();
-        for &model in &scores.models {
-            for criterion in Criterion::ALL {
-                let Some(s) = scores.index(0, model, criterion) else { continue };
-                let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
-                row.push(scores.cells[s].counts.both.to_string());
-                for variant in 1..scores.variants.len() {
-                    let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
-                    let mut text = cell.map_or("–".to_owned(), |c| tables::value(f1(&c.counts), c.f1_interval));
-                    let theirs = published_lvd_f1(&scores.variants[variant], model, criterion);
-                    if let Some(theirs) = theirs.filter(|_| self.published) {
-                        text.push_str(&format!("\npaper {theirs:.3}"));
-                    }
-                    row.push(text.replace("-", "–"));
-                }
-                rows.push(row);
-            }
-        }
+        let rows = tables::f1_rows(scores, self.published);
         let level = 100.0 * self.scores.options.confidence;
         PageTable { caption: format!("F1 with its {level} % bootstrap interval"), header, texts: 2, rows }
     }
@@ -177,7 +145,7 @@ impl StudyReport {
     fn claims(&self) -> Section {
         let row = |result: &crate::score::ClaimResult| {
             let overall = &result.overall;
-            let difference = overall.value.map_or("–".to_owned(), |value| format!("{value:+.3}"));
+            let difference = overall.value.map_or("-".to_owned(), |value| format!("{value:+.3}"));
             let interval = overall.interval.map_or(String::new(), |i| format!("\n[{:+.3} {:+.3}]", i.low, i.high));
             let count = |verdict: ClaimVerdict| result.rows.iter().filter(|row| row.verdict == verdict).count();
             let all = [
@@ -223,11 +191,7 @@ impl StudyReport {
             run.scenario_file_sha256.iter().map(|sha| ("SHA-256 of the scenario file".to_owned(), sha.clone())),
         );
         let mut host = vec![("computed by".to_owned(), run.backend.clone())];
-        host.extend(run.device.iter().map(|device| {
-            let exact = if device.exact_path { "exact path" } else { "plain path" };
-            let at = device.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
-            ("device".to_owned(), format!("{} ({}, {}{at}, {exact})", device.name, device.api, device.driver))
-        }));
+        host.extend(run.device.iter().map(|device| ("device".to_owned(), device.line())));
         host.push((
             "checked".to_owned(),
             match run.sweep.rechecked_lanes {
@@ -268,7 +232,7 @@ impl StudyReport {
 fn shares_table(scores: &CategoryScores) -> PageTable {
     let mut header = vec!["model".to_owned(), "criterion".to_owned()];
     header.extend(scores.variants.iter().skip(1).cloned());
-    let share = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
+    let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
     let mut rows = Vec::new();
     for &model in &scores.models {
         for criterion in Criterion::ALL {
@@ -276,7 +240,7 @@ fn shares_table(scores: &CategoryScores) -> PageTable {
             for variant in 1..scores.variants.len() {
                 let counts = scores.index(variant, model, criterion).map(|i| scores.cells[i].counts);
                 let both = |c| format!("{} / {}", share(recall(&c)), share(precision(&c)));
-                row.push(counts.map_or("–".to_owned(), both));
+                row.push(counts.map_or("-".to_owned(), both));
             }
             rows.push(row);
         }

@@ -37,6 +37,15 @@ pub fn failures(scores: &ScoreTable, published: bool) -> String {
         header.push("published (of)".to_owned());
     }
     let mut table = table(header);
+    for row in failure_rows(scores, published) {
+        table.add_row(row);
+    }
+    format!("Failures of the recorded scenarios (S)\n{}", aligned(table, 2))
+}
+
+/// The rows of [`failures`].
+pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
     for category in &scores.categories {
         for (at, &model) in category.models.iter().enumerate() {
             let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.both);
@@ -50,10 +59,10 @@ pub fn failures(scores: &ScoreTable, published: bool) -> String {
                 let of = counts.first().map(|p| format!("{} ({})", failures.join(" "), p.simulations));
                 row.push(of.unwrap_or_else(|| "-".to_owned()));
             }
-            table.add_row(row);
+            rows.push(row);
         }
     }
-    format!("Failures of the recorded scenarios (S)\n{}", aligned(table, 2))
+    rows
 }
 
 /// F1 per parameterization, model and criterion, with the bootstrap interval.
@@ -61,6 +70,20 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
     let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
     header.extend(scores.variants.iter().skip(1).cloned());
     let mut table = table(header);
+    for row in f1_rows(scores, published) {
+        table.add_row(row);
+    }
+    format!(
+        "{}: F1 of S' against S over {} scenarios, [bootstrap interval]; - is undefined (0/0)\n{}",
+        scores.category.label(),
+        scores.scenarios,
+        aligned(table, 2)
+    )
+}
+
+/// The rows of [`f1_table`].
+pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
     for &model in &scores.models {
         for criterion in Criterion::ALL {
             let Some(s) = scores.index(0, model, criterion) else { continue };
@@ -75,18 +98,13 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
                 }
                 row.push(text);
             }
-            table.add_row(row);
+            rows.push(row);
         }
     }
-    format!(
-        "{}: F1 of S' against S over {} scenarios, [bootstrap interval]; - is undefined (0/0)\n{}",
-        scores.category.label(),
-        scores.scenarios,
-        aligned(table, 2)
-    )
+    rows
 }
 
-pub(super) fn value(value: Option<f64>, interval: Option<Interval>) -> String {
+fn value(value: Option<f64>, interval: Option<Interval>) -> String {
     match (value, interval) {
         (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
         (Some(value), None) => format!("{value:.3}"),

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 pub mod device;
 pub mod lane_sets;
+pub mod page;
 pub mod small;
 
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
