@@ -42,7 +42,7 @@ fn a_machine_without_any_driver_is_told_what_to_install() {
         assert!(text.contains(part), "{part}: {text}");
     }
     let mut json = without_drivers(&home);
-    json.arg("--json");
+    json.args(["--format", "json"]);
     let seen: serde_json::Value = serde_json::from_str(&stdout(json)).unwrap();
     assert_eq!((&seen["devices"], &seen["auto"]), (&serde_json::json!([]), &serde_json::Value::Null));
 }
@@ -67,7 +67,7 @@ fn json_is_all_that_is_on_stdout_and_agrees_with_the_library() {
     let Some((adapters, _)) = software_device() else { return };
     let home = tempfile::tempdir().unwrap();
     let mut json = devices(&home);
-    json.arg("--json");
+    json.args(["--format", "json"]);
     let seen: serde_json::Value = serde_json::from_str(&stdout(json)).unwrap();
     let listed = seen["devices"].as_array().unwrap();
     assert_eq!(listed.len(), adapters.cards().len());

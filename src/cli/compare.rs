@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::source::{self, Source};
 use super::study::StudyConfig;
 use super::study_run::{How, run_plan};
@@ -82,6 +83,8 @@ pub struct Compare {
     /// Study options (TOML): tables `mining`, `parameterization`, `score`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    #[command(flatten)]
+    format: FormatFlag,
     #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
@@ -246,8 +249,8 @@ impl Compare {
             }
         }
         write_atomically(&self.out.join("report.html"), file.html(figures)?.as_bytes())?;
-        write_atomically(&self.out.join("compare.json"), &file.to_json()?)?;
-        console::print(&text)?;
+        write_atomically(&self.out.join("compare.json"), file.json()?.as_bytes())?;
+        self.format.print(|| text, || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(())
     }

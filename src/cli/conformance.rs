@@ -6,9 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::{Table as TextTable, presets};
 
-use super::{Exit, console};
-use crate::conformance::{Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
+use super::Exit;
+use super::format::FormatFlag;
+use crate::conformance::{LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
 use crate::profile::Profile;
+use crate::report::records;
 use crate::scenario::read_scenarios;
 use crate::{Error, Place, Result};
 
@@ -29,6 +31,8 @@ pub struct Conformance {
     /// Lanes of the paper profile (CSV)
     #[arg(long, value_name = "FILE", requires = "scenarios")]
     lanes: Option<PathBuf>,
+    #[command(flatten)]
+    format: FormatFlag,
 }
 
 impl Conformance {
@@ -50,26 +54,28 @@ impl Conformance {
             });
         }
         let mut text = String::new();
+        let mut compared = None;
         if let (Some(scenarios), Some(lanes)) = (&self.scenarios, &self.lanes) {
-            let compared = compare_lanes(&read_scenarios(scenarios)?, &Table::read(lanes)?, &Profile::load("paper")?)?;
+            let mut seen = compare_lanes(&read_scenarios(scenarios)?, &Table::read(lanes)?, &Profile::load("paper")?)?;
             let _ = writeln!(
                 text,
                 "{} lanes of profile paper in f64 and f32: {} verdicts differ between the two; {} ties (rounding \
                  decides; equal once the gap moves by 1e-9 m); the end time differs in {} (information).",
-                compared.lanes,
-                compared.f32_different.len(),
-                compared.ties.len(),
-                compared.end_differs
+                seen.lanes,
+                seen.f32_different.len(),
+                seen.ties.len(),
+                seen.end_differs
             );
-            for lane in compared.ties.iter().map(|l| format!("  tie: {l}\n")) {
+            for lane in seen.ties.iter().map(|l| format!("  tie: {l}\n")) {
                 text += &lane;
             }
-            for lane in compared.f32_different.iter().map(|l| format!("  f32 differs: {l}\n")) {
+            for lane in seen.f32_different.iter().map(|l| format!("  f32 differs: {l}\n")) {
                 text += &lane;
             }
-            tallies.extend(compared.tallies);
+            tallies.append(&mut seen.tallies);
+            compared = Some(seen);
         }
-        console::print(&(render(&tallies) + &text))?;
+        self.format.print(|| render(&tallies) + &text, || document(&tallies, compared.as_ref()))?;
         let failed: Vec<&Tally> = tallies.iter().filter(|t| !t.passes()).collect();
         if failed.is_empty() {
             return Ok(Exit::Ok);
@@ -78,6 +84,41 @@ impl Conformance {
         let list: String = complaints.map(|c| format!("\n  {c}")).collect();
         Err(Error::Verification(format!("{} of {} groups do not agree:{list}", failed.len(), tallies.len())))
     }
+}
+
+/// What [`render`] tells, as JSON.
+fn document(tallies: &[Tally], compared: Option<&LaneComparison>) -> Result<String> {
+    let groups = tallies.iter().map(|t| {
+        let deviations = t.deviations.iter().map(|d| {
+            serde_json::json!({
+                "quantity": d.quantity, "compared": d.compared, "largest": d.largest, "place": d.place,
+            })
+        });
+        serde_json::json!({
+            "what": t.label,
+            "model": t.model.map(|m| m.name()),
+            "rows": t.rows,
+            "robust": t.robust,
+            "reacted": t.reacted,
+            "collided": t.collided,
+            "labels_equal": t.labels_equal,
+            "types_equal": t.types_equal,
+            "fragile_different": t.fragile_different,
+            "passes": t.passes(),
+            "deviations": deviations.collect::<Vec<_>>(),
+            "complaints": t.complaints,
+        })
+    });
+    let lanes = compared.map(|c| {
+        serde_json::json!({
+            "lanes": c.lanes, "f32_different": c.f32_different, "ties": c.ties, "end_differs": c.end_differs,
+        })
+    });
+    records::document(&serde_json::json!({
+        "passes": tallies.iter().all(Tally::passes),
+        "groups": groups.collect::<Vec<_>>(),
+        "lanes": lanes,
+    }))
 }
 
 fn render(tallies: &[Tally]) -> String {

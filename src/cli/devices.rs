@@ -5,7 +5,8 @@ use std::fmt::Write;
 use clap::Args;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, presets};
 
-use super::{Exit, console};
+use super::Exit;
+use super::format::FormatFlag;
 use crate::gpu::{AdapterCard, Adapters, BackendChoice, GpuBackend, GpuOptions, choose, visible_here};
 use crate::report::tables::{WIDTH, wrap};
 use crate::verify::self_check;
@@ -16,11 +17,10 @@ use crate::{Error, Result};
 /// Every device of every driver, with its limits, and the one that `--backend auto` takes. CUDA_VISIBLE_DEVICES
 /// and Slurm's GPU list are honoured.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep devices --json")]
+#[command(after_help = "Example:\n  lanesweep devices --format json")]
 pub struct Devices {
-    /// Write JSON instead of a table
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    format: FormatFlag,
     /// Leave out the self-check, which opens every device
     #[arg(long)]
     no_self_check: bool,
@@ -31,7 +31,7 @@ impl Devices {
         let adapters = Adapters::enumerate();
         let seen = Seen::new(adapters.cards(), visible_here());
         let self_check = |index: usize| if self.no_self_check { "-".to_owned() } else { check(&adapters, index) };
-        console::print(&if self.json { seen.json(&self_check)? } else { seen.text(&self_check) })?;
+        self.format.print(|| seen.text(&self_check), || seen.json(&self_check))?;
         // The list helps to correct the environment, so it comes first.
         seen.visible.map(|_| Exit::Ok)
     }

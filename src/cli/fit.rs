@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::Exit;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, Source};
 use super::study::StudyConfig;
@@ -17,6 +18,7 @@ use crate::mining::Collection;
 use crate::parameterization::ParameterizationId;
 use crate::report::density;
 use crate::report::files::{check_folder_of, make_folder};
+use crate::report::records;
 use crate::scenario::write_scenarios_to;
 use crate::{Error, Place, Result, input_file};
 
@@ -71,6 +73,8 @@ pub struct Fit {
     /// Study options (TOML): tables `mining`, `parameterization`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    #[command(flatten)]
+    format: FormatFlag,
     #[command(flatten)]
     generator: GeneratorFlags,
 }
@@ -151,7 +155,7 @@ impl Fit {
             tracing::warn!("{error}; {}", error.help().unwrap_or_default());
         }
         self.write(&fitted)?;
-        console::print(&text(&facts, &fitted))?;
+        self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
         tracing::info!("{} density files written to {}", fitted.len(), self.out.display());
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
@@ -243,6 +247,21 @@ fn text(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> String {
         text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
     }
     text
+}
+
+fn document(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> Result<String> {
+    let densities = fitted.iter().map(|(path, model)| {
+        let mut record = density::record(model);
+        record["file"] = path.display().to_string().into();
+        record
+    });
+    records::document(&serde_json::json!({
+        "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        "data": facts.data,
+        "synthetic": facts.synthetic,
+        "driven": facts.driven,
+        "densities": densities.collect::<Vec<_>>(),
+    }))
 }
 
 /// A writer that keeps nothing but a checksum.

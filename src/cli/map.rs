@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::{Exit, lists};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
@@ -68,6 +69,8 @@ pub struct Map {
     /// Time step, s [default: the profile's]
     #[arg(long, value_name = "SECONDS")]
     dt: Option<f64>,
+    #[command(flatten)]
+    format: FormatFlag,
     #[command(flatten)]
     backend: BackendFlags,
     /// Compute in binary64 on the CPU: the reference of the lane arithmetic
@@ -162,7 +165,9 @@ impl Map {
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
         let written = report.write(&self.out)?;
-        console::print(&report.text())?;
+        let name =
+            |path: &PathBuf| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        self.format.print(|| report.text(), || report.json(written.iter().map(name).collect()))?;
         let (count, seconds, host) = (report.simulations(), report.host.sweep_s, &report.host.backend);
         tracing::info!("{count} simulations in {seconds:.3} s on {host}");
         tracing::info!("{} files written to {}", written.len(), self.out.display());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::Exit;
+use super::format::FormatFlag;
 use super::shard_flags::{PLAN_FILE, is_result};
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
@@ -28,6 +29,8 @@ pub struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR")]
     dir: PathBuf,
+    #[command(flatten)]
+    format: FormatFlag,
 }
 
 impl Merge {
@@ -60,9 +63,9 @@ impl Merge {
         let _lock = FolderLock::acquire(&self.dir.join("run.lock"))?;
         crate::atomic_file::clear_stale(&self.dir, is_result);
         match kind.as_str() {
-            study_plan::KIND => merge_study(&self.dir, &plan),
-            sample_plan::KIND => sample_crude::merge(&self.dir, &plan),
-            weighted_plan::KIND => sample_weighted::merge(&self.dir, &plan),
+            study_plan::KIND => merge_study(&self.dir, &plan, self.format),
+            sample_plan::KIND => sample_crude::merge(&self.dir, &plan, self.format),
+            weighted_plan::KIND => sample_weighted::merge(&self.dir, &plan, self.format),
             other => {
                 let help = "give the folder (--out) of a run in parts";
                 Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
@@ -71,7 +74,7 @@ impl Merge {
     }
 }
 
-fn merge_study(dir: &Path, plan: &Path) -> Result<Exit> {
+fn merge_study(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let (study, run_sha256) = PlannedStudy::read(plan)?;
     let parts = read_parts::<Partial>(dir, plan, "study", &run_sha256, study.plan.unit_count())?;
     let mut swept = SweepSummary { lanes: study.plan.lane_count(), ..SweepSummary::default() };
@@ -87,7 +90,7 @@ fn merge_study(dir: &Path, plan: &Path) -> Result<Exit> {
         return Err(Error::input(Place::file(dir), problem, "make them again"));
     }
     let host = Host { backend: format!("{count} parts merged"), device: None, swept, timings: Timings::default() };
-    finish_study(&study, &partial, None, host, dir)
+    finish_study(&study, &partial, None, host, dir, format)
 }
 
 /// All parts of a folder, checked: of this run, whole, together everything exactly once.

@@ -10,6 +10,7 @@ mod devices;
 mod environment;
 mod exit;
 mod fit;
+mod format;
 mod lists;
 mod map;
 mod merge;

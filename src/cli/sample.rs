@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 
 use super::backend_flags::{BackendFlags, Opened};
-use super::console::{self, Verbosity};
+use super::console::Verbosity;
+use super::format::FormatFlag;
 use super::lists;
 use super::sample_checks;
 use super::sample_crude;
@@ -122,6 +123,8 @@ pub struct Sample {
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
     #[command(flatten)]
+    pub(super) format: FormatFlag,
+    #[command(flatten)]
     pub(super) shards: ShardFlags,
     #[command(flatten)]
     backend: BackendFlags,
@@ -216,7 +219,7 @@ impl Sample {
         // A proposal in this folder may be an input: it is read and written on the way.
         sample_lanes::clear(&self.out, &["proposal-"])?;
         sample_lanes::write_estimates(&self.out, &run.density, &file, Vec::new())?;
-        console::print(&file.text())?;
+        self.format.print(|| file.text(), || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(Exit::Ok)
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::Exit;
 use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::merge::read_parts;
 use super::sample::Sample;
 use super::sample_lanes;
@@ -38,7 +39,7 @@ pub(super) fn run(
     }
     if flags.shards.plan_only {
         let path = out.join(PLAN_FILE);
-        console::print(&format!("{} lanes planned in {}\n", plan.lane_count(), path.display()))?;
+        flags.format.print_plan(plan.lane_count(), &path)?;
         return Ok(Exit::Ok);
     }
     if planned.facts.sobol {
@@ -103,13 +104,13 @@ pub(super) fn run(
         seconds: started.elapsed().as_secs_f64(),
         threads: rayon::current_num_threads(),
     };
-    write_run(planned, crude, record, host, out)?;
+    write_run(planned, crude, record, host, out, flags.format)?;
     work.forget()?;
     Ok(Exit::Ok)
 }
 
 /// Makes the result of the parts in a folder.
-pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
+pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let (planned, run_sha256) = PlannedSample::read(plan)?;
     let parts = read_parts::<SampleTally>(dir, plan, "sample", &run_sha256, planned.plan.unit_count())?;
     let host = HostRecord {
@@ -126,7 +127,7 @@ pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
         let problem = "the parts do not hold every sample that their names stand for";
         return Err(Error::input(Place::file(dir), problem, "make them again"));
     }
-    write_run(&planned, crude, None, host, dir)?;
+    write_run(&planned, crude, None, host, dir, format)?;
     Ok(Exit::Ok)
 }
 
@@ -137,6 +138,7 @@ fn write_run(
     bootstrap: Option<BootstrapRecord>,
     host: HostRecord,
     out: &Path,
+    format: FormatFlag,
 ) -> Result<()> {
     let figures = sample_lanes::write(out, &planned.plan, &planned.density, &crude, &planned.counting())?;
     let mut file = EstimateFile::new(&planned.density, planned.run_facts(), crude.rows, host)?;
@@ -144,7 +146,7 @@ fn write_run(
     file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
     file.bootstrap = bootstrap;
     sample_lanes::write_estimates(out, &planned.density, &file, figures)?;
-    console::print(&file.text())?;
+    format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(())
 }

@@ -168,5 +168,5 @@ pub(super) fn write_estimates(
     }
     write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
     write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
-    write_atomically(&out.join("estimate.json"), &file.to_json()?)
+    write_atomically(&out.join("estimate.json"), file.json()?.as_bytes())
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::Exit;
 use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::merge::read_parts;
 use super::sample::Sample;
 use super::sample_lanes;
@@ -37,7 +38,7 @@ pub(super) fn run(
     }
     if flags.shards.plan_only {
         let lanes = samples.saturating_mul(planned.facts.models.len() as u64);
-        console::print(&format!("{lanes} lanes planned in {}\n", out.join(PLAN_FILE).display()))?;
+        flags.format.print_plan(lanes, &out.join(PLAN_FILE))?;
         return Ok(Exit::Ok);
     }
     let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: samples };
@@ -67,7 +68,7 @@ pub(super) fn run(
         threads: rayon::current_num_threads(),
     };
     let tally = work.ledger.counts(0..samples)?;
-    write_run(planned, tally, host, out)?;
+    write_run(planned, tally, host, out, flags.format)?;
     work.forget()?;
     Ok(Exit::Ok)
 }
@@ -108,7 +109,7 @@ fn sample(
 }
 
 /// Makes the result of the parts in a folder.
-pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
+pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let (planned, run_sha256) = PlannedWeighted::read(plan)?;
     let parts = read_parts::<WeightedTally>(dir, plan, "sample", &run_sha256, planned.facts.samples)?;
     let host = HostRecord {
@@ -121,12 +122,18 @@ pub(super) fn merge(dir: &Path, plan: &Path) -> Result<Exit> {
     let mut segments = parts.into_iter().flat_map(|part| part.segments);
     let first = segments.next();
     let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
-    write_run(&planned, tally, host, dir)?;
+    write_run(&planned, tally, host, dir, format)?;
     Ok(Exit::Ok)
 }
 
 /// Table, density, the record; the record comes last.
-fn write_run(planned: &PlannedWeighted, tally: Option<WeightedTally>, host: HostRecord, out: &Path) -> Result<()> {
+fn write_run(
+    planned: &PlannedWeighted,
+    tally: Option<WeightedTally>,
+    host: HostRecord,
+    out: &Path,
+    format: FormatFlag,
+) -> Result<()> {
     let (facts, density) = (&planned.facts, &planned.density);
     let tally = tally.filter(|tally| {
         let models: Vec<ModelId> = tally.sums.iter().map(|(model, _)| *model).collect();
@@ -148,7 +155,7 @@ fn write_run(planned: &PlannedWeighted, tally: Option<WeightedTally>, host: Host
     // A proposal in this folder may be the one that was given.
     sample_lanes::clear(out, &["proposal-"])?;
     sample_lanes::write_estimates(out, density, &file, Vec::new())?;
-    console::print(&file.text())?;
+    format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(())
 }

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::case_flags::{CaseFlags, from_csv, from_toml};
+use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
 use super::source::refuse_overwriting;
-use super::{Exit, ProfileFlags, console};
+use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::report::files::{make_folder, write_atomically};
+use crate::report::records;
 use crate::report::trace_figure::{TraceFigure, TraceSeries};
 use crate::report::trace_table;
 use crate::scenario::Tables;
@@ -63,6 +65,8 @@ pub struct Simulate {
     #[arg(long, value_name = "SECONDS", requires = "plot")]
     until: Option<f64>,
     #[command(flatten)]
+    format: FormatFlag,
+    #[command(flatten)]
     profile: ProfileFlags,
 }
 
@@ -78,7 +82,7 @@ impl Simulate {
             }
             write_atomically(path, figure(&lanes, self.until).svg().as_bytes())?;
         }
-        console::print(&trace_table::csv(&named))?;
+        self.format.print(|| trace_table::csv(&named), || document(&lanes, &named))?;
         for lane in &lanes.traced {
             eprint!("{}", summary(lane, lanes.traced.len() > 1));
         }
@@ -171,6 +175,28 @@ fn figure(lanes: &Lanes, until_s: Option<f64>) -> TraceFigure<'_> {
     let synthetic = if lanes.synthetic && !lanes.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
     let series = lanes.traced.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
     TraceFigure { title, subtitle: Some(format!("{synthetic}{}", lanes.origin)), series, until_s }
+}
+
+/// Outcomes and series as one document.
+fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
+    let outcomes = lanes.traced.iter().map(|lane| {
+        let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
+        serde_json::json!({
+            "lane": lane.key,
+            "category": lane.trace.category.key(),
+            "model": lane.trace.model.name(),
+            "initial_gap_m": lane.trace.initial_gap_m,
+            "outcome": records::outcome(&lane.trace.outcome, lane.trace.dt_s),
+            "reference": reference,
+        })
+    });
+    records::document(&serde_json::json!({
+        "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        "data": lanes.origin,
+        "synthetic": lanes.synthetic,
+        "lanes": outcomes.collect::<Vec<_>>(),
+        "steps": trace_table::records(named)?,
+    }))
 }
 
 /// How a lane ended, in words.

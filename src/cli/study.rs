@@ -7,7 +7,8 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 
 use super::backend_flags::{BackendFlags, Opened};
-use super::console::{self, Verbosity};
+use super::console::Verbosity;
+use super::format::FormatFlag;
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
 use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
@@ -74,6 +75,8 @@ pub struct Study {
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
+    #[command(flatten)]
+    format: FormatFlag,
     #[command(flatten)]
     shards: ShardFlags,
     #[command(flatten)]
@@ -152,7 +155,7 @@ impl Study {
             if self.shards.plan_only {
                 let path = self.out.join(PLAN_FILE);
                 let lanes = study.plan.lane_count();
-                console::print(&format!("{} lanes planned in {}\n", lanes, path.display()))?;
+                self.format.print_plan(lanes, &path)?;
                 return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
             }
             return self.sweep(&study, &opened, run_sha256, timings, verbosity);
@@ -254,7 +257,7 @@ impl Study {
             timings,
         };
         self.leave_plan(study)?;
-        let exit = finish_study(study, &partial, comparison, host, &self.out)?;
+        let exit = finish_study(study, &partial, comparison, host, &self.out, self.format)?;
         work.forget()?;
         Ok(exit)
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Exit;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::shard_flags::Work;
 use super::study_plan::PlannedStudy;
 use crate::report::files::make_folder;
@@ -113,6 +114,7 @@ pub(super) fn finish_study(
     comparison: Option<ReferenceComparison>,
     mut host: Host,
     out: &Path,
+    format: FormatFlag,
 ) -> Result<Exit> {
     let (plan, facts) = (&study.plan, study.facts.clone());
     let started = std::time::Instant::now();
@@ -154,7 +156,7 @@ pub(super) fn finish_study(
     let pictures = study.facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
     let report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
     let written = report.write(out)?;
-    console::print(&report.text())?;
+    format.print(|| report.text(), || report.json())?;
     tracing::info!("{} files written to {}", written.len(), out.display());
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
 }

@@ -6,12 +6,13 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
+use super::format::FormatFlag;
 use super::source::{self, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::MiningOptions;
 use crate::profile::Profile;
-use crate::report::verification;
+use crate::report::{records, verification};
 use crate::scenario::Category;
 use crate::sweep::{Backend, LanePlan, LaneRunner, StudyOptions, Wanted, plan_study};
 use crate::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
@@ -47,6 +48,8 @@ pub struct Verify {
     #[arg(long, value_name = "KEY")]
     lane: Option<String>,
     #[command(flatten)]
+    format: FormatFlag,
+    #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
@@ -74,21 +77,39 @@ impl Verify {
             return self.one_lane(key, &profile, tested, verbosity);
         }
         let head = format!("Under test: {}\nProfile {}, seed {}\n", tested.describe(), profile.name, self.seed);
-        console::print(&head)?;
+        let is_text = !self.format.is_json();
+        if is_text {
+            console::print(&head)?;
+        }
+        let mut sets = Vec::new();
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
         for (name, plan) in self.sets(&profile, verbosity)? {
             let bar = console::progress(verbosity, plan.lane_count(), name);
             let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
             bar.finish_and_clear();
             // Set by set: a device that fails later takes nothing back.
-            console::print(&format!("\n{}", verification::comparison(&comparison)))?;
+            if is_text {
+                console::print(&format!("\n{}", verification::comparison(&comparison)))?;
+            }
+            sets.push(verification::record(&comparison));
             equal &= comparison.is_equal();
             lanes += comparison.lanes();
             differing += comparison.differing();
         }
         let found =
             if equal { "every word equals the CPU's".to_owned() } else { format!("{differing} DIFFER from the CPU's") };
-        console::print(&format!("\n{lanes} lanes, all computed by what is under test itself: {found}.\n"))?;
+        let text = || format!("\n{lanes} lanes, all computed by what is under test itself: {found}.\n");
+        self.format.print(text, || {
+            records::document(&serde_json::json!({
+                "under_test": tested.describe(),
+                "profile": profile.name,
+                "seed": self.seed,
+                "equal": equal,
+                "lanes": lanes,
+                "differing": differing,
+                "sets": sets,
+            }))
+        })?;
         if equal {
             Ok(Exit::Ok)
         } else {
@@ -156,15 +177,20 @@ impl Verify {
         let cpu = LaneRunner::<f32>::new(&plan).run(&key).widen();
         let theirs = chunk.outcomes[at];
         let names = ["f64 reference", "CPU, f32", "under test"];
-        console::print(&format!(
-            "Under test: {}\n{}",
-            tested.describe(),
-            verification::lane(text, names, &[reference, cpu, theirs])
-        ))?;
-        if crate::sweep::same_words(&cpu, &theirs) {
-            Ok(Exit::Ok)
-        } else {
-            Err(Error::Verification(format!("lane {text} differs from the CPU's")))
-        }
+        let is_equal = crate::sweep::same_words(&cpu, &theirs);
+        let outcomes = [reference, cpu, theirs];
+        self.format.print(
+            || format!("Under test: {}\n{}", tested.describe(), verification::lane(text, names, &outcomes)),
+            || {
+                let [reference, cpu, theirs] = outcomes.map(|o| records::outcome(&o, plan.profile.frame.dt_s));
+                records::document(&serde_json::json!({
+                    "under_test": tested.describe(),
+                    "lane": text,
+                    "equal": is_equal,
+                    "outcomes": {"reference": reference, "cpu": cpu, "under_test": theirs},
+                }))
+            },
+        )?;
+        if is_equal { Ok(Exit::Ok) } else { Err(Error::Verification(format!("lane {text} differs from the CPU's"))) }
     }
 }

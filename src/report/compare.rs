@@ -59,11 +59,9 @@ impl CompareFile {
     ///
     /// # Errors
     /// None for what this program made.
-    pub fn to_json(&self) -> Result<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self)
-            .map_err(|e| Error::Internal(format!("a comparison cannot be written: {e}")))?;
-        text.push(b'\n');
-        Ok(text)
+    pub fn json(&self) -> Result<String> {
+        let text = serde_json::to_string_pretty(self);
+        text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("a comparison cannot be written: {e}")))
     }
 
     /// `compare.csv`: one row per category, parameterization, model and criterion.

@@ -57,6 +57,38 @@ pub fn text(model: &DensityModel) -> String {
     text
 }
 
+/// The same as [`text`], as JSON; what is not known is null.
+pub fn record(model: &DensityModel) -> serde_json::Value {
+    let id = model.space.id();
+    let provenance = &model.provenance;
+    let parameters = model.space.parameters().iter().enumerate().map(|(j, parameter)| {
+        let values: Vec<f64> = model.kde.points().iter().map(|p| p[j]).collect();
+        serde_json::json!({
+            "name": parameter.name,
+            "unit": parameter.unit,
+            "mean": values.iter().sum::<f64>() / values.len() as f64,
+            "deviation": standard_deviation(&values),
+            "scale": model.kde.scale()[j],
+            "kernel": model.kde.spread()[j],
+            "valid": parameter.bounds_text(),
+        })
+    });
+    serde_json::json!({
+        "category": id.category.key(),
+        "parameterization": id.key,
+        "description": id.description,
+        "scenarios": model.kde.points().len(),
+        "found": provenance.found,
+        "kept": provenance.kept,
+        "left_out": provenance.left_out,
+        "parameters": parameters.collect::<Vec<_>>(),
+        "bandwidth": model.kde.bandwidth(),
+        "valid": model.valid,
+        "exposure": model.exposure,
+        "representativeness": model.representativeness,
+    })
+}
+
 const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";
 
 fn exposure(exposure: &Exposure) -> String {

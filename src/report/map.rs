@@ -191,7 +191,7 @@ impl MapReport {
                 _ => {}
             }
         }
-        write_atomically(&path, &self.json(names)?)?;
+        write_atomically(&path, self.json(names)?.as_bytes())?;
         written.push(path);
         Ok(written)
     }
@@ -278,7 +278,11 @@ impl MapReport {
         out.flush()
     }
 
-    fn json(&self, files: Vec<String>) -> Result<Vec<u8>> {
+    /// `map.json`: shares, differences and what makes them again; `files` stand beside it.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn json(&self, files: Vec<String>) -> Result<String> {
         let record = MapRecord {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             preset: self.preset.as_deref(),
@@ -286,6 +290,7 @@ impl MapReport {
             against: self.against.as_ref().map(|_| self.against_name()),
             simulations: self.simulations(),
             grids: self.grids.iter().map(|mapped| GridRecord::of(mapped, self.criterion)).collect(),
+            differences: self.differences().iter().map(DifferenceRecord::of).collect(),
             profile: &self.profile,
             other_profile: match &self.against {
                 Some(Against::Profile(profile)) => Some(profile),
@@ -294,10 +299,8 @@ impl MapReport {
             files,
             host: &self.host,
         };
-        let mut text = serde_json::to_vec_pretty(&record)
-            .map_err(|e| Error::Internal(format!("map.json cannot be written: {e}")))?;
-        text.push(b'\n');
-        Ok(text)
+        let text = serde_json::to_string_pretty(&record);
+        text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("map.json cannot be written: {e}")))
     }
 }
 
@@ -326,6 +329,7 @@ struct MapRecord<'a> {
     against: Option<String>,
     simulations: u64,
     grids: Vec<GridRecord<'a>>,
+    differences: Vec<DifferenceRecord>,
     profile: &'a Profile,
     other_profile: Option<&'a Profile>,
     /// Beside this one.
@@ -361,6 +365,36 @@ struct ShareRecord {
     failures: u64,
     share: f64,
     known_percent: Option<f64>,
+}
+
+/// Cells by how two agree.
+#[derive(Serialize)]
+struct DifferenceRecord {
+    map: String,
+    model: &'static str,
+    first: String,
+    second: String,
+    both_pass: u64,
+    both_fail: u64,
+    only_first_fails: u64,
+    only_second_fails: u64,
+}
+
+impl DifferenceRecord {
+    fn of(difference: &Difference) -> DifferenceRecord {
+        let [both_pass, both_fail, only_first_fails, only_second_fails] =
+            count(&difference.cells).map(|cells| cells as u64);
+        DifferenceRecord {
+            map: difference.grid.name().to_owned(),
+            model: difference.model.name(),
+            first: difference.first.clone(),
+            second: difference.second.clone(),
+            both_pass,
+            both_fail,
+            only_first_fails,
+            only_second_fails,
+        }
+    }
 }
 
 /// A plan: the same hash means the same lanes.

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::lanes::quoted;
+use crate::Result;
 use crate::sweep::{Mark, Trace, TracedStep, TracedVehicle};
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
@@ -34,6 +35,14 @@ pub fn csv(traces: &[(String, &Trace)]) -> String {
         }
     }
     text
+}
+
+/// The same rows as a list of objects.
+///
+/// # Errors
+/// None for what this program made.
+pub fn records(traces: &[(String, &Trace)]) -> Result<serde_json::Value> {
+    super::records::records(csv(traces).as_bytes())
 }
 
 fn write_step(text: &mut String, trace: &Trace, step: &TracedStep, vehicles: usize) {

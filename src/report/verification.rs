@@ -44,6 +44,35 @@ pub fn comparison(comparison: &Comparison) -> String {
     text
 }
 
+/// The same as [`comparison`], as JSON.
+pub fn record(comparison: &Comparison) -> serde_json::Value {
+    let tallies = comparison.tallies.iter().map(|tally| {
+        let mut record = serde_json::json!({
+            "category": tally.category.key(),
+            "model": tally.model.name(),
+            "lanes": tally.lanes,
+            "steps": tally.steps,
+            "lanes_differing": tally.lanes_differing,
+            "words_differing": tally.words_differing,
+            "verdicts_differing": tally.verdicts_differing,
+            "reference_differing": tally.reference_differing,
+        });
+        for criterion in Criterion::ALL {
+            record[format!("{}_failures", criterion.key())] = tally.failed[criterion.index()].into();
+        }
+        record
+    });
+    let worst = comparison.worst.iter().map(|lane| serde_json::json!({"lane": lane.key, "words": lane.names()}));
+    serde_json::json!({
+        "set": comparison.set,
+        "plan_sha256": comparison.plan_sha256,
+        "equal": comparison.is_equal(),
+        "modes_differing": comparison.modes_differing,
+        "tallies": tallies.collect::<Vec<_>>(),
+        "worst": worst.collect::<Vec<_>>(),
+    })
+}
+
 /// One lane's words on each backend, side by side.
 pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String {
     let mut rows = table(["word"].into_iter().chain(names).map(str::to_owned).collect());
