@@ -29,6 +29,10 @@ fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion
     if rule.kind == ATTENTION_VISIBLE_MOVEMENT && abs(start) - half_widths <= rule.threshold {
         return vec2<u32>(0u, 0u);
     }
+    let is_in_path = abs(start) <= half_widths;
+    if (rule.kind == ATTENTION_WANDERING) & (rule.with_ahead == 0u) & is_in_path {
+        return vec2<u32>(0u, 0u);
+    }
     var event = NEVER;
     var early = NEVER;
     var lateral_before = start;

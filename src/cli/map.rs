@@ -167,7 +167,7 @@ impl Map {
         let written = report.write(&self.out)?;
         let name =
             |path: &PathBuf| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        self.format.print(|| report.text(), || report.json(written.iter().map(name).collect()))?;
+        self.format.print(|| report.text(), || report.json(written.iter().map(name).filter(|name| name != "map.json").collect()))?;
         let (count, seconds, host) = (report.simulations(), report.host.sweep_s, &report.host.backend);
         tracing::info!("{count} simulations in {seconds:.3} s on {host}");
         tracing::info!("{} files written to {}", written.len(), self.out.display());

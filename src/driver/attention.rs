@@ -41,7 +41,7 @@ pub struct AttentionRule<R> {
     pub kind: u32,
     /// Steps from the event to the reaction.
     pub delay_steps: u32,
-    /// 1 where the driver waits as long with the vehicle ahead of the principal one.
+    /// 1 where the driver waits as long with the vehicle ahead of the principal one (cut-outs, leader decelerations).
     pub with_ahead: u32,
     /// Movement: the lateral gate, m. Wandering: the normal wandering, m. Deceleration: loss of speed in a step, m/s.
     pub threshold: R,
@@ -66,15 +66,16 @@ impl AttentionRule<f64> {
     }
 
     /// Once the deviation from the vehicle's own lane centre has been perceived (Annex 3): more than the wandering
-    /// for the perception time, or the perception travel beyond it.
-    pub fn after_wandering(rule: Perception, dt_s: f64) -> Self {
+    /// for the perception time, or the perception travel beyond it. In a cut-out the vehicle ahead is seen as late; in
+    /// a cut-in a vehicle that is in the ego's path from the start has nothing left to deviate and is seen at once.
+    pub fn after_wandering(rule: Perception, dt_s: f64, category: Category) -> Self {
         if rule.wandering_m <= 0.0 {
             return Self::always();
         }
         AttentionRule {
             kind: WANDERING,
             delay_steps: delay_steps(rule.time_s, dt_s),
-            with_ahead: 1,
+            with_ahead: u32::from(category == Category::CutOut),
             threshold: rule.wandering_m,
             travel: rule.wandering_m + rule.travel_m,
         }
@@ -132,6 +133,10 @@ impl<R: Real> AttentionRule<R> {
         if self.kind == VISIBLE_MOVEMENT && start.abs() - half_widths <= self.threshold {
             return [0; 2];
         }
+        let is_in_path = start.abs() <= half_widths;
+        if self.kind == WANDERING && self.with_ahead == 0 && is_in_path {
+            return [0; 2];
+        }
         let mut event = NEVER;
         let mut early = NEVER;
         let (mut lateral_before, mut speed_before) = (start, speed(0));
@@ -170,12 +175,21 @@ mod tests {
 
     #[test]
     fn wandering_is_perceived_after_its_time_or_its_travel() {
-        let rule = AttentionRule::after_wandering(PERCEPTION, 0.1);
+        let rule = AttentionRule::after_wandering(PERCEPTION, 0.1, Category::CutIn);
         // 0.375 m are exceeded at step 4 with 1 m/s, and 1.095 m only at step 11.
         assert_eq!(first(rule, |i| 3.5 - 0.1 * f64::from(i)), 4 + 4);
         // With 10 m/s the travel is made at step 2.
         assert_eq!(first(rule, |i| 3.5 - f64::from(i)), 2);
         assert_eq!(first(rule, |_| 3.5), NEVER);
+    }
+
+    /// Parameterizations 3, 4, c and d have the other vehicle in its final place from the start.
+    #[test]
+    fn a_vehicle_that_begins_in_the_path_is_seen_at_once_unless_it_is_to_leave_it() {
+        let rule = |category| AttentionRule::after_wandering(PERCEPTION, 0.1, category);
+        assert_eq!(rule(Category::CutIn).attend_from(100, 1.8, |_| 0.1, |_| 20.0), [0, 0]);
+        assert_eq!(rule(Category::CutIn).attend_from(100, 1.8, |_| 1.9, |_| 20.0), [NEVER, 0]);
+        assert_eq!(rule(Category::CutOut).attend_from(100, 1.8, |_| 0.1, |_| 20.0), [NEVER, NEVER]);
     }
 
     #[test]

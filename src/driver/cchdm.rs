@@ -94,7 +94,7 @@ impl DriverProfile for CchdmProfile {
         };
         match category {
             Category::Lvd => AttentionRule::after_deceleration(self.lead_deceleration_trigger_mps2, dt_s),
-            Category::CutIn | Category::CutOut => AttentionRule::after_wandering(perception, dt_s),
+            Category::CutIn | Category::CutOut => AttentionRule::after_wandering(perception, dt_s, category),
         }
     }
 

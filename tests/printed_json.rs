@@ -1,0 +1,136 @@
+//! `--format json` prints one document with the numbers that the tables and files have.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+fn lanesweep(dir: &Path, args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_lanesweep")).current_dir(dir).args(args).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {told}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(dir: &Path, args: &[&str]) -> Value {
+    let args: Vec<&str> = args.iter().chain(&["--format", "json"]).copied().collect();
+    serde_json::from_str(&lanesweep(dir, &args)).unwrap()
+}
+
+/// Every field of a CSV table stands in the rows, and nothing else does.
+fn same_numbers(rows: &Value, csv: &Path) {
+    let mut reader = csv::Reader::from_path(csv).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let rows = rows.as_array().unwrap();
+    let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), records.len(), "{}", csv.display());
+    for (row, record) in rows.iter().zip(&records) {
+        for (name, field) in header.iter().zip(record).filter(|(name, _)| *name != "data") {
+            let same = match &row[name] {
+                Value::Null => field.is_empty(),
+                Value::String(text) => text == field,
+                Value::Number(number) => number.as_f64() == field.parse().ok(),
+                _ => false,
+            };
+            assert!(same, "{}: {name}: {} in JSON, {field} in CSV", csv.display(), row[name]);
+        }
+        assert_eq!(row.as_object().unwrap().len(), header.iter().filter(|name| *name != "data").count());
+    }
+}
+
+const SMALL: [&str; 6] = ["--synth-recordings", "2", "--synth-duration", "200", "--backend", "cpu"];
+
+#[test]
+fn a_study_prints_its_tables_and_a_merged_one_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = |more: &[&str]| {
+        let args: Vec<&str> = ["study"].iter().chain(&SMALL).chain(more).copied().collect();
+        args.into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let run = |more: &[&str]| {
+        let args = study(more);
+        json(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let whole = run(&["--out", "whole", "--published", "--compare-reference"]);
+    for (name, file) in
+        [("failures", "failures.csv"), ("f1", "f1.csv"), ("claims", "claims.csv"), ("reference", "reference.csv")]
+    {
+        same_numbers(&whole[name], &dir.path().join("whole").join(file));
+    }
+    assert_eq!(whole["synthetic"], Value::Bool(true));
+    assert!(whole["published"]["failures"].as_array().is_some_and(|rows| rows.len() == 36), "{}", whole["published"]);
+    // A parameterization's key is a text even where it is a digit.
+    assert!(whole["f1"].as_array().unwrap().iter().all(|row| row["parameterization"].is_string()));
+
+    let plan = run(&["--plan-only", "--out", "parts"]);
+    assert_eq!(plan["lanes"], whole["lanes"]);
+    for shard in ["0/2", "1/2"] {
+        let args = study(&["--shard", shard, "--out", "parts"]);
+        lanesweep(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>());
+    }
+    let merged = json(dir.path(), &["merge", "parts"]);
+    for name in ["failures", "f1", "claims", "data", "plan_sha256", "lanes"] {
+        assert_eq!(merged[name], whole[name], "{name}");
+    }
+}
+
+#[test]
+fn densities_and_samples_print_what_their_files_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    let fit: Vec<&str> = ["fit", "--category", "cut-in", "--parameterization", "2", "--out", "d", "--no-comparison"]
+        .into_iter()
+        .chain(SMALL.into_iter().take(4))
+        .collect();
+    let fitted = json(dir.path(), &fit);
+    let density = &fitted["densities"][0];
+    assert_eq!((density["parameterization"].as_str(), density["file"].as_str()), (Some("2"), Some("d/cut-in-2.json")));
+    assert!(density["parameters"].as_array().unwrap().iter().all(|p| p["unit"].is_string() && p["mean"].is_number()));
+
+    let sample = ["sample", "d/cut-in-2.json", "--samples", "2000", "--thw", "1.2", "--backend", "cpu", "--out", "s"];
+    let printed = json(dir.path(), &sample);
+    let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("s/estimate.json")).unwrap()).unwrap();
+    assert_eq!(printed, file);
+
+    let compare = ["compare", "--samples", "100", "--parameterization", "i", "--categories", "lvd", "--out", "c"];
+    let compare: Vec<&str> = compare.iter().chain(&SMALL).copied().collect();
+    let printed = json(dir.path(), &compare);
+    let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("c/compare.json")).unwrap()).unwrap();
+    assert_eq!(printed, file);
+}
+
+#[test]
+fn maps_traces_and_checks_print_documents() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = ["map", "lvd", "--x", "deceleration_mps2=1..9/2", "--y", "ego_speed_kmh=60,120", "--set", "thw_s=0.6"];
+    let map: Vec<&str> = map.iter().chain(&["--against", "FSM", "--backend", "cpu", "--out", "m"]).copied().collect();
+    let printed = json(dir.path(), &map);
+    let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("m/map.json")).unwrap()).unwrap();
+    assert_eq!(printed, file);
+    let cells = printed["grids"][0]["cells"].as_u64().unwrap();
+    for row in printed["differences"].as_array().unwrap() {
+        let of = |name: &str| row[name].as_u64().unwrap();
+        let sum = of("both_pass") + of("both_fail") + of("only_first_fails") + of("only_second_fails");
+        assert_eq!(sum, cells, "{row}");
+    }
+
+    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--thw", "0.4", "--lateral-speed", "1.5"];
+    let simulate: Vec<&str> = ["simulate", "--model", "all"].iter().chain(&case).copied().collect();
+    let (printed, csv) = (json(dir.path(), &simulate), lanesweep(dir.path(), &simulate));
+    assert_eq!(printed["steps"].as_array().unwrap().len(), csv.lines().count() - 1);
+    let lanes = printed["lanes"].as_array().unwrap();
+    assert!(lanes.len() >= 4);
+    for lane in lanes {
+        let outcome = &lane["outcome"];
+        assert_eq!(outcome["collision"] == Value::Bool(true), outcome["t_crash_s"].is_number(), "{lane}");
+    }
+
+    let verify = ["verify", "--backend", "cpu", "--lanes", "24", "--threshold-units", "1", "--synth-recordings", "1"];
+    let printed = json(dir.path(), &verify);
+    let sets = printed["sets"].as_array().unwrap();
+    assert_eq!((printed["equal"].as_bool(), sets.len()), (Some(true), 3));
+    let lanes = |set: &Value| set["tallies"].as_array().unwrap().iter().map(|t| t["lanes"].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(sets.iter().map(lanes).sum::<u64>(), printed["lanes"].as_u64().unwrap());
+
+    let devices = json(dir.path(), &["devices", "--no-self-check"]);
+    assert!(devices["devices"].is_array());
+}
