@@ -177,6 +177,10 @@ impl Profile {
 
     /// The same profile at another time step.
     pub fn with_dt(mut self, dt_s: f64) -> Result<Profile> {
+        if !(dt_s > 0.0 && dt_s.is_finite()) {
+            let problem = format!("{dt_s} s is no time step");
+            return Err(Error::usage(Place::item("--dt"), problem, "give seconds above 0, such as 0.04 or 0.1"));
+        }
         self.frame.dt_s = dt_s;
         self.check(&Place::item("--dt"))?;
         Ok(self)
@@ -207,7 +211,11 @@ mod tests {
 
     #[test]
     fn an_unusable_constant_is_named_with_its_key() {
-        let error = Profile::load("paper").unwrap().with_dt(0.0).unwrap_err();
+        let error = Profile::load("paper").unwrap().with_dt(1e9).unwrap_err();
         assert!(error.to_string().contains("frame.dt_s"), "{error}");
+        for dt_s in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            let error = Profile::load("paper").unwrap().with_dt(dt_s).unwrap_err();
+            assert!(error.to_string().contains("--dt"), "{error}");
+        }
     }
 }

@@ -30,7 +30,8 @@ fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion
         return vec2<u32>(0u, 0u);
     }
     let is_in_path = abs(start) <= half_widths;
-    if (rule.kind == ATTENTION_WANDERING) & (rule.with_ahead == 0u) & is_in_path {
+    let comes_in = rule.with_ahead == 0u;
+    if (rule.kind == ATTENTION_WANDERING) & (is_in_path == comes_in) {
         return vec2<u32>(0u, 0u);
     }
     var event = NEVER;

@@ -185,7 +185,7 @@ impl Map {
             Some("jrc") => presets::jrc(category, profile)?,
             Some(unknown) => {
                 let problem = format!("there is no preset `{unknown}`");
-                return Err(Error::usage(Place::item("--preset"), problem, presets::NAMES.join(", ")));
+                return Err(Error::usage(Place::item("--preset"), problem, format!("presets: {}", presets::NAMES.join(", "))));
             }
             None => {
                 let grid = self.own_grid(category)?;

@@ -66,8 +66,8 @@ impl AttentionRule<f64> {
     }
 
     /// Once the deviation from the vehicle's own lane centre has been perceived (Annex 3): more than the wandering
-    /// for the perception time, or the perception travel beyond it. In a cut-out the vehicle ahead is seen as late; in
-    /// a cut-in a vehicle that is in the ego's path from the start has nothing left to deviate and is seen at once.
+    /// for the perception time, or the perception travel beyond it. In a cut-out the vehicle ahead is seen as late. A
+    /// vehicle whose lane change is over at the start has nothing left to deviate: what it was to show is seen at once.
     pub fn after_wandering(rule: Perception, dt_s: f64, category: Category) -> Self {
         if rule.wandering_m <= 0.0 {
             return Self::always();
@@ -134,7 +134,8 @@ impl<R: Real> AttentionRule<R> {
             return [0; 2];
         }
         let is_in_path = start.abs() <= half_widths;
-        if self.kind == WANDERING && self.with_ahead == 0 && is_in_path {
+        let comes_in = self.with_ahead == 0;
+        if self.kind == WANDERING && is_in_path == comes_in {
             return [0; 2];
         }
         let mut event = NEVER;
@@ -185,11 +186,12 @@ mod tests {
 
     /// Parameterizations 3, 4, c and d have the other vehicle in its final place from the start.
     #[test]
-    fn a_vehicle_that_begins_in_the_path_is_seen_at_once_unless_it_is_to_leave_it() {
+    fn a_lane_change_that_is_over_at_the_start_is_seen_at_once() {
         let rule = |category| AttentionRule::after_wandering(PERCEPTION, 0.1, category);
         assert_eq!(rule(Category::CutIn).attend_from(100, 1.8, |_| 0.1, |_| 20.0), [0, 0]);
         assert_eq!(rule(Category::CutIn).attend_from(100, 1.8, |_| 1.9, |_| 20.0), [NEVER, 0]);
         assert_eq!(rule(Category::CutOut).attend_from(100, 1.8, |_| 0.1, |_| 20.0), [NEVER, NEVER]);
+        assert_eq!(rule(Category::CutOut).attend_from(100, 1.8, |_| -3.5, |_| 20.0), [0, 0]);
     }
 
     #[test]
