@@ -51,7 +51,7 @@ impl Mine {
         }
         match &self.output {
             Some(path) => {
-                write_scenarios_of(path, &collection.scenarios, Some(from.is_synthetic()))?;
+                write_scenarios_of(path, &collection.scenarios, from.is_synthetic())?;
                 if let Some(driven) = Driven::of(&collection) {
                     let scenarios_sha256 = input_file::sha256(path)?;
                     let (data, synthetic) = (from.describe(), from.is_synthetic());

@@ -43,7 +43,7 @@ pub(super) fn run(
         table: "samples",
         profile: Some(plan.profile.name.clone()),
         plan_sha256: Some(plan.hash().to_owned()),
-        synthetic: Some(density.provenance.synthetic),
+        synthetic: density.provenance.synthetic,
     };
     let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
     let mut table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;

@@ -95,7 +95,7 @@ pub(super) fn write_lanes(
         table: "lanes",
         profile: Some(plan.profile.name.clone()),
         plan_sha256: Some(plan.hash().to_owned()),
-        synthetic: Some(synthetic),
+        synthetic,
     };
     let mut table = TableWriter::create(path, lane_format(path)?, lanes::columns(digits), &facts)?;
     let options = how.options(Wanted::Outcomes);

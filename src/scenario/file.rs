@@ -33,17 +33,17 @@ pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
 /// [`crate::Error::Io`] if the folder cannot be written to; [`crate::Error::Usage`] for a name that ends neither in
 /// `.jsonl` nor in `.parquet`; [`crate::Error::Internal`] for a scenario that [`read_scenarios`] would refuse.
 pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
-    write_scenarios_of(path, scenarios, None)
+    write_scenarios_of(path, scenarios, false)
 }
 
-/// As [`write_scenarios`], for scenarios of which is known whether the program made them up.
+/// As [`write_scenarios`], for scenarios that are known to be made up by the program, if `synthetic`.
 ///
 /// # Errors
 /// As [`write_scenarios`].
 pub fn write_scenarios_of<'a>(
     path: &Path,
     scenarios: impl IntoIterator<Item = &'a Scenario>,
-    synthetic: Option<bool>,
+    synthetic: bool,
 ) -> Result<()> {
     match check_scenario_file(path)? {
         TableFormat::JsonLines => jsonl::write(path, scenarios),

@@ -109,7 +109,7 @@ pub(super) fn read(table: TableReader) -> Result<Vec<Scenario>> {
         check(&scenario).map_err(|Problem { field, problem, help }| {
             Error::input(rows.table.place(row, Some(name(&scenario.id))).column(field), problem, help)
         })?;
-        found.add(scenario, row, |item| rows.table.place(row, item))?;
+        found.add(scenario, row, &rows.table)?;
     }
     if found.scenarios.is_empty() {
         return Err(Error::input(header, "holds no scenario", HELP));

@@ -10,7 +10,7 @@ use super::jsonl::{Problem, check, name};
 use super::leaves::{Leaf, leaves, names};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Result};
 use crate::table::{Named, Resolved, Row, TableFormat, TableReader, nearest, resolve};
 
 /// Where the columns are told.
@@ -59,11 +59,11 @@ impl Found {
     }
 
     /// Takes a scenario whose id did not come before.
-    pub fn add(&mut self, scenario: Scenario, row: u64, place: impl FnOnce(Option<String>) -> Place) -> Result<()> {
+    pub fn add(&mut self, scenario: Scenario, row: u64, table: &TableReader) -> Result<()> {
         if let Some(first) = self.rows.insert(scenario.id.clone(), row) {
             return Err(Error::input(
-                place(Some(name(&scenario.id))).column("id"),
-                format!("this id is that of row {first} too, but every scenario needs its own"),
+                table.place(row, Some(name(&scenario.id))).column("id"),
+                format!("this id is that of {} {first} too, but every scenario needs its own", table.word()),
                 "rename one of the two; rows of one scenario stand together",
             ));
         }
@@ -278,7 +278,7 @@ impl Reader {
         let scenario: Scenario = serde_json::from_value(value)
             .map_err(|e| Error::input(self.table.place(row, item.clone()), format!("not a scenario: {e}"), HELP))?;
         check(&scenario).map_err(|Problem { field, problem, help }| Error::input(place(&field), problem, help))?;
-        self.found.add(scenario, row, |item| self.table.place(row, item))
+        self.found.add(scenario, row, &self.table)
     }
 
     /// The column of a field, as the file names it; `target.v[3]` is the fourth value in `target_v`.

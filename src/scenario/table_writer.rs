@@ -20,7 +20,7 @@ pub(super) fn write<'a>(
     path: &Path,
     format: TableFormat,
     scenarios: impl IntoIterator<Item = &'a Scenario>,
-    synthetic: Option<bool>,
+    synthetic: bool,
 ) -> Result<()> {
     let facts = TableFacts { table: "scenarios", synthetic, ..TableFacts::default() };
     let (leaves, columns) = (leaves(), scenario_columns());

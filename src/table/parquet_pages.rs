@@ -20,7 +20,7 @@ const BYTES: u64 = 64 << 20;
 const BYTES_PER_BYTE: u64 = 1024;
 /// Values that may come of a file of any size, and more for each of its bytes.
 const VALUES: u64 = 4 << 20;
-const VALUES_PER_BYTE: u64 = 1024;
+const VALUES_PER_BYTE: u64 = 512;
 
 /// What is wrong with a file; `None` for what the system did not give.
 pub(super) type Refusal = &'static str;

@@ -3,6 +3,7 @@
 //! The same rows give the same bytes, whoever computed them in whatever pieces: rows are gathered in batches of a fixed
 //! number, and no time and no machine is named.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -45,14 +46,19 @@ impl ParquetFile {
         let has_series = columns.iter().any(|column| column.kind == Kind::Series);
         let (batch_rows, group_rows) =
             if has_series { (SERIES_BATCH_ROWS, SERIES_GROUP_ROWS) } else { (BATCH_ROWS, GROUP_ROWS) };
-        let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
+        // Arrow's readers show what stands with its schema, the others what stands in the footer.
+        let words = key_values(columns, facts);
+        let pairs = words.iter().map(|word| (word.key.clone(), word.value.clone().unwrap_or_default()));
+        let pairs: HashMap<String, String> = pairs.collect();
+        let fields: Vec<Field> = columns.iter().map(field).collect();
+        let schema = Arc::new(Schema::new_with_metadata(fields, pairs));
         let level = ZstdLevel::try_new(3).map_err(|e| Error::Internal(format!("Parquet: {e}")))?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::ZSTD(level))
             .set_created_by(format!("lanesweep {}", env!("CARGO_PKG_VERSION")))
             .set_max_row_group_row_count(Some(group_rows))
             .set_statistics_enabled(EnabledStatistics::Chunk)
-            .set_key_value_metadata(Some(key_values(columns, facts)))
+            .set_key_value_metadata(Some(words))
             .build();
         let file = AtomicFile::create(path)?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(|e| failed(path, e))?;
@@ -109,7 +115,7 @@ fn field(column: &Column) -> Field {
         Kind::Wholes => DataType::List(Arc::new(Field::new_list_field(DataType::Int64, true))),
     };
     let words = [("unit", &column.unit), ("description", &column.description)];
-    let words: std::collections::HashMap<String, String> =
+    let words: HashMap<String, String> =
         words.into_iter().map(|(key, value)| (key.to_owned(), value.to_string())).collect();
     Field::new(column.name.as_ref(), data_type, true).with_metadata(words)
 }
@@ -130,7 +136,7 @@ fn key_values(columns: &[Column], facts: &TableFacts) -> Vec<KeyValue> {
     };
     add("profile", facts.profile.clone());
     add("plan_sha256", facts.plan_sha256.clone());
-    add("synthetic", facts.synthetic.map(|synthetic| synthetic.to_string()));
+    add("synthetic", facts.synthetic.then(|| "true".to_owned()));
     add("columns", Some(serde_json::Value::from(words).to_string()));
     list
 }

@@ -98,6 +98,15 @@ impl TableReader {
         }
     }
 
+    /// What rows are counted as.
+    pub fn word(&self) -> &'static str {
+        match &self.rows {
+            Rows::Csv(_) => "line",
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(_) => "row",
+        }
+    }
+
     /// A row and what it is of, where that is known.
     pub fn place(&self, number: u64, item: Option<String>) -> Place {
         match &self.rows {

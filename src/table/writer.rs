@@ -18,8 +18,8 @@ pub struct TableFacts {
     pub profile: Option<String>,
     /// SHA-256 of the plan of lanes, where there is one.
     pub plan_sha256: Option<String>,
-    /// Made by the program, no statement about real traffic; `None` where nobody knows.
-    pub synthetic: Option<bool>,
+    /// Known to be made up by the program: no statement about real traffic.
+    pub synthetic: bool,
 }
 
 /// A table that is being written. Memory does not grow with its rows. Dropped before [`TableWriter::finish`], it leaves
