@@ -1,7 +1,6 @@
 //! Tables of scenarios and cases that users make: what is read of them, and what is said of those that cannot be read.
 #![cfg(feature = "parquet")]
 
-#[allow(dead_code)]
 #[path = "tables/made.rs"]
 mod made;
 #[path = "tables/run.rs"]
@@ -59,7 +58,7 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
         ),
         ("72,3.4", "fast,3.4", "column `target_speed_kmh[1]`, scenario a", "expected a number"),
         ("10.04", "soon", "line 3, column `time_s`", "expected a time in seconds"),
-        ("left,4.2,1.9,72,3.5", "up,4.2,1.9,72,3.5", "line 2, column `side`", "\"left\", \"right\""),
+        ("Right,4.2", "up,4.2", "line 5, column `side`, scenario b", "\"left\", \"right\""),
         ("b,,0.1,,,,,,,36,0.1,\n", "", "line 5, column `time_s`, scenario b", "one instant"),
         ("side,", "sied,", "s.csv, line 1, column `sied`", "no such column"),
         ("target_lateral_m", "target_lateral_ft", "column `target_lateral_ft`", "feet"),
