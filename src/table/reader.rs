@@ -25,7 +25,7 @@ pub(crate) struct TableReader {
 }
 
 enum Rows {
-    Csv(CsvRows),
+    Csv(Box<CsvRows>),
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetRows>),
 }
@@ -39,7 +39,7 @@ impl TableReader {
         let (columns, rows) = match format {
             TableFormat::Csv => {
                 let (columns, rows) = CsvRows::open(path)?;
-                (columns, Rows::Csv(rows))
+                (columns, Rows::Csv(Box::new(rows)))
             }
             #[cfg(feature = "parquet")]
             TableFormat::Parquet => {
