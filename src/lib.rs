@@ -4,7 +4,7 @@
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
-//! [`parts`] (shards, journals, merging), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
+//! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
 //! good order) and [`cli`].
 
 mod atomic_file;
@@ -33,6 +33,7 @@ pub mod scalar;
 pub mod scenario;
 pub mod score;
 pub mod sweep;
+pub mod table;
 mod toml_file;
 pub mod trajectory;
 pub mod verify;

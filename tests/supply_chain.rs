@@ -266,13 +266,14 @@ fn the_lock_file_is_in_the_repository_and_current() {
     }
 }
 
+/// With one feature, on by default, the combinations are the default, which all else builds, and none.
 #[test]
-fn there_are_no_feature_combinations_to_build() {
-    let features = toml_file("Cargo.toml").get("features").cloned();
-    assert!(
-        features.is_none(),
-        "Cargo.toml has [features] now: this test has to learn to build their combinations (none, each one, all)"
-    );
+fn every_combination_of_features_is_built() {
+    let manifest = toml_file("Cargo.toml");
+    let features: Vec<&str> = manifest["features"].as_table().expect("features").keys().map(String::as_str).collect();
+    assert_eq!(features, ["default", "parquet"], "build each new combination in .ci/run (none, each one, all)");
+    let run = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
+    assert!(run.contains("cargo clippy --release --lib --bins --no-default-features --locked"), "none is not built");
 }
 
 /// The Rust files below a folder.

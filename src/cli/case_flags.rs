@@ -6,11 +6,11 @@ use clap::Args;
 use serde::Deserialize;
 
 use crate::driver::ModelId;
-use crate::grid::{LATERAL_DISTANCE_M, PlainCase};
 use crate::profile::Profile;
-use crate::scenario::{Case, Category};
+use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least, needed};
 use crate::sweep::Headway;
-use crate::{Error, Place, Result, input_file, toml_file};
+use crate::table::{TableFormat, TableReader};
+use crate::{Error, Place, Result, toml_file};
 
 /// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Args)]
@@ -86,14 +86,7 @@ impl CaseFlags {
     }
 
     pub(super) fn category(&self) -> Result<Category> {
-        let text = needed(self.category.as_ref(), "category", "cut-in, cut-out or lvd")?;
-        Category::parse(text).ok_or_else(|| {
-            Error::usage(
-                Place::item("category"),
-                format!("there is no category `{text}`"),
-                "use cut-in, cut-out or lvd",
-            )
-        })
+        self.parameters().category()
     }
 
     /// Does it say anything of the case itself?
@@ -141,73 +134,25 @@ impl CaseFlags {
     }
 
     pub(super) fn case(&self, profile: &Profile) -> Result<Case> {
-        let category = self.category()?;
-        let ego_speed_mps =
-            at_least(*needed(self.ego_speed.as_ref(), "ego_speed", "a speed in m/s")?, 0.0, "ego_speed")?;
-        let length_m = above_zero(self.length.unwrap_or(profile.frame.default_length_m), "length")?;
-        let width_m = above_zero(self.width.unwrap_or(profile.frame.default_width_m), "width")?;
-        let initial_mps = at_least(self.speed.unwrap_or(ego_speed_mps), 0.0, "speed")?;
-        let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
-        let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
-        let lateral_distance_m =
-            at_least(self.lateral_distance.unwrap_or(LATERAL_DISTANCE_M), 0.0, "lateral_distance")?;
-        let lateral_speed_mps = match category {
-            Category::Lvd => 0.0,
-            Category::CutIn | Category::CutOut => {
-                let rate = *needed(self.lateral_speed.as_ref(), "lateral_speed", "a speed in m/s")?;
-                above_zero(rate, "lateral_speed")?
-            }
-        };
-        let (ahead_gap_m, ahead_speed_mps) = if category == Category::CutOut {
-            let gap_m = at_least(*needed(self.ahead_gap.as_ref(), "ahead_gap", "a gap in m")?, 0.0, "ahead_gap")?;
-            (gap_m, at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?)
-        } else {
-            (0.0, 0.0)
-        };
-        let plain = PlainCase {
-            category,
-            ego_speed_mps,
-            speed_mps: initial_mps,
-            acceleration_mps2,
-            end_speed_mps,
-            lateral_speed_mps,
-            lateral_distance_m,
-            ahead_speed_mps,
-            ahead_gap_m,
-            length_m,
-            width_m,
-        };
-        plain.case(profile.frame.time_cap_s)
+        let frame = &profile.frame;
+        self.parameters().plain_case(frame.default_length_m, frame.default_width_m)?.case(frame.time_cap_s)
     }
-}
 
-fn needed<'a, T>(value: Option<&'a T>, key: &str, what: &str) -> Result<&'a T> {
-    value.ok_or_else(|| {
-        let flag = key.replace('_', "-");
-        Error::usage(Place::item(key), "it is missing", format!("give {what} with --{flag} or as `{key}` in the file"))
-    })
-}
-
-/// Beyond this no speed, length or acceleration is physical.
-const LARGEST: f64 = 1e6;
-
-fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
-    if value.abs() <= LARGEST && value >= least {
-        return Ok(value);
+    fn parameters(&self) -> CaseParameters {
+        CaseParameters {
+            category: self.category.clone(),
+            ego_speed: self.ego_speed,
+            speed: self.speed,
+            lateral_speed: self.lateral_speed,
+            lateral_distance: self.lateral_distance,
+            acceleration: self.acceleration,
+            end_speed: self.end_speed,
+            ahead_speed: self.ahead_speed,
+            ahead_gap: self.ahead_gap,
+            length: self.length,
+            width: self.width,
+        }
     }
-    let expected = if least.is_finite() {
-        format!("a number of at least {least} and at most 1e6")
-    } else {
-        "a number between -1e6 and 1e6".into()
-    };
-    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), format!("give {expected}")))
-}
-
-fn above_zero(value: f64, key: &str) -> Result<f64> {
-    if value > 0.0 && value <= LARGEST {
-        return Ok(value);
-    }
-    Err(Error::usage(Place::item(key), format!("{value} cannot be used"), "give a number above 0 and at most 1e6"))
 }
 
 /// The flags that a TOML file holds.
@@ -215,21 +160,18 @@ pub(super) fn from_toml(path: &Path) -> Result<CaseFlags> {
     toml_file::read(path, "the keys are the flags of `simulate --help` with `_`")
 }
 
-/// The flags that a row of a CSV table holds; rows count from 1 after the header.
-pub(super) fn from_csv(path: &Path, row: usize) -> Result<CaseFlags> {
-    let text = input_file::read_text(path, input_file::LARGEST_TABLE_BYTES)?;
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
-    let records = reader.deserialize::<CaseFlags>();
-    let line = row as u64 + 1;
-    let found = row.checked_sub(1).and_then(|skip| records.into_iter().nth(skip)).ok_or_else(|| {
-        Error::usage(Place::file(path), format!("there is no row {row}"), "rows count from 1 after the header")
-    })?;
-    found.map_err(|e| {
-        Error::input(
-            Place::file(path).row(line),
-            e.to_string(),
-            "the columns are the flags of `simulate --help` with `_`",
-        )
-    })
+/// The flags that a row of a table holds, of CSV or Parquet; rows count from 1 after the header.
+pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
+    let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
+    let mut rows = ParameterRows::new(TableReader::open(path, format)?)?;
+    let missing =
+        || Error::usage(Place::file(path), format!("there is no row {row}"), "rows count from 1 after the header");
+    for _ in 1..row {
+        rows.next_row()?.ok_or_else(missing)?;
+    }
+    let (_, mut found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
+    // Of tables of scenarios: a single run has no key and no samples.
+    ["id", "duration", "rate"].iter().for_each(|key| drop(found.remove(*key)));
+    serde_json::from_value(serde_json::Value::Object(found))
+        .map_err(|e| Error::Internal(format!("{}, row {row}: {e}", path.display())))
 }

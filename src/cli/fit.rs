@@ -37,7 +37,7 @@ pub struct Fit {
     /// Folder of highD-format recordings [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
     dir: Option<PathBuf>,
-    /// Scenario file (JSON Lines) instead of recordings
+    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
     /// Folder for density files, or one file (.json) where one density is fitted

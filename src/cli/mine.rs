@@ -9,13 +9,13 @@ use super::source::{self, Source};
 use super::{Exit, console};
 use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
-use crate::scenario::{write_scenarios, write_scenarios_to};
+use crate::scenario::{check_scenario_file, write_scenarios_of, write_scenarios_to};
 use crate::{Result, input_file};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
 /// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with
-/// its series; `study --scenarios FILE` reads it. How long and how far the recordings' vehicles drove is written
+/// its series, or one row where FILE ends in .parquet; `study --scenarios FILE` reads it. How long and how far the recordings' vehicles drove is written
 /// beside it (FILE with the ending .exposure.json), so that `fit --scenarios FILE` can tell events per hour.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings -o scenarios.jsonl")]
@@ -23,7 +23,7 @@ pub struct Mine {
     /// Folder of highD-format recordings
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// File to write [default: standard output]
+    /// File to write: .jsonl or .parquet [default: standard output, JSON Lines]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Mining options (TOML) [default: the paper's]
@@ -38,6 +38,7 @@ impl Mine {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.output {
             source::refuse_recording(path, &self.dir, "--output")?;
+            check_scenario_file(path)?;
             // Before the work: a file that cannot be written is known at once.
             AtomicFile::create(path).map(drop)?;
         }
@@ -50,7 +51,7 @@ impl Mine {
         }
         match &self.output {
             Some(path) => {
-                write_scenarios(path, &collection.scenarios)?;
+                write_scenarios_of(path, &collection.scenarios, from.is_synthetic())?;
                 if let Some(driven) = Driven::of(&collection) {
                     let scenarios_sha256 = input_file::sha256(path)?;
                     let (data, synthetic) = (from.describe(), from.is_synthetic());

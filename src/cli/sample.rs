@@ -27,6 +27,7 @@ use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
 use crate::sweep::Headway;
+use crate::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
@@ -89,7 +90,7 @@ pub struct Sample {
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none")]
     pub(super) map: Option<String>,
-    /// Also write one row per lane
+    /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
     /// Runs of the pilot of is
@@ -396,5 +397,6 @@ fn given(text: &str) -> std::result::Result<(String, f64), String> {
 fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
+    TableFormat::of(rows, &TableFormat::EVERY, "--rows")?;
     super::source::refuse_overwriting(rows, &others, "--rows")
 }

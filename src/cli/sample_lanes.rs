@@ -1,12 +1,11 @@
 //! The lanes of a sampling run: progress, rows on request, and the files that come of the counts.
 
-use std::io::Write;
 use std::path::Path;
 
 use super::console::{self, Verbosity};
 use crate::density::{DensityModel, write_density};
 use crate::parts::Ledger;
-use crate::report::files::{make_folder, write_atomically, write_atomically_with};
+use crate::report::files::{make_folder, write_atomically};
 use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
 use crate::report::sampling::EstimateFile;
@@ -14,6 +13,7 @@ use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
+use crate::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
 /// Samples, with one row per lane where asked for.
@@ -39,25 +39,22 @@ pub(super) fn run(
     };
     // Rows hold every value, so the lanes must.
     let counting = TallyOptions { worst: counting.worst.max(1), ..counting.clone() };
-    let mut run = None;
-    let written = write_atomically_with(path, |out: &mut dyn Write| {
-        sampled_rows::write_header(out, density)?;
-        let sampled = sample_into(plan, ledger, how, &counting, options, |chunk| {
-            bar.inc(chunk.units.end - chunk.units.start);
-            sampled_rows::write_chunk(out, plan, density, chunk).map_err(|e| Error::io(path, "write", e))
-        });
-        let failed = sampled.is_err();
-        run = Some(sampled);
-        // The run's own error is the one to tell.
-        if failed { Err(std::io::Error::other("the run failed")) } else { Ok(()) }
+    let facts = TableFacts {
+        table: "samples",
+        profile: Some(plan.profile.name.clone()),
+        plan_sha256: Some(plan.hash().to_owned()),
+        synthetic: density.provenance.synthetic,
+    };
+    let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
+    let mut table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
+    let run = sample_into(plan, ledger, how, &counting, options, |chunk| {
+        bar.inc(chunk.units.end - chunk.units.start);
+        sampled_rows::write_chunk(&mut table, plan, density, chunk)
     });
     bar.finish_and_clear();
-    match run {
-        Some(Ok(run)) => written.map(|()| run),
-        Some(Err(error)) => Err(error),
-        // The file could not even be begun.
-        None => Err(written.err().unwrap_or_else(|| Error::Internal("the rows were not written".to_owned()))),
-    }
+    let run = run?;
+    table.finish()?;
+    Ok(run)
 }
 
 /// A folder that cannot be written to is known before the work.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::case_flags::{CaseFlags, from_csv, from_toml};
+use super::case_flags::{CaseFlags, from_table, from_toml};
 use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
 use super::source::refuse_overwriting;
@@ -21,7 +21,7 @@ use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///
-/// The case comes from flags, from a TOML file, from a row of a CSV table (the flags' names with `_` as
+/// The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as
 /// keys or columns; flags win), or from a finished run or a scenario file with a lane key. The series goes to
 /// stdout as CSV, the outcome to stderr, the figure to --plot. Several models (--model FSM,RSS or all) or
 /// variants (--compare) stand below one another in the CSV and together on the figure.
@@ -39,13 +39,13 @@ pub struct Simulate {
     /// TOML file with the case
     #[arg(long, value_name = "FILE", conflicts_with = "table")]
     case_file: Option<PathBuf>,
-    /// CSV table with one case per row
+    /// Table (.csv, .parquet) with one case per row
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
     /// Row of the table, counted from 1 after the header
     #[arg(long, value_name = "N", default_value_t = 1)]
     row: usize,
-    /// Scenario file (JSON Lines) for --lane
+    /// Scenario file (.jsonl, .parquet, .csv) for --lane
     #[arg(long, value_name = "FILE", requires = "lane")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a `lanesweep study` or `lanesweep sample`, for --lane: reruns that lane with the run's profile and
@@ -129,7 +129,7 @@ impl Simulate {
     fn flags(&self) -> Result<CaseFlags> {
         let file = match (&self.case_file, &self.table) {
             (Some(path), _) => from_toml(path)?,
-            (None, Some(path)) => from_csv(path, self.row)?,
+            (None, Some(path)) => from_table(path, self.row)?,
             (None, None) => CaseFlags::default(),
         };
         Ok(self.case.over(file))

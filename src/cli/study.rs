@@ -12,7 +12,7 @@ use super::format::FormatFlag;
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
 use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
-use super::study_run::{Host, How, compare_reference, finish_study, run_units, write_lanes};
+use super::study_run::{Host, How, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::mining::{Collection, MiningOptions, count};
@@ -44,13 +44,13 @@ pub struct Study {
     /// Folder of highD-format recordings [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
     dir: Option<PathBuf>,
-    /// Scenario file (JSON Lines) instead of recordings
+    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
     /// Folder for tables, figures and run.json
     #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
     out: PathBuf,
-    /// Also write one row per lane
+    /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     lanes: Option<PathBuf>,
     /// Set the paper's published numbers beside (they are highD's)
@@ -244,7 +244,7 @@ impl Study {
         let partial = work.ledger.counts(0..plan.unit_count())?.unwrap_or_else(|| Partial::empty(plan));
         if let Some(path) = &self.lanes {
             let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-            swept.add(&write_lanes(path, plan, &how, digits)?);
+            swept.add(&write_lanes(path, plan, &how, digits, study.facts.synthetic)?);
         }
         let comparison = self.compare_reference.then(|| compare_reference(plan)).transpose()?;
         let host = Host {
@@ -284,6 +284,7 @@ impl Study {
         others.extend(self.scenarios.clone());
         others.extend(self.config.clone());
         others.extend(self.shards.plan.clone());
+        lane_format(lanes)?;
         source::refuse_overwriting(lanes, &others, "--lanes")?;
         self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--lanes"))
     }

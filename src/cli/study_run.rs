@@ -17,7 +17,8 @@ use crate::score::{ScoreTable, f1, judge_claims, score};
 use crate::sweep::{
     Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Wanted, chunks, sweep,
 };
-use crate::{Error, Result, interrupt};
+use crate::table::{TableFacts, TableFormat, TableWriter};
+use crate::{Result, interrupt};
 
 /// Who computes the lanes, who stands in, who checks.
 pub(super) struct How<'a> {
@@ -81,22 +82,33 @@ pub(super) fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> 
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
-pub(super) fn write_lanes(path: &Path, plan: &LanePlan, how: &How, digits: Digits) -> Result<SweepSummary> {
+pub(super) fn write_lanes(
+    path: &Path,
+    plan: &LanePlan,
+    how: &How,
+    digits: Digits,
+    synthetic: bool,
+) -> Result<SweepSummary> {
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         make_folder(dir)?;
     }
-    let mut swept = Ok(SweepSummary::default());
-    let written = crate::report::files::write_atomically_with(path, |out| {
-        lanes::write_header(out)?;
-        let options = how.options(Wanted::Outcomes);
-        swept = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
-            lanes::write_chunk(out, plan, &chunk, digits).map_err(|e| Error::io(path, "write", e))
-        });
-        // The sweep's own error is the one to tell.
-        if swept.is_ok() { Ok(()) } else { Err(std::io::Error::other("the sweep failed")) }
-    });
-    let summary = swept?;
-    written.map(|()| summary)
+    let facts = TableFacts {
+        table: "lanes",
+        profile: Some(plan.profile.name.clone()),
+        plan_sha256: Some(plan.hash().to_owned()),
+        synthetic,
+    };
+    let mut table = TableWriter::create(path, lane_format(path)?, lanes::columns(digits), &facts)?;
+    let options = how.options(Wanted::Outcomes);
+    let swept =
+        sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| lanes::write_chunk(&mut table, plan, &chunk))?;
+    table.finish()?;
+    Ok(swept)
+}
+
+/// The format of a table of lanes.
+pub(super) fn lane_format(path: &Path) -> Result<TableFormat> {
+    TableFormat::of(path, &TableFormat::EVERY, "--lanes")
 }
 
 /// What belongs to the machine and not to the result.

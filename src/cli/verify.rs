@@ -32,7 +32,7 @@ pub struct Verify {
     /// Folder of highD-format recordings for the study [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
     dir: Option<PathBuf>,
-    /// Scenario file (JSON Lines) for the study
+    /// Scenario file (.jsonl, .parquet, .csv) for the study
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
     /// Random lanes of each model in each category

@@ -36,9 +36,13 @@ struct Content {
 }
 
 impl ExposureFile {
-    /// Where it stands: `scenarios.jsonl` → `scenarios.exposure.json`.
+    /// Where it stands: `scenarios.jsonl` → `scenarios.exposure.json`; of another format with its ending, so that the
+    /// same scenarios in two formats have one each: `scenarios.parquet` → `scenarios.parquet.exposure.json`.
     pub fn path_of(scenarios: &Path) -> PathBuf {
-        scenarios.with_extension("exposure.json")
+        match scenarios.extension().and_then(|ending| ending.to_str()) {
+            Some(ending @ ("parquet" | "csv")) => scenarios.with_extension(format!("{ending}.exposure.json")),
+            _ => scenarios.with_extension("exposure.json"),
+        }
     }
 
     /// Writes it beside a scenario file: whole or not at all.

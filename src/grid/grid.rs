@@ -8,7 +8,7 @@ use crate::{Error, Place, Result};
 use super::axis::GridAxis;
 use super::jrc_case::{self, Front};
 use super::parameter::{Parameter, Point, Quantity};
-use super::plain_case::{LATERAL_DISTANCE_M, PlainCase};
+use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};
 
 /// Cells of a grid at most.
 pub const MOST_CELLS: usize = 1_000_000;

@@ -10,7 +10,6 @@ mod grid;
 pub mod jrc_case;
 mod map;
 mod parameter;
-mod plain_case;
 mod plan;
 pub mod presets;
 
@@ -18,5 +17,6 @@ pub use axis::{GridAxis, MOST_VALUES};
 pub use grid::{CaseStyle, Grid, GridParts, MOST_CELLS, MOST_PANELS};
 pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
 pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
-pub use plain_case::{LATERAL_DISTANCE_M, PlainCase};
 pub use plan::{GridPart, GridPlan};
+
+pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};

@@ -1,16 +1,12 @@
 //! One row per lane: verdicts, continuous values and times, with the columns of the golden lanes.
 
-use std::io::Write;
-
 use rayon::prelude::*;
 
+use crate::Result;
 use crate::criterion::Criterion;
 use crate::scalar::Real;
 use crate::sweep::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
-
-/// The header.
-pub const HEADER: &str = "id,category,param,thw,model,collision,ttc,btn,min_ttc,max_btn,crash_type,t_react,t_crash,\
-                          impact_speed,t_end,robust";
+use crate::table::{Cell, Column, Kind, TableWriter};
 
 /// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,28 +17,40 @@ pub enum Digits {
     Binary64,
 }
 
-impl Digits {
-    fn write(self, value: f64) -> String {
-        match self {
-            Digits::Binary32 => (value as f32).to_string(),
-            Digits::Binary64 => value.to_string(),
-        }
-    }
+/// The columns, in their order.
+#[rustfmt::skip] // a table: one line per column
+pub fn columns(digits: Digits) -> Vec<Column> {
+    let value = match digits {
+        Digits::Binary32 => Kind::Binary32,
+        Digits::Binary64 => Kind::Binary64,
+    };
+    let c = Column::new;
+    vec![
+        c("id", Kind::Text, "", "Scenario."),
+        c("category", Kind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+        c("param", Kind::Name, "", "Variant: S (as recorded) or the key of a parameterization."),
+        c("thw", Kind::Binary64, "s", "Initial time headway; null where the start is a gap."),
+        c("model", Kind::Name, "", "Driver model."),
+        c("collision", Kind::Flag, "", "Failed the criterion collision."),
+        c("ttc", Kind::Flag, "", "Failed the criterion TTC."),
+        c("btn", Kind::Flag, "", "Failed the criterion BTN."),
+        c("min_ttc", value, "s", "Smallest time to collision; infinite where the vehicles never approached."),
+        c("max_btn", value, "1", "Largest Brake Threat Number."),
+        c("crash_type", Kind::Whole, "1", "Kind of contact; 0 without one."),
+        c("t_react", Kind::Binary64, "s", "When the driver first reacted; null if never."),
+        c("t_crash", Kind::Binary64, "s", "When vehicles touched; null if never."),
+        c("impact_speed", value, "m/s", "Speed of the ego at contact; null without one."),
+        c("t_end", Kind::Binary64, "s", "When the run ended."),
+        c("robust", Kind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64."),
+    ]
 }
 
-/// A key as a CSV field.
-pub(super) fn quoted(key: &str) -> String {
-    if key.contains([',', '"', '\n', '\r']) { format!("\"{}\"", key.replace('"', "\"\"")) } else { key.to_owned() }
-}
-
-/// Writes the header.
-pub fn write_header(out: &mut dyn Write) -> std::io::Result<()> {
-    writeln!(out, "{HEADER}")
-}
-
-/// Writes the lanes of a chunk that has outcomes, in the plan's order. Empty: did not happen. `robust` is 0
+/// Writes the lanes of a chunk that has outcomes, in the plan's order. Null: did not happen. `robust` is false
 /// where verdicts or crash type of the f64 reference change when the initial gap moves by 1e-9 m.
-pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: Digits) -> std::io::Result<()> {
+///
+/// # Errors
+/// As [`TableWriter::row`].
+pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let constants: Vec<Constants<f64>> =
         plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
@@ -56,32 +64,32 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, chunk: &Chunk, digits: 
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
-        let headway = plan.headways[key.headway];
-        let thw = match headway {
-            Headway::ThwS(thw) => decimal(thw),
-            Headway::GapM(_) => String::new(),
+        let thw = match plan.headways[key.headway] {
+            // 2 as `2.0`, like the golden lanes.
+            Headway::ThwS(thw) => Cell::Decimal(thw),
+            Headway::GapM(_) => Cell::Null,
         };
-        let judged = |c: Criterion| u8::from(outcome.verdicts.failed(c));
-        let time = |step: u32| if step == NO_STEP { String::new() } else { time(step, dt) };
-        let impact = if outcome.contact_step == NO_STEP { String::new() } else { digits.write(outcome.impact_speed) };
-        writeln!(
-            out,
-            "{},{},{},{thw},{},{},{},{},{},{},{},{},{},{impact},{},{}",
-            quoted(&block.units.name(key.unit)),
-            block.category.key(),
-            block.variants[key.variant],
-            plan.models[key.model].name(),
+        let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
+        let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt)));
+        let id = block.units.name(key.unit);
+        table.row(&[
+            Cell::text(id.as_ref()),
+            Cell::text(block.category.key()),
+            Cell::text(block.variants[key.variant].as_str()),
+            thw,
+            Cell::text(plan.models[key.model].name()),
             judged(Criterion::Collision),
             judged(Criterion::Ttc),
             judged(Criterion::Btn),
-            digits.write(outcome.min_ttc),
-            digits.write(outcome.max_btn),
-            outcome.contact.code(),
+            Cell::Number(outcome.min_ttc),
+            Cell::Number(outcome.max_btn),
+            Cell::Whole(i64::from(outcome.contact.code())),
             time(outcome.reaction_step),
             time(outcome.contact_step),
+            Cell::number((outcome.contact_step != NO_STEP).then_some(outcome.impact_speed)),
             time(outcome.end_step),
-            u8::from(robust[at])
-        )?;
+            Cell::Flag(robust[at]),
+        ])?;
     }
     Ok(())
 }
@@ -100,12 +108,7 @@ fn is_robust(constants: &Constants<f64>, plan: &LanePlan, key: &LaneKey) -> bool
     seen(run(gap - 1e-9)) == middle && seen(run(gap + 1e-9)) == middle
 }
 
-/// i·dt without the rounding error of the product.
-fn time(step: u32, dt: f64) -> String {
-    ((f64::from_step(step) * dt * 1e9).round() / 1e9).to_string()
-}
-
-/// 2 as `2.0`, like the golden lanes.
-fn decimal(value: f64) -> String {
-    format!("{value:?}")
+/// i·dt without the rounding error of the product, s.
+fn time(step: u32, dt: f64) -> f64 {
+    (f64::from_step(step) * dt * 1e9).round() / 1e9
 }

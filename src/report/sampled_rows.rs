@@ -1,33 +1,55 @@
 //! One row per sampled lane: its point, its verdicts and its values. Void samples have no row.
 
-use std::io::Write;
-
 use crate::criterion::Criterion;
 use crate::density::DensityModel;
 use crate::sweep::{Chunk, LanePlan, NO_STEP};
+use crate::table::{Cell, Column, Kind, TableWriter};
+use crate::{Error, Result};
 
-/// Writes the header: units are in the names, parameters come last.
-pub fn write_header(out: &mut dyn Write, density: &DensityModel) -> std::io::Result<()> {
-    write!(
-        out,
-        "sample,category,parameterization,headway,model,collision,ttc,btn,capped,min_ttc_s,max_btn,min_gap_m,\
-         contact_type,reaction_s,end_s,impact_speed_mps,impact_closing_speed_mps"
-    )?;
-    for parameter in density.space.parameters() {
-        write!(out, ",{}", parameter.name)?;
-    }
-    writeln!(out)
+/// The columns, in their order: units are in the names, parameters come last.
+#[rustfmt::skip] // a table: one line per column
+pub fn columns(density: &DensityModel) -> Vec<Column> {
+    let c = Column::new;
+    let mut columns = vec![
+        c("sample", Kind::Whole, "1", "Index of the sample: with the seed it decides the point."),
+        c("category", Kind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+        c("parameterization", Kind::Name, "", "Key of the parameterization whose parameters were drawn."),
+        c("headway", Kind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
+        c("model", Kind::Name, "", "Driver model."),
+        c("collision", Kind::Flag, "", "Failed the criterion collision."),
+        c("ttc", Kind::Flag, "", "Failed the criterion TTC."),
+        c("btn", Kind::Flag, "", "Failed the criterion BTN."),
+        c("capped", Kind::Flag, "", "Ended by the time cap."),
+        c("min_ttc_s", Kind::Binary32, "s", "Smallest time to collision; null where the vehicles never approached."),
+        c("max_btn", Kind::Binary32, "1", "Largest Brake Threat Number; null where it has no bound."),
+        c("min_gap_m", Kind::Binary32, "m", "Smallest gap, bumper to bumper; null where there was none."),
+        c("contact_type", Kind::Whole, "1", "Kind of contact; 0 without one."),
+        c("reaction_s", Kind::Binary64, "s", "When the driver first reacted; null if never."),
+        c("end_s", Kind::Binary64, "s", "When the run ended."),
+        c("impact_speed_mps", Kind::Binary32, "m/s", "Speed of the ego at contact."),
+        c("impact_closing_speed_mps", Kind::Binary32, "m/s", "Closing speed at contact."),
+    ];
+    columns.extend(density.space.parameters().iter().map(|parameter| Column {
+        name: parameter.name.clone().into(),
+        kind: Kind::Binary32,
+        unit: parameter.unit.clone().into(),
+        description: "Parameter that was drawn.".into(),
+    }));
+    columns
 }
 
-/// Writes the lanes of a chunk that has outcomes, in the plan's order. Empty: did not happen, or without bound.
-pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, density: &DensityModel, chunk: &Chunk) -> std::io::Result<()> {
-    let Some(generator) = plan.generator() else { return Err(std::io::Error::other("the plan has no generator")) };
+/// Writes the lanes of a chunk that has outcomes, in the plan's order. Null: did not happen, or without bound.
+///
+/// # Errors
+/// As [`TableWriter::row`]; [`Error::Internal`] for a plan that is not sampled.
+pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, density: &DensityModel, chunk: &Chunk) -> Result<()> {
+    let Some(generator) = plan.generator() else {
+        return Err(Error::Internal("the plan has no generator".to_owned()));
+    };
     let dt = plan.profile.frame.dt_s;
     let dimensions = density.space.dimensions();
-    let value = |v: f64| if v.is_finite() { (v as f32).to_string() } else { String::new() };
-    let time = |step: u32| {
-        if step == NO_STEP { String::new() } else { ((f64::from(step) * dt * 1e9).round() / 1e9).to_string() }
-    };
+    let value = |v: f64| Cell::number(v.is_finite().then_some(v));
+    let time = |step: u32| Cell::number((step != NO_STEP).then(|| (f64::from(step) * dt * 1e9).round() / 1e9));
     let (headways, models) = (plan.headways.len(), plan.models.len());
     for (unit, lanes) in chunk.units.clone().zip(chunk.outcomes.chunks(headways * models)) {
         let drawn = generator.draw(unit);
@@ -35,29 +57,33 @@ pub fn write_chunk(out: &mut dyn Write, plan: &LanePlan, density: &DensityModel,
             continue;
         }
         let point: Vec<f64> = drawn.values[..dimensions].iter().map(|&v| f64::from(v)).collect();
-        let parameters: String = drawn.values[..dimensions].iter().map(|v| format!(",{v}")).collect();
         for (at, outcome) in lanes.iter().enumerate() {
             let headway = match density.space.thw_s(&point) {
                 Some(_) => "sampled".to_owned(),
                 None => plan.headways[at / models].to_string(),
             };
-            let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(outcome.verdicts.failed(c)));
-            writeln!(
-                out,
-                "{unit},{},{},{headway},{},{collision},{ttc},{btn},{},{},{},{},{},{},{},{},{}{parameters}",
-                density.category().key(),
-                density.space.id().key,
-                plan.models[at % models].name(),
-                u8::from(outcome.verdicts.capped()),
+            let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
+            let mut row = vec![
+                Cell::Whole(unit as i64),
+                Cell::text(density.category().key()),
+                Cell::text(density.space.id().key),
+                Cell::text(headway),
+                Cell::text(plan.models[at % models].name()),
+                collision,
+                ttc,
+                btn,
+                Cell::Flag(outcome.verdicts.capped()),
                 value(outcome.min_ttc),
                 value(outcome.max_btn),
                 value(outcome.min_gap),
-                outcome.contact.code(),
+                Cell::Whole(i64::from(outcome.contact.code())),
                 time(outcome.reaction_step),
                 time(outcome.end_step),
                 value(outcome.impact_speed),
                 value(outcome.impact_closing_speed),
-            )?;
+            ];
+            row.extend(point.iter().map(|&v| Cell::Number(v)));
+            table.row(&row)?;
         }
     }
     Ok(())

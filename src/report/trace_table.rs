@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::lanes::quoted;
 use crate::Result;
 use crate::sweep::{Mark, Trace, TracedStep, TracedVehicle};
+use crate::table::quoted;
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
 const COLUMNS: [&str; 11] =

@@ -1,4 +1,4 @@
-//! The scenario file: JSON Lines, one [`Scenario`] a line, its fields as they are named there.
+//! The scenario file as JSON Lines: one [`Scenario`] a line, its fields as they are named there.
 //!
 //! Numbers are written with as many digits as they need and read to the same bits, so a study on a
 //! written file gives the result of a study on the recordings. Unknown fields are ignored, so files of
@@ -17,14 +17,7 @@ use crate::error::{Error, Place, Result};
 use crate::input_file;
 
 /// Reads a scenario file. A byte-order mark, Windows line ends and empty lines are accepted.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Input`] naming the file, the line, the scenario
-/// where its id can be read, and the field: not JSON, a missing field or one of a wrong type, series of
-/// unequal length or of fewer than two samples, a negative speed, a size, lane width or sample rate that
-/// is not above 0, a kept cut-out without the vehicle ahead or its gap, an id that came before, or a file
-/// without scenarios.
-pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
+pub(super) fn read(path: &Path) -> Result<Vec<Scenario>> {
     let file = input_file::open(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut scenarios = Vec::new();
@@ -70,11 +63,7 @@ pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
 }
 
 /// Writes a scenario file: whole or not at all.
-///
-/// # Errors
-/// [`Error::Io`] if the folder cannot be written to; [`Error::Internal`] for a scenario that
-/// [`read_scenarios`] would refuse.
-pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
+pub(super) fn write<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     write_lines(&mut file, scenarios, path)?;
     file.stage()?.publish()
@@ -83,7 +72,7 @@ pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a 
 /// Writes scenarios to an open stream, one a line.
 ///
 /// # Errors
-/// As [`write_scenarios`]; the path in an [`Error::Io`] is `<output>`.
+/// As [`super::write_scenarios`]; the path in an [`Error::Io`] is `<output>`.
 pub fn write_scenarios_to<'a>(mut writer: impl Write, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
     let output = Path::new("<output>");
     write_lines(&mut writer, scenarios, output)?;
@@ -96,10 +85,7 @@ fn write_lines<'a>(
     path: &Path,
 ) -> Result<()> {
     for scenario in scenarios {
-        // JSON has no NaN: it would be written as null and not be read again.
-        check(scenario).map_err(|p| {
-            Error::Internal(format!("scenario {} cannot be written: `{}` {}", scenario.id, p.field, p.problem))
-        })?;
+        check_written(scenario)?;
         let mut line = serde_json::to_vec(scenario)
             .map_err(|e| Error::Internal(format!("scenario {} cannot be written: {e}", scenario.id)))?;
         line.push(b'\n');
@@ -108,16 +94,23 @@ fn write_lines<'a>(
     Ok(())
 }
 
+/// What could not be read again: JSON has no NaN, for instance, and it would be written as null.
+pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
+    check(scenario).map_err(|p| {
+        Error::Internal(format!("scenario {} cannot be written: `{}` {}", scenario.id, p.field, p.problem))
+    })
+}
+
 /// How messages call a scenario.
-fn name(id: &str) -> String {
+pub(super) fn name(id: &str) -> String {
     format!("scenario {id}")
 }
 
 /// What is wrong with which field.
-struct Problem {
-    field: String,
-    problem: String,
-    help: &'static str,
+pub(super) struct Problem {
+    pub field: String,
+    pub problem: String,
+    pub help: &'static str,
 }
 
 impl Problem {
@@ -127,7 +120,7 @@ impl Problem {
 }
 
 /// What no type says: lengths, signs and what a category needs.
-fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
+pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
     expect((LEAST_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
     above_zero("lane_width", s.lane_width)?;

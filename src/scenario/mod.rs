@@ -1,16 +1,29 @@
 //! Scenarios: what was found in a recording ([`Scenario`]) and what is simulated ([`Case`]).
 //!
-//! Here live the mined scenario, its file format, and the concrete case with its motions. Here lives
+//! Here live the mined scenario, its files and tables, and the concrete case with its motions. Here lives
 //! nothing about how scenarios are found or parameterized. Data comes from [`crate::mining`] or from a
 //! scenario file and goes to [`crate::parameterization`].
 
 mod case;
+mod case_parameters;
+mod file;
 mod jsonl;
+mod leaves;
 mod mined;
 mod motion;
+mod parameter_table;
+mod plain_case;
 mod schema;
+mod table_reader;
+mod table_writer;
 
 pub use case::{Ahead, Case, Participant};
-pub use jsonl::{read_scenarios, write_scenarios, write_scenarios_to};
+pub use case_parameters::CaseParameters;
+pub(crate) use case_parameters::{at_least, needed};
+pub use file::{check_scenario_file, read_scenarios, write_scenarios, write_scenarios_of};
+pub use jsonl::write_scenarios_to;
 pub use mined::{Category, Ego, Other, Scenario, Side};
 pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
+pub(crate) use parameter_table::ParameterRows;
+pub use plain_case::{LATERAL_DISTANCE_M, PlainCase};
+pub use table_writer::scenario_columns;

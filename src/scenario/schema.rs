@@ -1,11 +1,11 @@
-//! The fields of a scenario line and what each holds: used to name the field that a line was refused for
-//! (`serde_json` says what is wrong and at which character, but not in which field of a long line).
+//! The fields of a scenario and what each holds: used to name the field that a line was refused for (`serde_json` says
+//! what is wrong and at which character, but not in which field of a long line), and as the columns of tables.
 
 use serde_json::Value;
 
 /// Whether a field must be there.
-#[derive(Clone, Copy, PartialEq)]
-enum Presence {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Presence {
     Required,
     /// May be absent; if there, it has a value.
     Defaulted,
@@ -15,7 +15,7 @@ enum Presence {
 
 /// What a field holds.
 #[derive(Clone, Copy)]
-enum Content {
+pub(super) enum Content {
     Text,
     OneOf(&'static [&'static str]),
     Number,
@@ -28,42 +28,73 @@ enum Content {
     Object(&'static [Field]),
 }
 
-type Field = (&'static str, Presence, Content);
+/// A field, with what a user of a table has to know of it.
+pub(super) struct Field {
+    pub name: &'static str,
+    pub presence: Presence,
+    pub content: Content,
+    /// Empty for what is no number.
+    pub unit: &'static str,
+    pub about: &'static str,
+}
 
 use Content::{Frame, Number, Object, OneOf, Series, Text, TwoFrames, VehicleId, YesNo};
 use Presence::{Defaulted, Optional, Required};
 
-const FIELDS: &[Field] = &[
-    ("id", Required, Text),
-    ("category", Required, OneOf(&["cut_in", "cut_out", "lvd"])),
-    ("recording", Defaulted, Text),
-    ("ego_id", Defaulted, VehicleId),
-    ("target_id", Defaulted, VehicleId),
-    ("lead_id", Optional, VehicleId),
-    ("frame0", Defaulted, Frame),
-    ("frame1", Defaulted, Frame),
-    ("fps", Required, Number),
-    ("kept", Defaulted, YesNo),
-    ("reason", Defaulted, Text),
-    ("ego", Required, Object(EGO)),
-    ("lane_width", Defaulted, Number),
-    ("side", Required, OneOf(&["left", "right"])),
-    ("target", Required, Object(OTHER)),
-    ("lead", Optional, Object(OTHER)),
-    ("thw0", Optional, Number),
-    ("gap0", Optional, Number),
-    ("D", Optional, Number),
-    ("peak_decel", Optional, Number),
-    ("truncated_start", Optional, YesNo),
-    ("end_cause", Optional, Text),
-    ("frame_switch", Optional, Frame),
-    ("tag_frames", Optional, TwoFrames),
+const fn field(
+    name: &'static str,
+    presence: Presence,
+    content: Content,
+    unit: &'static str,
+    about: &'static str,
+) -> Field {
+    Field { name, presence, content, unit, about }
+}
+
+const CATEGORIES: Content = OneOf(&["cut_in", "cut_out", "lvd"]);
+
+#[rustfmt::skip] // a table: one line per field
+pub(super) const FIELDS: &[Field] = &[
+    field("id", Required, Text, "", "Key of the scenario, of its own in the file."),
+    field("category", Required, CATEGORIES, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+    field("recording", Defaulted, Text, "", "Recording it was found in."),
+    field("ego_id", Defaulted, VehicleId, "1", "Ego vehicle in the recording."),
+    field("target_id", Defaulted, VehicleId, "1", "Cutter, cutting-out vehicle or leader in the recording."),
+    field("lead_id", Optional, VehicleId, "1", "Cut-out: the vehicle ahead of the target in the recording."),
+    field("frame0", Defaulted, Frame, "1", "First frame of the series in the recording."),
+    field("frame1", Defaulted, Frame, "1", "Last frame of the series in the recording."),
+    field("fps", Required, Number, "Hz", "Samples per second of the series."),
+    field("kept", Defaulted, YesNo, "", "Passed the filters of its category; others are not simulated."),
+    field("reason", Defaulted, Text, "", "Why it was kept or not."),
+    field("ego", Required, Object(EGO), "", ""),
+    field("lane_width", Defaulted, Number, "m", "Width of the ego's lane."),
+    field("side", Required, OneOf(&["left", "right"]), "", "Where the target comes from or leaves to."),
+    field("target", Required, Object(OTHER), "", ""),
+    field("lead", Optional, Object(OTHER), "", ""),
+    field("thw0", Optional, Number, "s", "Observed time headway at the start, bumper to bumper."),
+    field("gap0", Optional, Number, "m", "Observed gap at the start, bumper to bumper."),
+    field("D", Optional, Number, "m", "Cut-out: gap from the target to the vehicle ahead of it at the start."),
+    field("peak_decel", Optional, Number, "m/s²", "Largest recorded deceleration of the target."),
+    field("truncated_start", Optional, YesNo, "", "The lane change began before the ego's data."),
+    field("end_cause", Optional, Text, "", "What ended the scenario: lc_end, leader, ego_lane, data_end."),
+    field("frame_switch", Optional, Frame, "1", "First frame in which the target is, or is no longer, the leader."),
+    field("tag_frames", Optional, TwoFrames, "1", "LVD: first frame with the tags and first frame without."),
 ];
 
-const EGO: &[Field] = &[("v0", Required, Number), ("length", Required, Number), ("width", Required, Number)];
+#[rustfmt::skip]
+const EGO: &[Field] = &[
+    field("v0", Required, Number, "m/s", "Speed of the ego at the start."),
+    field("length", Required, Number, "m", "Length of the ego."),
+    field("width", Required, Number, "m", "Width of the ego."),
+];
 
-const OTHER: &[Field] =
-    &[("length", Required, Number), ("width", Required, Number), ("v", Required, Series), ("y", Required, Series)];
+#[rustfmt::skip]
+const OTHER: &[Field] = &[
+    field("length", Required, Number, "m", "Length of the vehicle."),
+    field("width", Required, Number, "m", "Width of the vehicle."),
+    field("v", Required, Series, "m/s", "Speed along the road, one value per sample."),
+    field("y", Required, Series, "m", "Lateral position from the middle of the ego's lane, > 0 on `side`."),
+];
 
 /// The first field of a line that is not what it must be, and what is wrong with it.
 pub(super) fn wrong_field(line: &Value) -> Option<(String, String)> {
@@ -71,12 +102,12 @@ pub(super) fn wrong_field(line: &Value) -> Option<(String, String)> {
 }
 
 fn wrong_in(object: &Value, prefix: &str, fields: &[Field]) -> Option<(String, String)> {
-    fields.iter().find_map(|&(name, presence, content)| {
-        let field = format!("{prefix}{name}");
-        match (object.get(name), presence) {
+    fields.iter().find_map(|of| {
+        let field = format!("{prefix}{}", of.name);
+        match (object.get(of.name), of.presence) {
             (None, Required) => Some((field, "missing".to_owned())),
             (None, _) | (Some(Value::Null), Optional) => None,
-            (Some(value), _) => wrong_content(value, field, content),
+            (Some(value), _) => wrong_content(value, field, of.content),
         }
     })
 }
@@ -126,7 +157,7 @@ mod tests {
         let scenario: Scenario = serde_json::from_str(line).unwrap();
         let Ok(Value::Object(written)) = serde_json::to_value(scenario) else { panic!("not an object") };
         let mut written: Vec<&str> = written.keys().map(String::as_str).collect();
-        let mut known: Vec<&str> = FIELDS.iter().map(|f| f.0).collect();
+        let mut known: Vec<&str> = FIELDS.iter().map(|f| f.name).collect();
         written.sort_unstable();
         known.sort_unstable();
         assert_eq!(written, known);

@@ -45,6 +45,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("tracksMeta", std::slice::from_ref(tracks_meta), |b, d, s, _| recording(1, b, d, s)),
         plain("recordingMeta", std::slice::from_ref(recording_meta), |b, d, s, _| recording(2, b, d, s)),
         plain("scenarios", &seeds.scenario_files, scenarios),
+        plain("scenario table", &seeds.scenario_tables, |b, d, s, h| scenario_table("s.csv", b, d, s, h)),
         plain("exposure", &seeds.exposures, exposure),
         plain("conformance table", &seeds.tables, table),
         plain("profile", &seeds.profiles, profile),
@@ -53,6 +54,8 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("score options", &seeds.score, |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
         plain("proposal", &seeds.proposals, proposal),
     ];
+    #[cfg(feature = "parquet")]
+    readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     let sealed = |b: &[u8], _: &Path, _: &Seeds| resealed(b.strip_suffix(b"\n").unwrap_or(b), b"\"content\":");
     readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
@@ -95,6 +98,11 @@ fn study(scenarios: &[Scenario], profile: &Profile, options: &ParameterizationOp
 
 fn scenarios(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let scenarios = read_scenarios(&file(bytes, dir, "s.jsonl"))?;
+    study(&scenarios, &seeds.profile, &ParameterizationOptions::default(), heavy)
+}
+
+fn scenario_table(name: &str, bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let scenarios = read_scenarios(&file(bytes, dir, name))?;
     study(&scenarios, &seeds.profile, &ParameterizationOptions::default(), heavy)
 }
 

@@ -28,6 +28,10 @@ pub struct Seeds {
     /// A few of each category.
     pub scenarios: Vec<Scenario>,
     pub scenario_files: Vec<Vec<u8>>,
+    /// A row per instant, and one per concrete case.
+    pub scenario_tables: Vec<Vec<u8>>,
+    #[cfg(feature = "parquet")]
+    pub parquets: Vec<Vec<u8>>,
     pub exposures: Vec<Vec<u8>>,
     pub tables: Vec<Vec<u8>>,
     pub profiles: Vec<Vec<u8>>,
@@ -76,6 +80,22 @@ t_react,t_crash,impact_speed,impact_rel_speed,min_ttc,min_gap,v@0.5,v@1,v@1.5,v@
 x@1,x@2,x@3,x@5,x@10,robust
 cut_in,comparison,,CC_human_driver,60,40,0.9,3,20,0,0,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
 cut_in,plain,,FSM,60,40,0.3,0,20,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
+";
+
+const INSTANTS: &str = "id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
+target_width_m,target_speed_kmh,target_lateral_m,kept,tag_frames
+a,cut-in,10.00,108,4.5,1.8,left,4.2,1.9,72,3.5,yes,1 2
+a,cut-in,10.04,107,4.5,1.8,left,4.2,1.9,72,3.4,,
+a,cut-in,10.08,106,4.5,1.8,left,4.2,1.9,90,3.3,,
+b,lvd,0,90,4.5,1.8,Right,4.2,1.9,90,0,1,
+b,,0.1,,,,,,,36,0.1,,
+";
+
+const CASES: &str = "id,category,model,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+ahead_speed_kmh,duration_s,rate_hz
+a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
+,lvd,RSS,108,30,,30,,-6,0,,,,10
+c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
 ";
 
 const CUT_OUTS: &str = "scenario,check,model,v0_kmh,vlat,front_length,vfront_kmh,front_dist,initial_gap_nominal,\
@@ -158,6 +178,16 @@ impl Seeds {
             loaded: small::recording(),
             scenario_files: [&few[..], &few[..1], &few[4..5]]
                 .map(|s| written(|path| write_scenarios(path, s).unwrap()))
+                .into(),
+            scenario_tables: vec![INSTANTS.into(), CASES.into()],
+            #[cfg(feature = "parquet")]
+            parquets: [&few[..], &few[..1]]
+                .map(|s| {
+                    let dir = tempfile::tempdir().unwrap();
+                    let path = dir.path().join("s.parquet");
+                    write_scenarios(&path, s).unwrap();
+                    std::fs::read(path).unwrap()
+                })
                 .into(),
             scenarios: few,
             exposures: vec![{

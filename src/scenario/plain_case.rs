@@ -1,7 +1,7 @@
 //! A concrete case from a handful of numbers: constant speeds or one deceleration, a lane change at constant lateral
 //! speed. What `simulate` takes from flags and what a map's cells are.
 
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+use super::{Ahead, Case, Category, Lateral, Participant, Speed};
 use crate::{Error, Place, Result};
 
 /// Lateral distance of a lane change unless told otherwise, m.

@@ -1,0 +1,314 @@
+//! Scenarios from tables that this or any other program wrote: one row per scenario with series as lists, one row per
+//! scenario and instant, or one row per concrete case ([`super::parameter_table`]). The columns tell which it is.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use super::jsonl::{Problem, check, name};
+use super::leaves::{Leaf, leaves, names};
+use super::schema::wrong_field;
+use super::{Scenario, parameter_table};
+use crate::error::{Error, Result};
+use crate::table::{Named, Resolved, Row, TableFormat, TableReader, nearest, resolve};
+
+/// Where the columns are told.
+pub(super) const HELP: &str = "the columns are told in the chapter on tables (docs/src/tables.md)";
+
+/// Reads a table of scenarios.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] naming file, row, scenario and column.
+pub(super) fn read(path: &Path, format: TableFormat) -> Result<Vec<Scenario>> {
+    let table = TableReader::open(path, format)?;
+    let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s" }]);
+    let names = names(&leaves);
+    let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
+    let is = |column: &String, field: &str| match resolve(column, &known) {
+        Resolved::Field(at, _) => leaves[names[at].1].flat == field,
+        _ => false,
+    };
+    let has_time = table.columns().iter().any(|column| matches!(resolve(column, &time), Resolved::Field(..)));
+    let has_series = table.columns().iter().any(|column| is(column, "target_v") || is(column, "target_y"));
+    let mut reader = if has_time {
+        let mut known = known;
+        known.extend(time);
+        Reader::new(table, leaves, &known, &names)?
+    } else if has_series {
+        Reader::new(table, leaves, &known, &names)?
+    } else {
+        return parameter_table::read(table);
+    };
+    while let Some(row) = reader.table.next_row()? {
+        if has_time { reader.instant(row)? } else { reader.scenario(row)? }
+    }
+    reader.end()?;
+    Ok(reader.found.scenarios)
+}
+
+/// Scenarios that have been read, with where each id came from.
+pub(super) struct Found {
+    pub scenarios: Vec<Scenario>,
+    rows: HashMap<String, u64>,
+}
+
+impl Found {
+    pub fn new() -> Found {
+        Found { scenarios: Vec::new(), rows: HashMap::new() }
+    }
+
+    /// Takes a scenario whose id did not come before.
+    pub fn add(&mut self, scenario: Scenario, row: u64, table: &TableReader) -> Result<()> {
+        if let Some(first) = self.rows.insert(scenario.id.clone(), row) {
+            return Err(Error::input(
+                table.place(row, Some(name(&scenario.id))).column("id"),
+                format!("this id is that of {} {first} too, but every scenario needs its own", table.word()),
+                "rename one of the two; rows of one scenario stand together",
+            ));
+        }
+        self.scenarios.push(scenario);
+        Ok(())
+    }
+}
+
+/// Says which fields the columns of a table are, and takes only those.
+///
+/// # Errors
+/// [`Error::Input`] for a column in a unit that cannot be used, two columns of one field, and a name so near to that of
+/// a field which is missing that it is misspelt; where `others` are not let be, for every unknown one.
+pub(super) fn choose(
+    table: &mut TableReader,
+    known: &[Named],
+    field_of: impl Fn(usize) -> usize,
+    others_are_let_be: bool,
+) -> Result<Vec<Chosen>> {
+    let mut chosen: Vec<Chosen> = Vec::new();
+    let mut unknown = Vec::new();
+    for (at, column) in table.columns().iter().enumerate() {
+        let refused = |problem: String, help: String| Err(Error::input(table.header().column(column), problem, help));
+        match resolve(column, known) {
+            Resolved::Field(known, divisor) => {
+                let field = field_of(known);
+                if let Some(other) = chosen.iter().find(|other| other.field == field) {
+                    let problem = format!("holds the same as the column `{}`", other.column);
+                    return refused(problem, "remove one of the two".to_owned());
+                }
+                chosen.push(Chosen { at, column: column.clone(), known, field, divisor });
+            }
+            Resolved::WrongUnit(problem, help) => return refused(problem, help),
+            // The index that pandas keeps.
+            Resolved::Unknown if column.is_empty() || column.starts_with("__") || column.starts_with("Unnamed") => {}
+            Resolved::Unknown => unknown.push(column),
+        }
+    }
+    for column in unknown {
+        let missing = (0..known.len()).filter(|&at| !chosen.iter().any(|other| other.field == field_of(at)));
+        let near = nearest(column, missing.map(|at| known[at].name.as_str()));
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`? {HELP}"),
+            None if others_are_let_be => continue,
+            None => format!("remove it; {HELP}"),
+        };
+        return Err(Error::input(table.header().column(column), "no such column is known", help));
+    }
+    let at: Vec<usize> = chosen.iter().map(|column| column.at).collect();
+    table.want(&at)?;
+    Ok(chosen)
+}
+
+/// A column whose field is known.
+pub(super) struct Chosen {
+    at: usize,
+    /// As the file names it.
+    pub column: String,
+    /// Under which name it was understood.
+    pub known: usize,
+    pub field: usize,
+    pub divisor: f64,
+}
+
+struct Reader {
+    table: TableReader,
+    leaves: Vec<Leaf>,
+    chosen: Vec<Chosen>,
+    /// Per chosen column: may its value change within a scenario?
+    may_change: Vec<bool>,
+    found: Found,
+    /// The scenario whose instants are being read.
+    open: Option<Open>,
+}
+
+/// Instants of one scenario, so far.
+struct Open {
+    first_row: u64,
+    id: Value,
+    /// Of the first row, per chosen column.
+    first: Vec<Value>,
+    /// Per chosen column that is a series.
+    series: Vec<Vec<Value>>,
+    times_s: Vec<f64>,
+}
+
+impl Reader {
+    fn new(
+        mut table: TableReader,
+        leaves: Vec<Leaf>,
+        known: &[Named],
+        names: &[(Named, usize, bool)],
+    ) -> Result<Reader> {
+        // What comes after the names is the time.
+        let field_of = |at: usize| names.get(at).map_or(leaves.len(), |name| name.1);
+        let chosen = choose(&mut table, known, field_of, true)?;
+        let has_time = chosen.iter().any(|column| column.field == leaves.len());
+        let is_there = |at: usize| chosen.iter().any(|column| column.field == at);
+        let is_needed = |leaf: &Leaf| leaf.is_required && !(has_time && leaf.flat == "fps");
+        let missing: Vec<String> = leaves
+            .iter()
+            .enumerate()
+            .filter(|(at, leaf)| is_needed(leaf) && !is_there(*at))
+            .map(|(_, leaf)| format!("`{}`", leaf.flat))
+            .collect();
+        if !missing.is_empty() {
+            let problem = format!("no column {}", missing.join(", "));
+            return Err(Error::input(table.header(), problem, HELP));
+        }
+        let may_change = chosen.iter().map(|column| names.get(column.known).is_none_or(|name| name.2)).collect();
+        Ok(Reader { table, leaves, chosen, may_change, found: Found::new(), open: None })
+    }
+
+    /// A row that is a scenario.
+    fn scenario(&mut self, row: Row) -> Result<()> {
+        let values = self.chosen.iter().zip(row.values);
+        let mut scenario = Map::new();
+        for (column, value) in values {
+            let leaf = &self.leaves[column.field];
+            leaf.put(&mut scenario, leaf.typed(value, column.divisor));
+        }
+        self.take(scenario, row.number)
+    }
+
+    /// A row that is an instant of a scenario.
+    fn instant(&mut self, row: Row) -> Result<()> {
+        let time = self.leaves.len();
+        let typed = |(column, value): (&Chosen, Value)| match self.leaves.get(column.field) {
+            Some(leaf) => leaf.typed(value, column.divisor),
+            None => super::leaves::number(value, column.divisor),
+        };
+        let values: Vec<Value> = self.chosen.iter().zip(row.values).map(typed).collect();
+        let value_of = |field: usize| {
+            self.chosen.iter().position(|column| column.field == field).map_or(Value::Null, |at| values[at].clone())
+        };
+        let id = value_of(self.leaves.iter().position(|leaf| leaf.flat == "id").unwrap_or(time));
+        let item = id.as_str().map(name);
+        let Some(time_s) = value_of(time).as_f64() else {
+            let problem = format!("is {}; expected a time in seconds", value_of(time));
+            return Err(Error::input(self.table.place(row.number, item).column("time_s"), problem, HELP));
+        };
+        if self.open.as_ref().is_some_and(|open| open.id != id) {
+            self.end()?;
+        }
+        let Some(open) = &mut self.open else {
+            let series = |column: &Chosen, value: &Value| {
+                let is_series = self.leaves.get(column.field).is_some_and(Leaf::is_series);
+                if is_series { vec![value.clone()] } else { Vec::new() }
+            };
+            let series = self.chosen.iter().zip(&values).map(|(column, value)| series(column, value)).collect();
+            self.open = Some(Open { first_row: row.number, id, first: values, series, times_s: vec![time_s] });
+            return Ok(());
+        };
+        for (at, (column, value)) in self.chosen.iter().zip(values).enumerate() {
+            match self.leaves.get(column.field) {
+                Some(leaf) if leaf.is_series() => open.series[at].push(value),
+                Some(_) if !self.may_change[at] && !value.is_null() && value != open.first[at] => {
+                    let problem = format!("is {value}, but {} at the scenario's first instant", open.first[at]);
+                    return Err(Error::input(
+                        self.table.place(row.number, item).column(&column.column),
+                        problem,
+                        "what is of a whole scenario is the same in all its rows, or stands in the first only",
+                    ));
+                }
+                _ => {}
+            }
+        }
+        open.times_s.push(time_s);
+        Ok(())
+    }
+
+    /// The instants that have been read make a scenario.
+    fn end(&mut self) -> Result<()> {
+        if let Some(open) = self.open.take() {
+            let mut scenario = Map::new();
+            let mut has_rate = false;
+            for (at, (column, first)) in self.chosen.iter().zip(open.first).enumerate() {
+                let Some(leaf) = self.leaves.get(column.field) else { continue };
+                has_rate |= leaf.flat == "fps" && !first.is_null();
+                let series = &open.series[at];
+                // A vehicle that is not there has no series.
+                let value = match leaf.is_series() {
+                    true if series.iter().all(Value::is_null) => Value::Null,
+                    true => Value::from(series.clone()),
+                    false => first,
+                };
+                leaf.put(&mut scenario, value);
+            }
+            let place = || self.table.place(open.first_row, open.id.as_str().map(name)).column("time_s");
+            let rate_hz = rate_hz(&open.times_s).map_err(|problem| {
+                Error::input(place(), problem, "give every scenario rows at equal distances in time, in order")
+            })?;
+            if !has_rate {
+                scenario.insert("fps".to_owned(), Value::from(rate_hz));
+            }
+            self.take(scenario, open.first_row)?;
+        }
+        match self.found.scenarios.is_empty() && self.table.next_row()?.is_none() {
+            true => Err(Error::input(self.table.file(), "holds no scenario", HELP)),
+            false => Ok(()),
+        }
+    }
+
+    /// Makes the scenario and checks it.
+    fn take(&mut self, scenario: Map<String, Value>, row: u64) -> Result<()> {
+        let value = Value::Object(scenario);
+        let item = value.get("id").and_then(Value::as_str).map(name);
+        let place = |field: &str| self.table.place(row, item.clone()).column(self.column_of(field));
+        if let Some((field, problem)) = wrong_field(&value) {
+            return Err(Error::input(place(&field), problem, HELP));
+        }
+        let scenario: Scenario = serde_json::from_value(value)
+            .map_err(|e| Error::input(self.table.place(row, item.clone()), format!("not a scenario: {e}"), HELP))?;
+        check(&scenario).map_err(|Problem { field, problem, help }| Error::input(place(&field), problem, help))?;
+        self.found.add(scenario, row, &self.table)
+    }
+
+    /// The column of a field, as the file names it; `target.v[3]` is the fourth value in `target_v`.
+    fn column_of(&self, field: &str) -> String {
+        let (stem, index) = field.find('[').map_or((field, ""), |at| field.split_at(at));
+        let flat = stem.replace('.', "_");
+        let is = |column: &&Chosen| self.leaves.get(column.field).is_some_and(|leaf| leaf.flat == flat);
+        format!("{}{index}", self.chosen.iter().find(is).map_or(flat.as_str(), |column| &column.column))
+    }
+}
+
+/// Samples per second of instants at equal distances.
+fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, String> {
+    let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else { return Err("no instant".to_owned()) };
+    if times_s.len() < 2 {
+        return Err("one instant, but a scenario has a duration".to_owned());
+    }
+    let step_s = (last - first) / (times_s.len() - 1) as f64;
+    if step_s.is_nan() || step_s <= 0.0 {
+        return Err(format!("the last instant, {last} s, is not after the first, {first} s"));
+    }
+    for (k, time_s) in times_s.iter().enumerate() {
+        let expected_s = first + k as f64 * step_s;
+        // Times are often written with two or three digits.
+        if (time_s - expected_s).abs() > 0.05 * step_s {
+            return Err(format!(
+                "{time_s} s where {expected_s:.4} s was expected: the instants are not equally spaced"
+            ));
+        }
+    }
+    // 25 Hz from times with rounding errors is 25 Hz.
+    Ok((1e6 / step_s).round() / 1e6)
+}

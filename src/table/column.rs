@@ -1,0 +1,93 @@
+//! What a column is and what a field of it holds.
+
+use std::borrow::Cow;
+
+/// How the values of a column are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Text of which most rows have their own.
+    Text,
+    /// One of few texts: Parquet keeps each once.
+    Name,
+    /// Yes or no; in CSV 1 and 0.
+    Flag,
+    /// A whole number of 64 bits.
+    Whole,
+    /// A number of the lane arithmetic, binary32.
+    Binary32,
+    /// A number in binary64.
+    Binary64,
+    /// Numbers over the instants of a scenario, binary64.
+    Series,
+    /// Whole numbers in a row.
+    Wholes,
+}
+
+impl Kind {
+    /// The type as the chapter on tables names it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Text => "string",
+            Kind::Name => "dictionary",
+            Kind::Flag => "bool",
+            Kind::Whole => "int64",
+            Kind::Binary32 => "float",
+            Kind::Binary64 => "double",
+            Kind::Series => "list<double>",
+            Kind::Wholes => "list<int64>",
+        }
+    }
+}
+
+/// A column of a table that is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Name.
+    pub name: Cow<'static, str>,
+    /// Type.
+    pub kind: Kind,
+    /// Unit: `m`, `m/s`, `s`, …; `1` for numbers without one; empty for what is no number.
+    pub unit: Cow<'static, str>,
+    /// One sentence, with when a field is empty.
+    pub description: Cow<'static, str>,
+}
+
+impl Column {
+    /// A column whose words are constants.
+    pub fn new(name: &'static str, kind: Kind, unit: &'static str, description: &'static str) -> Column {
+        Column { name: name.into(), kind, unit: unit.into(), description: description.into() }
+    }
+}
+
+/// A field of a row.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell<'a> {
+    /// Did not happen, or does not exist: null in Parquet and JSON Lines, empty in CSV.
+    Null,
+    /// Of [`Kind::Text`] and [`Kind::Name`].
+    Text(Cow<'a, str>),
+    /// Of [`Kind::Flag`].
+    Flag(bool),
+    /// Of [`Kind::Whole`].
+    Whole(i64),
+    /// Of [`Kind::Binary32`] (which it has to fit) and [`Kind::Binary64`].
+    Number(f64),
+    /// As `Number`, but 2 is `2.0` in CSV.
+    Decimal(f64),
+    /// Of [`Kind::Series`].
+    Series(Cow<'a, [f64]>),
+    /// Of [`Kind::Wholes`].
+    Wholes(Cow<'a, [i64]>),
+}
+
+impl<'a> Cell<'a> {
+    /// A text that is there.
+    pub fn text(text: impl Into<Cow<'a, str>>) -> Cell<'a> {
+        Cell::Text(text.into())
+    }
+
+    /// A number, or null.
+    pub fn number(value: Option<f64>) -> Cell<'a> {
+        value.map_or(Cell::Null, Cell::Number)
+    }
+}

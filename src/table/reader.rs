@@ -1,0 +1,120 @@
+//! Reading tables that other programs made, row by row.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::TableFormat;
+use super::csv_reader::CsvRows;
+#[cfg(feature = "parquet")]
+use super::parquet_reader::ParquetRows;
+use crate::{Error, Place, Result};
+
+/// A row; one value per column that was asked for. CSV has texts only; a field that is empty is null.
+pub(crate) struct Row {
+    /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
+    pub number: u64,
+    pub values: Vec<Value>,
+}
+
+/// A table that is being read.
+pub(crate) struct TableReader {
+    path: PathBuf,
+    columns: Vec<String>,
+    rows: Rows,
+}
+
+enum Rows {
+    Csv(Box<CsvRows>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<ParquetRows>),
+}
+
+impl TableReader {
+    /// Opens a table and reads the names of its columns; fields of records count as columns `record_field`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for what is no regular file, no table, or one with a damaged header or footer.
+    pub fn open(path: &Path, format: TableFormat) -> Result<TableReader> {
+        let (columns, rows) = match format {
+            TableFormat::Csv => {
+                let (columns, rows) = CsvRows::open(path)?;
+                (columns, Rows::Csv(Box::new(rows)))
+            }
+            #[cfg(feature = "parquet")]
+            TableFormat::Parquet => {
+                let (columns, rows) = ParquetRows::open(path)?;
+                (columns, Rows::Parquet(Box::new(rows)))
+            }
+            _ => return Err(Error::Internal(format!("{} cannot be read as a table", path.display()))),
+        };
+        Ok(TableReader { path: path.to_path_buf(), columns, rows })
+    }
+
+    /// Names of the columns, as they are in the file.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Says which columns are wanted, in the order in which rows shall have them. Before the first row.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where a wanted column holds what no table here has, or its pages claim more than the file can
+    /// hold.
+    pub fn want(&mut self, columns: &[usize]) -> Result<()> {
+        match &mut self.rows {
+            Rows::Csv(rows) => {
+                rows.want(columns);
+                Ok(())
+            }
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.want(columns),
+        }
+    }
+
+    /// The next row; `None` after the last one.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for what is damaged.
+    pub fn next_row(&mut self) -> Result<Option<Row>> {
+        match &mut self.rows {
+            Rows::Csv(rows) => rows.next_row(),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.next_row(),
+        }
+    }
+
+    /// The file.
+    pub fn file(&self) -> Place {
+        Place::file(&self.path)
+    }
+
+    /// The header: where a column is told to be wrong.
+    pub fn header(&self) -> Place {
+        match &self.rows {
+            Rows::Csv(_) => self.file().row(1),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(_) => self.file(),
+        }
+    }
+
+    /// What rows are counted as.
+    pub fn word(&self) -> &'static str {
+        match &self.rows {
+            Rows::Csv(_) => "line",
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(_) => "row",
+        }
+    }
+
+    /// A row and what it is of, where that is known.
+    pub fn place(&self, number: u64, item: Option<String>) -> Place {
+        match &self.rows {
+            Rows::Csv(_) => item.map_or(self.file().row(number), |item| self.file().row(number).of(item)),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(_) => {
+                self.file().of(item.map_or(format!("row {number}"), |item| format!("row {number}, {item}")))
+            }
+        }
+    }
+}
