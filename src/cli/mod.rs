@@ -9,6 +9,9 @@ mod console;
 mod devices;
 mod environment;
 mod exit;
+mod export;
+mod export_lanes;
+mod export_worst;
 mod fit;
 mod lists;
 mod map;
@@ -101,6 +104,7 @@ enum Verb {
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
+    Export(export::Export),
     Slurm(slurm::Slurm),
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
@@ -188,6 +192,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
+        Verb::Export(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(cli.common.verbosity()),
