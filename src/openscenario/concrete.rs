@@ -31,9 +31,10 @@ pub struct PlayedVehicle {
 const REAR_AXLE_SHARE: f64 = 0.3;
 
 impl PlayedVehicle {
-    /// From the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the box, m.
+    /// From the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the box, m, in
+    /// whole millimetres.
     pub fn centre_offset_m(&self) -> f64 {
-        REAR_AXLE_SHARE * self.length_m
+        (REAR_AXLE_SHARE * self.length_m * 1e3).round() / 1e3
     }
 
     /// Distance of the axles, m: they lie symmetrically about the centre.

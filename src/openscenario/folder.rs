@@ -37,8 +37,11 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     }
     make_folder(dir)?;
     remove_earlier(dir);
-    let names = scenarios.first().map_or(Vec::new(), |s| s.properties.iter().map(|(n, _)| n.clone()).collect());
-    let header = ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.clone());
+    // The lane has a column of its own already.
+    let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
+        s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
+    });
+    let header = ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.iter().map(|n| plain(n)));
     let mut table = vec![header.collect::<Vec<String>>()];
     let mut rows = Vec::new();
     for ((text, road, row), scenario) in made.into_iter().zip(scenarios) {
@@ -53,6 +56,11 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     }
     write_atomically(&dir.join(INDEX), &csv::text(table)?)?;
     Ok(rows)
+}
+
+/// The name of a property as that of a column.
+fn plain(property: &str) -> String {
+    property.strip_prefix("lanesweep.").unwrap_or(property).to_owned()
 }
 
 /// A lane key as a part of a file name that every system takes.
