@@ -164,7 +164,7 @@ const CUT_IN: [&str; 12] = [
     "--lateral-speed",
     "1",
 ];
-const CUT_OUT: [&str; 12] = [
+const CUT_OUT: [&str; 14] = [
     "--category",
     "cut-out",
     "--model",
@@ -177,6 +177,8 @@ const CUT_OUT: [&str; 12] = [
     "1.1",
     "--ahead-gap",
     "42",
+    "--ahead-speed",
+    "26",
 ];
 const LVD: [&str; 10] =
     ["--category", "lvd", "--model", "CCHDM", "--ego-speed", "25", "--gap", "20", "--acceleration", "-6.5"];
@@ -204,8 +206,8 @@ fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
 fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
-    good(root, &["synth", "--recordings", "1", "--out", "data"]);
-    good(root, &["mine", "data", "--out", "s.jsonl"]);
+    good(root, &["synth", "data", "--synth-recordings", "1"]);
+    good(root, &["mine", "data", "--output", "s.jsonl"]);
     good(root, &["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--out", "study"]);
     let check = |args: &[&str], from: &str| {
         let listed = good(root, &[&["export", "xosc", "--out", "x"], args].concat());
@@ -231,7 +233,21 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     // What an earlier export left does not stand beside the new files.
     assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 3);
 
-    good(root, &["fit", "--scenarios", "s.jsonl", "--category", "cut-in", "--parameterization", "2", "--out", "d"]);
+    good(
+        root,
+        &[
+            "fit",
+            "--scenarios",
+            "s.jsonl",
+            "--category",
+            "cut-in",
+            "--parameterization",
+            "2",
+            "--no-comparison",
+            "--out",
+            "d",
+        ],
+    );
     good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
     assert_eq!(check(&["--from", "run", "--worst", "2", "--model", "FSM"], "run"), 2);
     refused(root, &["export", "xosc", "--from", "run"], 2, "a run has many lanes");

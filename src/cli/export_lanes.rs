@@ -9,7 +9,7 @@ use crate::criterion::Criterion;
 use crate::density::DensityModel;
 use crate::driver::{ModelId, NEVER};
 use crate::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
-use crate::parameterization::Sizes;
+use crate::parameterization::{Sizes, VehicleSize};
 use crate::profile::{CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables, read_scenarios};
@@ -83,12 +83,30 @@ pub(super) fn of_run(
                 }
                 None => named(plan, source)?,
             };
-            let about = About { data: &facts.data, is_synthetic: facts.synthetic, mined: &mined, density: None };
+            let about = About {
+                data: &facts.data,
+                is_synthetic: facts.synthetic,
+                mined: &mined,
+                density: None,
+                are_alike: false,
+            };
             if facts.reference {
                 lanes::<f64>(plan, &keys, &about, extras)
             } else {
                 lanes::<f32>(plan, &keys, &about, extras)
             }
+        }
+        Run::Distribution(plan, data) => {
+            if scenarios.is_some() || worst.is_some_and(|(_, variants)| !variants.is_empty()) {
+                let problem = "a run of distributions has neither scenarios nor variants";
+                return Err(Error::usage(Place::item("--scenarios, --variant"), problem, "leave them out"));
+            }
+            let keys = match worst {
+                Some((count, _)) => worst_of_sample(dir, &plan, count, source.models.as_deref())?,
+                None => named(&plan, source)?,
+            };
+            let about = About { data: &data, is_synthetic: false, mined: &[], density: None, are_alike: true };
+            lanes::<f32>(&plan, &keys, &about, extras)
         }
         Run::Sample(plan, density) => {
             if scenarios.is_some() {
@@ -109,6 +127,7 @@ pub(super) fn of_run(
                 is_synthetic: provenance.synthetic,
                 mined: &[],
                 density: Some(density.as_ref()),
+                are_alike: false,
             };
             lanes::<f32>(&plan, &keys, &about, extras)
         }
@@ -139,7 +158,7 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extr
     }
     let plan = plan_study(&mined, profile, &options)?.plan;
     let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
-    let about = About { data: &data, is_synthetic: false, mined: &mined, density: None };
+    let about = About { data: &data, is_synthetic: false, mined: &mined, density: None, are_alike: false };
     lanes::<f64>(&plan, &named(&plan, source)?, &about, extras)
 }
 
@@ -152,7 +171,7 @@ pub(super) fn of_case(flags: &CaseFlags, profile: &Profile, extras: &Extras) -> 
     let described = flags.case(profile)?;
     let mut tables = Tables::default();
     let case = LaneCase::encode(&described, profile, &mut tables);
-    let size = |length_m, width_m| crate::parameterization::VehicleSize { length_m, width_m };
+    let size = |length_m, width_m| VehicleSize { length_m, width_m };
     let sizes = Sizes {
         ego: size(described.ego_length_m, described.ego_width_m),
         target: size(described.principal.length_m, described.principal.width_m),
@@ -200,6 +219,8 @@ struct About<'a> {
     is_synthetic: bool,
     mined: &'a [Scenario],
     density: Option<&'a DensityModel>,
+    /// Every vehicle has the same size.
+    are_alike: bool,
 }
 
 fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Extras) -> Result<Exported> {
@@ -224,7 +245,10 @@ fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Ext
             Some(_) => widened(&case),
             None => plan.case(key.block, key.unit, key.variant),
         };
-        let sizes = about.density.map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
+        let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
+        let alike = || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size) };
+        let told = about.density.map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
+        let sizes = told.or_else(|| about.are_alike.then(alike));
         are_lengths_told &= sizes.is_some();
         let known = Known {
             key: &text,
@@ -292,7 +316,7 @@ fn concrete<R: Real>(
     };
     // A trajectory has two vertices at least.
     let mut all = paths(trace, case, tables, last.max(1)).into_iter();
-    let mut vehicle = |name, size: crate::parameterization::VehicleSize| PlayedVehicle {
+    let mut vehicle = |name, size: VehicleSize| PlayedVehicle {
         name,
         length_m: size.length_m,
         width_m: size.width_m,

@@ -24,6 +24,7 @@ mod sample;
 mod sample_adaptive;
 mod sample_checks;
 mod sample_crude;
+mod sample_distribution;
 mod sample_lanes;
 mod sample_plan;
 mod sample_weighted;

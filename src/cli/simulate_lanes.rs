@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::sample_distribution;
 use super::sample_plan::{self, PlannedSample};
 use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
 use super::study_plan::{self, PlannedStudy};
@@ -68,6 +69,10 @@ pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
             let origin = format!("profile {}, f32, sampled", plan.profile.name);
             Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic })
         }
+        Run::Distribution(plan, data) => {
+            let origin = format!("profile {}, f32, {data}", plan.profile.name);
+            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic: false })
+        }
     }
 }
 
@@ -94,6 +99,8 @@ pub(super) enum Run {
     Study(Box<PlannedStudy>),
     /// With its density.
     Sample(Box<LanePlan>, Box<DensityModel>),
+    /// Of distributions of parameters, with what they are of.
+    Distribution(Box<LanePlan>, String),
 }
 
 /// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
@@ -102,6 +109,10 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
     let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
     if run.exists() && !(estimate.exists() && key.starts_with('#')) {
         return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));
+    }
+    if estimate.exists() && dir.join(sample_distribution::KEPT).exists() {
+        let (plan, data) = sample_distribution::plan_of(dir)?;
+        return Ok(Run::Distribution(Box::new(plan), data));
     }
     if estimate.exists() {
         let (_, plan, density) = super::rerun::run_of(dir)?;

@@ -1,6 +1,8 @@
 //! A concrete case from a handful of numbers: constant speeds or one deceleration, a lane change at constant lateral
 //! speed. What `simulate` takes from flags and what a map's cells are.
 
+use super::parameter::{Point, Quantity};
+use crate::profile::Profile;
 use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 use crate::{Error, Place, Result};
 
@@ -35,6 +37,27 @@ pub struct PlainCase {
 }
 
 impl PlainCase {
+    /// The numbers of a point; what it does not set has the value that `simulate` gives it.
+    pub fn of_point(category: Category, point: &Point, profile: &Profile) -> PlainCase {
+        let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
+        let ego_speed_mps = value(Quantity::EgoSpeed, 0.0);
+        let deceleration = value(Quantity::Deceleration, 0.0);
+        PlainCase {
+            category,
+            ego_speed_mps,
+            speed_mps: value(Quantity::OtherSpeed, ego_speed_mps),
+            // No negative zero.
+            acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
+            end_speed_mps: point.get(Quantity::EndSpeed),
+            lateral_speed_mps: value(Quantity::LateralSpeed, 0.0),
+            lateral_distance_m: value(Quantity::LateralDistance, LATERAL_DISTANCE_M),
+            ahead_speed_mps: value(Quantity::AheadSpeed, 0.0),
+            ahead_gap_m: value(Quantity::AheadGap, 0.0),
+            length_m: value(Quantity::Length, profile.frame.default_length_m),
+            width_m: value(Quantity::Width, profile.frame.default_width_m),
+        }
+    }
+
     /// The case; no event is later than `time_cap_s`.
     ///
     /// # Errors

@@ -253,19 +253,18 @@ mod tests {
         // Half of what lies beyond 8 lies beyond 8.0857.
         let median = draw.value(0.5);
         assert!((normal_cdf(-median) / normal_cdf(-8.0) - 0.5).abs() < 1e-9, "{median}");
-        assert!(Distribution::Normal { mean: 0.0, deviation: 1.0, range: Range { low: 50.0, high: 60.0 } }
-            .within(Range::ALL)
-            .is_none());
+        assert!(
+            Distribution::Normal { mean: 0.0, deviation: 1.0, range: Range { low: 50.0, high: 60.0 } }
+                .within(Range::ALL)
+                .is_none()
+        );
     }
 
     #[test]
     fn a_poisson_distribution_has_its_frequencies() {
-        for (mean, range) in [
-            (3.2, Range::ALL),
-            (0.4, Range::ALL),
-            (60.0, Range { low: 50.0, high: 61.5 }),
-            (900.0, Range::ALL),
-        ] {
+        for (mean, range) in
+            [(3.2, Range::ALL), (0.4, Range::ALL), (60.0, Range { low: 50.0, high: 61.5 }), (900.0, Range::ALL)]
+        {
             let values = drawn(&Distribution::Poisson { mean, range }, Range::ALL);
             let reference = Poisson::new(mean).unwrap();
             let ks = (0..2000_u64).filter(|k| range.holds(*k as f64));
@@ -282,7 +281,8 @@ mod tests {
     #[test]
     fn a_histogram_and_a_set_have_their_weights_and_a_bin_is_even_inside() {
         let range = |low, high| Range { low, high };
-        let bins = Distribution::Histogram(vec![(range(0.0, 1.0), 1.0), (range(1.0, 4.0), 6.0), (range(5.0, 6.0), 3.0)]);
+        let bins =
+            Distribution::Histogram(vec![(range(0.0, 1.0), 1.0), (range(1.0, 4.0), 6.0), (range(5.0, 6.0), 3.0)]);
         let cdf = |x: f64| match x {
             x if x < 1.0 => 0.1 * x,
             x if x < 4.0 => 0.1 + 0.2 * (x - 1.0),

@@ -41,7 +41,8 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
     });
-    let header = ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.iter().map(|n| plain(n)));
+    let header =
+        ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.iter().map(|n| plain(n)));
     let mut table = vec![header.collect::<Vec<String>>()];
     let mut rows = Vec::new();
     for ((text, road, row), scenario) in made.into_iter().zip(scenarios) {

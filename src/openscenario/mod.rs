@@ -5,19 +5,32 @@
 //! Traces come from [`crate::sweep`]; what is read goes to [`crate::grid`] and [`crate::sweep`].
 
 mod concrete;
+mod distribution;
+mod distribution_file;
 mod elements;
 mod folder;
+mod parameters;
 mod path;
 mod road;
+mod samples;
 mod scenario_file;
 mod sizes;
+mod variations;
+mod xml_tree;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle};
+pub use distribution::{Distribution, Draw, LARGEST_POISSON, Range};
+pub use distribution_file::{
+    Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
+};
 pub use folder::{IndexRow, export_folder};
+pub use parameters::{Names, Rename};
 pub use path::{Vertex, paths};
 pub use road::{Road, road_file};
+pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MOST_SAMPLES, Sampled, SampledParameter};
 pub use scenario_file::scenario_file;
 pub use sizes::{KnownSizes, sizes_of_case};
+pub use variations::{Variations, variations};
 
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
