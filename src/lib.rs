@@ -4,7 +4,8 @@
 //! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
 //! (the number a lane computes with), [`random`], [`density`] and
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
-//! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
+//! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`openscenario`] (played scenarios and
+//! distributions of parameters), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
 //! good order) and [`cli`].
 
 mod atomic_file;
@@ -23,6 +24,7 @@ mod input_file;
 pub mod interrupt;
 mod lock;
 pub mod mining;
+pub mod openscenario;
 pub mod parameterization;
 pub mod parts;
 pub mod profile;

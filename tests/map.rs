@@ -38,6 +38,7 @@ fn parts(category: Category, x: &str, y: &str) -> GridParts {
         style: CaseStyle::Plain,
         native_gap: false,
         closing_only: false,
+        panel_rows: None,
     }
 }
 
@@ -246,6 +247,7 @@ fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
         style: grid.style(),
         native_gap: grid.has_native_gap(),
         closing_only: grid.category() == Category::CutIn,
+        panel_rows: None,
     })
     .unwrap()
 }

@@ -1,6 +1,6 @@
 //! `lanesweep map`: the outcome over two parameters of a category, per panel of others and model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -12,7 +12,10 @@ use super::{Exit, lists};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::grid::presets::{self, Preset};
-use crate::grid::{CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapBackend, PARAMETERS, Parameter};
+use crate::grid::{
+    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MOST_PANELS, MapBackend, PARAMETERS, Parameter,
+};
+use crate::openscenario::{Names, Rename, read_distribution, variations};
 use crate::profile::Profile;
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
@@ -37,7 +40,14 @@ pub struct Map {
     /// Grids: jrc
     #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
     preset: Option<String>,
-    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C
+    /// OpenSCENARIO file with deterministic distributions of parameters: its first two with several values are the axes,
+    /// unless --x and --y name others; the rest part the panels
+    #[arg(long, value_name = "FILE", conflicts_with = "preset")]
+    distribution: Option<PathBuf>,
+    /// With --distribution: a parameter of the file is one of ours, times a factor for its unit; repeatable
+    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
+    rename: Vec<Rename>,
+    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C; with --distribution also a NAME of the file's
     #[arg(long, value_name = "NAME=RANGE")]
     x: Option<String>,
     /// Parameter upwards
@@ -87,7 +97,8 @@ fn after_help() -> String {
         "Parameters: {}\n\nExamples:\n  lanesweep map cut-in --preset jrc --out maps\n  lanesweep map cut-in --x \
          gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 --panel ego_speed_kmh=60,90,120 --panel \
          other_speed_kmh=30,50 --models FSM,RSS --against un-r157\n  lanesweep map lvd --x \
-         deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM",
+         deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM\n  lanesweep map cut-in \
+         --distribution cut-ins.xosc --rename Ego_Speed_kph=ego_speed_kmh --set thw_s=1.2",
         names.join(", ")
     )
 }
@@ -188,7 +199,10 @@ impl Map {
                 return Err(Error::usage(Place::item("--preset"), problem, format!("presets: {}", presets::NAMES.join(", "))));
             }
             None => {
-                let grid = self.own_grid(category)?;
+                let grid = match &self.distribution {
+                    Some(path) => Grid::new(self.of_distribution(path, category)?)?,
+                    None => self.own_grid(category)?,
+                };
                 vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent: Vec::new() }]
             }
         };
@@ -207,16 +221,6 @@ impl Map {
             })?;
             GridAxis::parse(category, text, flag)
         };
-        let fixed = |text: &String| -> Result<(&'static Parameter, f64)> {
-            let axis = GridAxis::parse(category, text, "--set")?;
-            match axis.values[..] {
-                [value] => Ok((axis.parameter, value)),
-                _ => {
-                    let problem = format!("`{text}` has {} values", axis.len());
-                    Err(Error::usage(Place::item("--set"), problem, "give one, or make it an axis with --panel"))
-                }
-            }
-        };
         Grid::new(GridParts {
             name: category.key().to_owned(),
             category,
@@ -227,10 +231,90 @@ impl Map {
                 .iter()
                 .map(|text| GridAxis::parse(category, text, "--panel"))
                 .collect::<Result<_>>()?,
-            fixed: self.set.iter().map(fixed).collect::<Result<_>>()?,
+            fixed: self.fixed(category)?,
             style: CaseStyle::Plain,
             native_gap: self.native_gap,
             closing_only: self.closing,
+            panel_rows: None,
+        })
+    }
+
+    fn fixed(&self, category: Category) -> Result<Vec<(&'static Parameter, f64)>> {
+        let fixed = |text: &String| -> Result<(&'static Parameter, f64)> {
+            let axis = GridAxis::parse(category, text, "--set")?;
+            match axis.values[..] {
+                [value] => Ok((axis.parameter, value)),
+                _ => {
+                    let problem = format!("`{text}` has {} values", axis.len());
+                    Err(Error::usage(Place::item("--set"), problem, "give one, or make it an axis with --panel"))
+                }
+            }
+        };
+        self.set.iter().map(fixed).collect()
+    }
+
+    /// The grid of a file of distributions, with what the flags add.
+    fn of_distribution(&self, path: &Path, category: Category) -> Result<GridParts> {
+        let file = read_distribution(path)?;
+        let found = variations(&file, &Names { category, renames: &self.rename, path })?;
+        let mut left = found.axes;
+        let mut axis = |flag: &Option<String>, name: &str| -> Result<GridAxis> {
+            let named = |left: &mut Vec<GridAxis>, at: Option<usize>| at.map(|at| left.remove(at));
+            match flag.as_deref().map(str::trim) {
+                Some(text) if text.contains('=') => GridAxis::parse(category, text, name),
+                Some(key) => {
+                    let parameter = Parameter::find(category, key, name)?;
+                    let at = left.iter().position(|axis| axis.parameter == parameter);
+                    named(&mut left, at).ok_or_else(|| {
+                        let problem = format!("the file has no distribution of `{key}` alone");
+                        Error::usage(Place::item(name), problem, format!("give its values: {name} {key}=FROM..TO/STEP"))
+                    })
+                }
+                None => {
+                    let several = left.iter().position(|axis| axis.len() > 1);
+                    let at = several.or(if left.is_empty() { None } else { Some(0) });
+                    named(&mut left, at).ok_or_else(|| {
+                        let problem = "the file has no two parameters with distributions of their own";
+                        let help = format!("a map has two axes: give one by {name} NAME=FROM..TO/STEP");
+                        Error::usage(Place::item(name), problem, help)
+                    })
+                }
+            }
+        };
+        // What --y names must not be taken for --x.
+        let (x, y) = if self.x.is_none() && self.y.is_some() {
+            let y = axis(&self.y, "--y")?;
+            (axis(&self.x, "--x")?, y)
+        } else {
+            let x = axis(&self.x, "--x")?;
+            (x, axis(&self.y, "--y")?)
+        };
+        let mut fixed = self.fixed(category)?;
+        fixed.extend(left.iter().filter(|axis| axis.len() == 1).map(|axis| (axis.parameter, axis.values[0])));
+        left.retain(|axis| axis.len() > 1);
+        left.extend(
+            self.panel.iter().map(|text| GridAxis::parse(category, text, "--panel")).collect::<Result<Vec<_>>>()?,
+        );
+        let mut rows = found.set_rows;
+        for axis in &left {
+            if rows.len().saturating_mul(axis.len()) > MOST_PANELS {
+                let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+                return Err(Error::usage(Place::item("--distribution"), "too many panels", help));
+            }
+            let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();
+            rows = rows.iter().flat_map(|row| axis.values.iter().map(move |v| with(row, *v))).collect();
+        }
+        Ok(GridParts {
+            name: category.key().to_owned(),
+            category,
+            x,
+            y,
+            panel_axes: found.set_axes.into_iter().chain(left).collect(),
+            fixed,
+            style: CaseStyle::Plain,
+            native_gap: self.native_gap,
+            closing_only: self.closing,
+            panel_rows: Some(rows),
         })
     }
 

@@ -9,6 +9,9 @@ mod console;
 mod devices;
 mod environment;
 mod exit;
+mod export;
+mod export_lanes;
+mod export_worst;
 mod fit;
 mod format;
 mod lists;
@@ -22,6 +25,7 @@ mod sample;
 mod sample_adaptive;
 mod sample_checks;
 mod sample_crude;
+mod sample_distribution;
 mod sample_lanes;
 mod sample_plan;
 mod sample_weighted;
@@ -102,6 +106,7 @@ enum Verb {
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
+    Export(export::Export),
     Slurm(slurm::Slurm),
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
@@ -189,6 +194,7 @@ fn run(cli: &Cli) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
+        Verb::Export(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(cli.common.verbosity()),

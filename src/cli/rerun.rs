@@ -33,6 +33,12 @@ struct Recorded {
 /// # Errors
 /// [`Error::Io`], [`Error::Input`] where the folder does not hold a run.
 pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<String>)> {
+    let (facts, plan_sha256) = record_of(dir)?;
+    Ok((facts, read_density(&dir.join("density.json"))?, plan_sha256))
+}
+
+/// The same of a run without a density of ours.
+pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
     let path = dir.join("estimate.json");
     let wrong = |problem: String| {
         let help = "give the folder (--out) of a `lanesweep sample` run by this version";
@@ -54,7 +60,7 @@ pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<Str
         seed: run.seed,
         given: run.given,
     };
-    Ok((facts, read_density(&dir.join("density.json"))?, run.plan_sha256))
+    Ok((facts, run.plan_sha256))
 }
 
 /// The plan of the sampling run that wrote this folder, with what the run was asked for and its density.

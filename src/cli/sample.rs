@@ -11,6 +11,7 @@ use super::format::FormatFlag;
 use super::lists;
 use super::sample_checks;
 use super::sample_crude;
+use super::sample_distribution;
 use super::sample_lanes;
 use super::sample_plan::{self, PlannedSample, SampleFacts};
 use super::sample_weighted;
@@ -21,6 +22,7 @@ use crate::criterion::Criterion;
 use crate::density::{DensityModel, read_density};
 use crate::driver::ModelId;
 use crate::estimate::{Checkpoints, StopRule};
+use crate::openscenario::Rename;
 use crate::parts::kind_of;
 use crate::profile::Profile;
 use crate::report::files::make_folder;
@@ -38,7 +40,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "density" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "until"
+    "density" | "distribution" | "category" | "rename" | "set" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "until"
     | "time_limit" | "worst" | "map" | "pilot" | "worst_share" | "broad" | "defence" | "given" | "proposal"
     | "bootstrap" | "bootstrap_samples" | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
@@ -47,12 +49,26 @@ use crate::{Error, Place, Result};
 #[command(
     after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
                         sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
-                        cut-in-1.json --samples 100000000 --shard 0/2 --out big"
+                        cut-in-1.json --samples 100000000 --shard 0/2 --out big\n  lanesweep sample --distribution \
+                        cut-ins.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --set lateral_speed_mps=1"
 )]
 pub struct Sample {
     /// Density file
-    #[arg(value_name = "DENSITY", required_unless_present = "plan")]
+    #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"])]
     density: Option<PathBuf>,
+    /// OpenSCENARIO file with stochastic distributions of parameters, instead of a density; its numberOfTestRuns and
+    /// randomSeed are the defaults of --samples and --seed
+    #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "bootstrap", "rows", "shard", "plan_only"])]
+    pub(super) distribution: Option<PathBuf>,
+    /// With --distribution: kind of scenario: cut-in, cut-out, lvd
+    #[arg(long, value_name = "NAME", requires = "distribution")]
+    pub(super) category: Option<String>,
+    /// With --distribution: a parameter of the file is one of ours, times a factor for its unit; repeatable
+    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
+    pub(super) rename: Vec<Rename>,
+    /// With --distribution: value that is the same in every sample; repeatable
+    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given)]
+    pub(super) set: Vec<(String, f64)>,
     /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
     #[arg(long, value_enum, default_value_t)]
     pub(super) estimator: EstimatorFlag,
@@ -117,9 +133,9 @@ pub struct Sample {
     /// Samples of each replicate
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     pub(super) bootstrap_samples: u64,
-    /// Seed of the draws
-    #[arg(long, value_name = "N", default_value_t = 157)]
-    pub(super) seed: u64,
+    /// Seed of the draws [default: 157; with --distribution: the file's]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
@@ -132,6 +148,9 @@ pub struct Sample {
     #[command(flatten)]
     profile: ProfileFlags,
 }
+
+/// Seed where none is given.
+pub(super) const SEED: u64 = 157;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum EstimatorFlag {
@@ -189,6 +208,9 @@ impl Sample {
         if let Some(path) = &self.shards.plan {
             return self.run_plan(path, started, verbosity);
         }
+        if let Some(path) = &self.distribution {
+            return sample_distribution::run(self, path, started, verbosity);
+        }
         let Some(density) = &self.density else {
             return Err(Error::usage(
                 Place::item("DENSITY"),
@@ -242,6 +264,37 @@ impl Sample {
         sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity)
     }
 
+    /// The seed of the draws.
+    pub(super) fn seed(&self) -> u64 {
+        self.seed.unwrap_or(SEED)
+    }
+
+    /// The seed as it was typed.
+    pub(super) fn given_seed(&self) -> Option<u64> {
+        self.seed
+    }
+
+    pub(super) fn open(&self) -> Result<Opened> {
+        self.backend.open()
+    }
+
+    pub(super) fn load_profile(&self) -> Result<Profile> {
+        self.profile.load()
+    }
+
+    /// The headways of `--thw` where nothing draws them.
+    pub(super) fn listed_headways(&self) -> Result<Option<Vec<Headway>>> {
+        match self.thw.as_deref().map(str::trim) {
+            None => Ok(None),
+            Some("paper") => Ok(Some(Headway::paper())),
+            Some(list) => lists::headways(list, "`paper`").map(Some),
+        }
+    }
+
+    pub(super) fn worst(&self) -> usize {
+        self.worst
+    }
+
     pub(super) fn is_crude(&self) -> bool {
         self.estimator == EstimatorFlag::Mc && self.proposal.is_empty()
     }
@@ -251,11 +304,11 @@ impl Sample {
         self.estimator == EstimatorFlag::Is && self.proposal.len() == 1
     }
 
-    fn models(&self) -> Result<Vec<ModelId>> {
+    pub(super) fn models(&self) -> Result<Vec<ModelId>> {
         lists::models(&self.models)
     }
 
-    fn criterion(&self) -> Result<Criterion> {
+    pub(super) fn criterion(&self) -> Result<Criterion> {
         Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
             let problem = format!("there is no criterion `{}`", self.criterion);
             Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
@@ -304,7 +357,7 @@ impl Run<'_> {
             },
             points: if self.flags.points == PointsFlag::Sobol { "sobol" } else { "random" },
             samples,
-            seed: self.flags.seed,
+            seed: self.flags.seed(),
             given: self.flags.given.clone(),
         };
         EstimateFile::new(&self.density, facts, estimates, self.host(0))
@@ -315,7 +368,7 @@ impl Run<'_> {
         let flags = self.flags;
         let options = SamplePlanOptions {
             samples: flags.samples.unwrap_or(100_000),
-            seed: flags.seed,
+            seed: flags.seed(),
             source: match flags.points {
                 PointsFlag::Random => SampleSource::Random,
                 PointsFlag::Sobol => SampleSource::Sobol,
@@ -351,7 +404,7 @@ impl Run<'_> {
             headway,
             criterion: self.criterion,
             samples: flags.samples.unwrap_or(100_000),
-            seed: flags.seed,
+            seed: flags.seed(),
             level: flags.level,
         };
         PlannedWeighted::new(self.density, proposal, facts)

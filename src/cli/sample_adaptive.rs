@@ -63,11 +63,11 @@ impl Run<'_> {
         let flags = self.flags;
         let lanes = self.limit_state(model);
         let importance_options =
-            Importance { level: flags.level, stop: self.stop(samples), ..Importance::new(flags.seed, samples) };
+            Importance { level: flags.level, stop: self.stop(samples), ..Importance::new(flags.seed(), samples) };
         let proposal_file = flags.out.join(format!("proposal-{}.json", model.name()));
         match flags.estimator {
             EstimatorFlag::Subset => {
-                let options = Subset { level: flags.level, ..Subset::new(flags.seed, samples) };
+                let options = Subset { level: flags.level, ..Subset::new(flags.seed(), samples) };
                 let run = subset(nominal, &lanes, &options)?;
                 Ok((run.estimate, Some(Levels::Subset(run.levels))))
             }
@@ -76,7 +76,7 @@ impl Run<'_> {
                     level: flags.level,
                     defence: flags.defence,
                     stop: self.stop(samples),
-                    ..CrossEntropy::new(flags.seed, (samples / 10).max(2000), samples)
+                    ..CrossEntropy::new(flags.seed(), (samples / 10).max(2000), samples)
                 };
                 let run = cross_entropy(nominal, &lanes, &options)?;
                 write_proposal(&proposal_file, &self.density, &run.proposal)?;
@@ -107,7 +107,7 @@ impl Run<'_> {
                 let prepared = |mixture| {
                     let proposal = defended(mixture, nominal, flags.defence)?;
                     // One proposal's valid share comes out of its own draws.
-                    Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed, VALIDITY_DRAWS) })
+                    Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed(), VALIDITY_DRAWS) })
                 };
                 let proposals: Vec<Defended> = mixtures.into_iter().map(prepared).collect::<Result<_>>()?;
                 let estimate = match &proposals[..] {
@@ -116,7 +116,7 @@ impl Run<'_> {
                         let draws = samples / several.len() as u64;
                         let techniques: Vec<Technique> =
                             several.iter().map(|proposal| Technique { proposal, draws }).collect();
-                        balance_heuristic(nominal, &techniques, &lanes, flags.seed, flags.level)?
+                        balance_heuristic(nominal, &techniques, &lanes, flags.seed(), flags.level)?
                     }
                 };
                 Ok((estimate, None))

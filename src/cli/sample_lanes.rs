@@ -63,7 +63,16 @@ pub(super) fn check_writable(out: &Path) -> Result<()> {
 }
 
 /// Beginnings of the names of all files that a sampling run writes beside its input.
-const OURS: [&str; 7] = ["estimate", "worst.csv", "convergence.", "map-", "proposal-", "headways.", "report.html"];
+const OURS: [&str; 8] = [
+    "estimate",
+    "worst.csv",
+    "convergence.",
+    "map-",
+    "proposal-",
+    "headways.",
+    "report.html",
+    super::sample_distribution::KEPT,
+];
 
 /// Takes the files of an earlier run out of a folder, so that none stands beside the results of this one; keeps those
 /// whose names begin so.

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::sample_distribution;
 use super::sample_plan::{self, PlannedSample};
 use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
 use super::study_plan::{self, PlannedStudy};
+use crate::density::DensityModel;
 use crate::driver::ModelId;
 use crate::parts::kind_of;
 use crate::profile::Profile;
@@ -61,14 +63,15 @@ pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
             let origin = format!("profile {}, {arithmetic}, {}", study.plan.profile.name, facts.data);
             Ok(Lanes { traced, origin, synthetic: facts.synthetic })
         }
-        Run::Sample(plan, synthetic) => {
-            let key = find(&plan, asked.key)?;
-            if plan.generator().is_some_and(|generator| generator.draw(key.unit).is_void()) {
-                let help = "no draw of it was valid: take another";
-                return Err(Error::usage(Place::item("--lane"), "this sample is void", help));
-            }
+        Run::Sample(plan, density) => {
+            refuse_void(&plan, &find(&plan, asked.key)?)?;
+            let synthetic = density.provenance.synthetic;
             let origin = format!("profile {}, f32, sampled", plan.profile.name);
             Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic })
+        }
+        Run::Distribution(plan, data) => {
+            let origin = format!("profile {}, f32, {data}", plan.profile.name);
+            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic: false })
         }
     }
 }
@@ -92,22 +95,28 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked) -> Res
     Ok(Lanes { traced: traced::<f64>(&plan, asked, false)?, origin, synthetic: false })
 }
 
-enum Run {
+pub(super) enum Run {
     Study(Box<PlannedStudy>),
-    /// With whether its density is of synthetic data.
-    Sample(Box<LanePlan>, bool),
+    /// With its density.
+    Sample(Box<LanePlan>, Box<DensityModel>),
+    /// Of distributions of parameters, with what they are of.
+    Distribution(Box<LanePlan>, String),
 }
 
 /// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
-fn find_run(dir: &Path, key: &str) -> Result<Run> {
+pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
     crate::report::files::check_folder(dir)?;
     let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
     if run.exists() && !(estimate.exists() && key.starts_with('#')) {
         return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));
     }
+    if estimate.exists() && dir.join(sample_distribution::KEPT).exists() {
+        let (plan, data) = sample_distribution::plan_of(dir)?;
+        return Ok(Run::Distribution(Box::new(plan), data));
+    }
     if estimate.exists() {
         let (_, plan, density) = super::rerun::run_of(dir)?;
-        return Ok(Run::Sample(Box::new(plan), density.provenance.synthetic));
+        return Ok(Run::Sample(Box::new(plan), Box::new(density)));
     }
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
@@ -117,7 +126,7 @@ fn find_run(dir: &Path, key: &str) -> Result<Run> {
     match kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?.as_str() {
         sample_plan::KIND => {
             let sample = PlannedSample::read(&plan)?.0;
-            Ok(Run::Sample(Box::new(sample.plan), sample.density.provenance.synthetic))
+            Ok(Run::Sample(Box::new(sample.plan), Box::new(sample.density)))
         }
         // Its reader refuses every other kind.
         _ => Ok(Run::Study(Box::new(PlannedStudy::read(&plan)?.0))),
@@ -158,7 +167,16 @@ fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
     }))
 }
 
-fn find(plan: &LanePlan, key: &str) -> Result<LaneKey> {
+/// A void sample has no case.
+pub(super) fn refuse_void(plan: &LanePlan, key: &LaneKey) -> Result<()> {
+    if plan.generator().is_some_and(|generator| generator.draw(key.unit).is_void()) {
+        let help = "no draw of it was valid: take another";
+        return Err(Error::usage(Place::item("--lane"), "this sample is void", help));
+    }
+    Ok(())
+}
+
+pub(super) fn find(plan: &LanePlan, key: &str) -> Result<LaneKey> {
     plan.parse_key(key).ok_or_else(|| {
         let example = plan.key(0).map_or(String::new(), |key| format!(", for instance {}", plan.key_text(&key)));
         Error::usage(
@@ -196,7 +214,7 @@ fn traced<R: Real>(plan: &LanePlan, asked: &Asked, with_reference: bool) -> Resu
     Ok(all)
 }
 
-fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
+pub(super) fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
     plan.models.iter().position(|m| *m == id).ok_or_else(|| {
         let there: Vec<&str> = plan.models.iter().map(|m| m.name()).collect();
         let problem = format!("{} is not a model of this run", id.name());

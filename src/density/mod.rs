@@ -34,6 +34,7 @@ pub use mixture::{MAX_DIMENSIONS, Mixture};
 pub use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DataFacts, DensityModel, FitOptions, Fitted, Provenance};
 pub use model_file::{LARGEST_FILE_BYTES, read_density, write_density};
+pub(crate) use normal::Draws;
 pub use normal::{normal_cdf, normal_density, normal_quantile};
 pub use parameters::{Invalid, ParameterSpace};
 pub use quantity::{LONGEST_DURATION_S, Parameter, Quantity};

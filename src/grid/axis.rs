@@ -59,6 +59,14 @@ impl GridAxis {
         Ok(GridAxis { parameter, values: range(ends, step, key, "preset")? })
     }
 
+    /// The values of an interval at steps, both ends included where the step meets them; `what` names it in an error.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a step that leads nowhere, an empty interval, and too many values.
+    pub fn steps(ends: (f64, f64), step: f64, what: &str) -> Result<Vec<f64>> {
+        range(ends, step, what, what)
+    }
+
     /// Number of values.
     pub fn len(&self) -> usize {
         self.values.len()

@@ -8,7 +8,6 @@ use crate::{Error, Place, Result};
 use super::axis::GridAxis;
 use super::jrc_case::{self, Front};
 use super::parameter::{Parameter, Point, Quantity};
-use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};
 
 /// Cells of a grid at most.
 pub const MOST_CELLS: usize = 1_000_000;
@@ -20,7 +19,7 @@ pub const MOST_PANELS: usize = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseStyle {
-    /// As `simulate` makes it: see [`PlainCase`].
+    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,
@@ -64,6 +63,8 @@ pub struct GridParts {
     pub native_gap: bool,
     /// Panels in which the ego is not faster than the other vehicle are left out.
     pub closing_only: bool,
+    /// The panels themselves, where they are not every combination: a value for each of `panel_axes`.
+    pub panel_rows: Option<Vec<Vec<f64>>>,
 }
 
 impl Grid {
@@ -72,7 +73,7 @@ impl Grid {
     /// # Errors
     /// [`Error::Usage`] with the parameter.
     pub fn new(parts: GridParts) -> Result<Grid> {
-        let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only } = parts;
+        let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only, panel_rows } = parts;
         let axes = || [&x, &y].into_iter().chain(&panel_axes);
         let given: Vec<&Parameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
         for (at, parameter) in given.iter().enumerate() {
@@ -82,8 +83,11 @@ impl Grid {
             }
         }
         let has = |quantity| given.iter().any(|p| p.quantity == quantity);
-        check_complete(category, native_gap, &has)?;
-        let panels = combinations(&panel_axes)?;
+        check_complete(category, native_gap, &has, FOR_A_MAP)?;
+        let panels = match panel_rows {
+            Some(rows) => checked(rows, &panel_axes)?,
+            None => combinations(&panel_axes)?,
+        };
         let cells = panels.len().saturating_mul(x.len()).saturating_mul(y.len());
         if cells > MOST_CELLS {
             let problem = format!("{} panels of {} × {} cells are {cells} cells", panels.len(), x.len(), y.len());
@@ -229,22 +233,7 @@ impl Grid {
         let other_mps = value(Quantity::OtherSpeed, ego_mps);
         let lateral_mps = value(Quantity::LateralSpeed, 0.0);
         if self.style == CaseStyle::Plain {
-            let deceleration = value(Quantity::Deceleration, 0.0);
-            let plain = PlainCase {
-                category: self.category,
-                ego_speed_mps: ego_mps,
-                speed_mps: other_mps,
-                // No negative zero.
-                acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
-                end_speed_mps: point.get(Quantity::EndSpeed),
-                lateral_speed_mps: lateral_mps,
-                lateral_distance_m: value(Quantity::LateralDistance, LATERAL_DISTANCE_M),
-                ahead_speed_mps: value(Quantity::AheadSpeed, 0.0),
-                ahead_gap_m: value(Quantity::AheadGap, 0.0),
-                length_m: value(Quantity::Length, profile.frame.default_length_m),
-                width_m: value(Quantity::Width, profile.frame.default_width_m),
-            };
-            return plain.case(profile.frame.time_cap_s);
+            return point.plain_case(self.category, profile).case(profile.frame.time_cap_s);
         }
         Ok(match self.category {
             Category::CutIn => jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point), dt_s),
@@ -289,11 +278,36 @@ fn run_up(style: CaseStyle, point: &Point) -> u32 {
     }
 }
 
+/// What needs the parameters, and how they are given.
+pub(crate) type Needing = (&'static str, &'static str);
+const FOR_A_MAP: Needing = ("a map", "give it by --x, --y, --panel or --set");
+
+/// Panels that are given one by one, each value within its parameter's range.
+fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
+    if rows.is_empty() || rows.len() > MOST_PANELS {
+        let problem = format!("they make {} panels", rows.len());
+        let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+        return Err(Error::usage(Place::item("panels"), problem, help));
+    }
+    if rows.iter().any(|row| row.len() != axes.len()) {
+        return Err(Error::Internal("a panel has another number of values than there are parameters".to_owned()));
+    }
+    Ok(rows)
+}
+
 /// Everything that a case of the category cannot do without.
-fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(Quantity) -> bool) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Usage`] naming what is missing or given twice.
+pub(crate) fn check_complete(
+    category: Category,
+    native_gap: bool,
+    has: &dyn Fn(Quantity) -> bool,
+    (needing, how): Needing,
+) -> Result<()> {
     let missing = |what: &str, example: &str| {
-        let problem = format!("a map of {}s needs {what}", category.label());
-        Err(Error::usage(Place::item(what), problem, format!("give it by --x, --y, --panel or --set {example}")))
+        let problem = format!("{needing} of {}s needs {what}", category.label());
+        Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
     };
     let has_gap = has(Quantity::Gap) || has(Quantity::Thw);
     if !has(Quantity::EgoSpeed) {

@@ -14,6 +14,7 @@ mod plan;
 pub mod presets;
 
 pub use axis::{GridAxis, MOST_VALUES};
+pub(crate) use grid::check_complete;
 pub use grid::{CaseStyle, Grid, GridParts, MOST_CELLS, MOST_PANELS};
 pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
 pub use parameter::{PARAMETERS, Parameter, Point, Quantity};

@@ -1,6 +1,7 @@
 //! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
 
-use crate::scenario::Category;
+use crate::profile::Profile;
+use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase};
 use crate::{Error, Place, Result};
 
 /// What a parameter sets.
@@ -176,5 +177,26 @@ impl Point {
     /// The value of a quantity, where it has one.
     pub fn get(&self, quantity: Quantity) -> Option<f64> {
         self.0[quantity as usize]
+    }
+
+    /// The plain case of these values; what they do not set has the value that `simulate` gives it.
+    pub fn plain_case(&self, category: Category, profile: &Profile) -> PlainCase {
+        let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
+        let ego_speed_mps = value(Quantity::EgoSpeed, 0.0);
+        let deceleration = value(Quantity::Deceleration, 0.0);
+        PlainCase {
+            category,
+            ego_speed_mps,
+            speed_mps: value(Quantity::OtherSpeed, ego_speed_mps),
+            // No negative zero.
+            acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
+            end_speed_mps: self.get(Quantity::EndSpeed),
+            lateral_speed_mps: value(Quantity::LateralSpeed, 0.0),
+            lateral_distance_m: value(Quantity::LateralDistance, LATERAL_DISTANCE_M),
+            ahead_speed_mps: value(Quantity::AheadSpeed, 0.0),
+            ahead_gap_m: value(Quantity::AheadGap, 0.0),
+            length_m: value(Quantity::Length, profile.frame.default_length_m),
+            width_m: value(Quantity::Width, profile.frame.default_width_m),
+        }
     }
 }

@@ -60,6 +60,7 @@ pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
         style,
         native_gap: true,
         closing_only: false,
+        panel_rows: None,
     };
     let following = vec![Cchdm, Rss, Fsm];
     match category {

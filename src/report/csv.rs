@@ -5,7 +5,7 @@ use crate::parameterization::ParameterizationId;
 use crate::score::{ClaimResult, Interval, ScoreTable, f1, precision, recall};
 use crate::{Error, Result};
 
-pub(super) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
+pub(crate) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
     let broken = |e: &dyn std::fmt::Display| Error::Internal(format!("a CSV table cannot be written: {e}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {

@@ -27,7 +27,7 @@ pub struct DensityRecord {
     pub parameterization: String,
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Scenarios that it was fitted on.
+    /// Scenarios that it was fitted on; 0 of a distribution that somebody wrote.
     pub kernels: usize,
     /// Where it comes from.
     pub provenance: Provenance,
@@ -187,16 +187,27 @@ impl EstimateFile {
         estimates: Vec<EstimateRow>,
         host: HostRecord,
     ) -> Result<EstimateFile> {
+        Ok(EstimateFile::of(DensityRecord::of(density)?, density.space.has_thw(), facts, estimates, host))
+    }
+
+    /// The same of any density by its record; `is_sampled_headway` where the headway is one of its parameters.
+    pub fn of(
+        density: DensityRecord,
+        is_sampled_headway: bool,
+        facts: RunFacts,
+        estimates: Vec<EstimateRow>,
+        host: HostRecord,
+    ) -> EstimateFile {
         let names = facts.headways.iter().map(Headway::to_string);
         let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
-        Ok(EstimateFile {
+        EstimateFile {
             lanesweep_estimate: 1,
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             estimator: facts.estimator,
-            density: DensityRecord::of(density)?,
+            density,
             profile: facts.profile,
             models: facts.models,
-            headways: if density.space.has_thw() { vec!["sampled".to_owned()] } else { names.collect() },
+            headways: if is_sampled_headway { vec!["sampled".to_owned()] } else { names.collect() },
             plan_headways: facts.headways,
             points: facts.points,
             samples: facts.samples,
@@ -210,7 +221,7 @@ impl EstimateFile {
             levels: Vec::new(),
             bootstrap: None,
             host,
-        })
+        }
     }
 
     /// As JSON. What is not finite is null.
@@ -228,10 +239,13 @@ impl EstimateFile {
         let density = &self.density;
         let _ = writeln!(
             text,
-            "{} {}: density over {} scenarios ({})",
+            "{} {}: {} ({})",
             Category::parse(density.category).map_or(density.category, Category::label),
             density.parameterization,
-            density.kernels,
+            match density.kernels {
+                0 => format!("distributions of {}", density.parameters.join(", ")),
+                kernels => format!("density over {kernels} scenarios"),
+            },
             density.provenance.data
         );
         if let Some(draws) =
@@ -314,7 +328,10 @@ impl EstimateFile {
         );
         // A density of N scenarios was never seen beyond them.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
-        if self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved) {
+        let is_fitted = self.density.kernels > 0;
+        if is_fitted
+            && self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved)
+        {
             let _ = writeln!(
                 text,
                 "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",

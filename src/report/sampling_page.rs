@@ -33,8 +33,15 @@ impl EstimateFile {
             title: format!("Probability of failure: {}", self.name()),
             program: self.program.clone(),
             lead: format!(
-                "{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
-                self.samples, density.kernels, self.estimator, self.profile.name, density.provenance.data
+                "{} samples of {}, estimator {}, profile {}. {}",
+                self.samples,
+                match density.kernels {
+                    0 => format!("distributions of {}", density.parameters.join(", ")),
+                    kernels => format!("a density over {kernels} mined scenarios"),
+                },
+                self.estimator,
+                self.profile.name,
+                density.provenance.data
             ),
             warnings,
             sections: vec![self.estimates_section(), pictures(figures), self.reproduction()?],
@@ -126,10 +133,15 @@ impl EstimateFile {
             title: "Estimates".to_owned(),
             intro: format!(
                 "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
-                 Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from \
-                 data. Every headway of its own is in estimates.csv.",
-                short(1.0 / self.density.kernels.max(1) as f64),
-                self.density.kernels
+                 {}Every headway of its own is in estimates.csv.",
+                match self.density.kernels {
+                    0 => String::new(),
+                    kernels => format!(
+                        "Probabilities below {} (one in {kernels} scenarios) come from the tails of the density's \
+                         kernels, not from data. ",
+                        short(1.0 / kernels as f64)
+                    ),
+                }
             ),
             tables,
             facts: said.collect(),

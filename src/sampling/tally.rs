@@ -10,7 +10,7 @@ use super::limit_state::limit_state;
 use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use crate::criterion::Criterion;
 use crate::parts::Countable;
-use crate::sweep::generated::{ATTEMPTS, Generator};
+use crate::sweep::generated::{ATTEMPTS, Drawn, Generator};
 use crate::sweep::{Chunk, LanePlan};
 use crate::{Error, Place, Result};
 
@@ -79,14 +79,16 @@ impl SampleTally {
         }
     }
 
-    /// Counts a chunk of a plan that makes its own cases.
+    /// Counts a chunk of a plan whose units are samples. Where the plan holds the cases, every sample is valid at once, and
+    /// there is no map.
     ///
     /// # Errors
     /// [`Error::Internal`] for a chunk of another plan, without lanes, or without the outcomes that worst lanes need.
     pub fn of_chunk(plan: &LanePlan, chunk: &Chunk, options: &TallyOptions) -> Result<SampleTally> {
-        let Some(generator) = plan.generator() else {
-            return Err(Error::Internal("the plan has no generator".to_owned()));
-        };
+        let generator = plan.generator();
+        if generator.is_none() && options.map.is_some() {
+            return Err(Error::Internal("a plan that holds its cases has no points to map".to_owned()));
+        }
         chunk.check(plan)?;
         if chunk.verdicts.is_empty() || (options.worst > 0 && chunk.outcomes.is_empty()) {
             return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
@@ -110,18 +112,25 @@ impl SampleTally {
         Ok(tally)
     }
 
-    fn count(&mut self, plan: &LanePlan, generator: &Generator, chunk: &Chunk, options: &TallyOptions, unit: u64) {
-        let drawn = generator.draw(unit);
-        if drawn.is_void() {
+    fn count(
+        &mut self,
+        plan: &LanePlan,
+        generator: Option<&Generator>,
+        chunk: &Chunk,
+        options: &TallyOptions,
+        unit: u64,
+    ) {
+        let drawn = generator.map(|generator| generator.draw(unit));
+        if drawn.as_ref().is_some_and(Drawn::is_void) {
             self.voids += 1;
             self.tries += u64::from(ATTEMPTS);
             return;
         }
-        self.tries += u64::from(drawn.tries);
+        self.tries += drawn.as_ref().map_or(1, |drawn| u64::from(drawn.tries));
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
         let first = (unit - chunk.units.start) as usize * headways * models;
         let lanes = &chunk.verdicts[first..first + headways * models];
-        let cell = self.map.as_ref().and_then(|map| map.axes.cell(&drawn.values));
+        let cell = self.map.as_ref().zip(drawn.as_ref()).and_then(|(map, drawn)| map.axes.cell(&drawn.values));
         for model in 0..models {
             let mut failed = [0_u64; Criterion::ALL.len()];
             for headway in 0..headways {

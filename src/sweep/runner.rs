@@ -47,7 +47,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// A case and the tables that it points into.
-    pub(super) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+    pub(crate) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
         match self.plan.generator() {
             Some(generator) => {
                 let mut tables = Tables::default();

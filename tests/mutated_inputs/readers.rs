@@ -7,6 +7,7 @@ use lanesweep::criterion::Criterion;
 use lanesweep::density::{DensityModel, Exposure, ExposureFile, read_density};
 use lanesweep::driver::ModelId;
 use lanesweep::mining::{MiningOptions, mine, mine_folder};
+use lanesweep::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
 use lanesweep::parameterization::ParameterizationOptions;
 use lanesweep::parts::{Countable, Journal, Ledger, read_part, read_sealed};
 use lanesweep::profile::Profile;
@@ -14,7 +15,7 @@ use lanesweep::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, WeightedTally, plan_samples,
     read_proposal,
 };
-use lanesweep::scenario::{Scenario, read_scenarios};
+use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::score::ScoreOptions;
 use lanesweep::sweep::{
     Backend, CpuBackend, Headway, LanePlan, Partial, PlanContent, StudyOptions, Wanted, plan_study,
@@ -53,6 +54,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("parameterization options", &seeds.parameterization, parameterization),
         plain("score options", &seeds.score, |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
         plain("proposal", &seeds.proposals, proposal),
+        plain("distribution", &seeds.distributions, distribution),
     ];
     #[cfg(feature = "parquet")]
     readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
@@ -64,6 +66,25 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(Reader { reseal: Some(sealed), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
     readers.push(Reader { reseal: Some(reseal_partial), ..plain("partial", &seeds.partials, partial) });
     readers
+}
+
+/// As a map of what is deterministic, as samples of what is not.
+fn distribution(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let path = file(bytes, dir, "distribution.xosc");
+    let read = read_distribution(&path)?;
+    let names = Names { category: Category::CutIn, renames: &[], path: &path };
+    if matches!(read.distributions, Distributions::Deterministic(_)) {
+        return variations(&read, &names).map(drop);
+    }
+    let samples = DistributionSamples::of(&read, &names, Vec::new())?;
+    let count = if heavy { samples.runs } else { samples.runs.min(20) };
+    let (plan, _) = samples.plan(
+        (count.min(2000), samples.seed.unwrap_or(1)),
+        &seeds.profile,
+        &[ModelId::Fsm],
+        &[Headway::ThwS(1.0)],
+    )?;
+    run_some(&plan, 20)
 }
 
 fn file(bytes: &[u8], dir: &Path, name: &str) -> std::path::PathBuf {

@@ -40,6 +40,7 @@ pub struct Seeds {
     pub score: Vec<Vec<u8>>,
     pub densities: Vec<Vec<u8>>,
     pub proposals: Vec<Vec<u8>>,
+    pub distributions: Vec<Vec<u8>>,
     pub parts: Vec<Vec<u8>>,
     pub plans: Vec<Vec<u8>>,
     pub journals: Vec<Vec<u8>>,
@@ -58,6 +59,17 @@ pub fn density_of(seeds: &Seeds) -> &DensityModel {
 
 fn first_of(scenarios: &[Scenario], category: Category, n: usize) -> Vec<Scenario> {
     scenarios.iter().filter(|s| s.category == category && s.kept).take(n).cloned().collect()
+}
+
+/// An example of a distribution file, with our names.
+fn distribution(kind: &str) -> Vec<u8> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/examples/cut-in-{kind}.xosc"));
+    std::fs::read_to_string(path)
+        .unwrap()
+        .replace("Speed_kph", "speed_kmh")
+        .replace("\"Ego_", "\"ego_")
+        .replace("\"Other_", "\"other_")
+        .into_bytes()
 }
 
 /// What a writer leaves in a file.
@@ -213,6 +225,7 @@ impl Seeds {
                 .chain(&others)
                 .map(|d| written(|p| write_density(p, d).unwrap()))
                 .collect(),
+            distributions: ["stochastic", "deterministic"].map(distribution).to_vec(),
             proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
             parts: parts.into(),
             plans: vec![seal("plan", &PlanContent::of(&study).unwrap()).unwrap().0],

@@ -1,0 +1,191 @@
+//! `lanesweep export`: scenarios for other programs.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::case_flags::{CaseFlags, from_toml};
+use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
+use super::{Exit, ProfileFlags, console};
+use crate::criterion::Criterion;
+use crate::openscenario::{EgoMotion, export_folder};
+use crate::report::files::check_folder;
+use crate::scenario::Side;
+use crate::{Error, Place, Result};
+
+/// Write scenarios for other simulators
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  lanesweep export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 \
+                  --lateral-speed 1.0 --out played"
+)]
+pub struct Export {
+    #[command(subcommand)]
+    format: Format,
+}
+
+#[derive(Debug, Subcommand)]
+enum Format {
+    Xosc(Box<Xosc>),
+}
+
+impl Export {
+    pub fn run(&self) -> Result<Exit> {
+        match &self.format {
+            Format::Xosc(xosc) => xosc.run(),
+        }
+    }
+}
+
+/// Write lanes as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road
+///
+/// The lanes are those named of a study, a sampling run or a scenario file, the worst of a run, or one case of flags.
+/// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The others follow their
+/// own motion, step by step; the ego what the driver model drove, or with --ego external only its start is written.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Examples:\n  lanesweep export xosc --from lanesweep-out --worst 5 --model FSM --ego external --out \
+                  worst\n  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_81_74_836/S/1.2s/RSS \
+                  --out played\n  lanesweep export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw \
+                  1.2 --lateral-speed 1.0 --out played"
+)]
+pub struct Xosc {
+    #[command(flatten)]
+    case: CaseFlags,
+    /// TOML file with the case
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"])]
+    case_file: Option<PathBuf>,
+    /// Folder (--out) of a `lanesweep study` or `lanesweep sample`, for --lane or --worst
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"])]
+    from: Option<PathBuf>,
+    /// Scenario file (JSON Lines) for --lane; with --from a study: its scenarios, for sizes, side and lane width
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Lane key: scenario/variant/headway/model, as errors and tables print it; repeatable
+    #[arg(long, value_name = "KEY")]
+    lane: Vec<String>,
+    /// So many of the run's worst lanes per model: of a sampling run those of worst.csv, of a study the scenarios with
+    /// the smallest margin, each with its worst lane
+    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
+    worst: Option<usize>,
+    /// Criterion of --worst of a study
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
+    criterion: String,
+    /// Variants of --worst of a study, separated by commas: S (recorded), keys of parameterizations [default: all]
+    #[arg(long, value_name = "LIST", requires = "worst", value_delimiter = ',')]
+    variant: Vec<String>,
+    /// Who drives the ego
+    #[arg(long, value_enum, default_value_t)]
+    ego: EgoFlag,
+    /// End of a scenario with --ego external, s [default: 10 s after the lane's last event and end]
+    #[arg(long, value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// Side that the other vehicle comes from or leaves to [default: the scenario's where it is known, else left]
+    #[arg(long, value_enum)]
+    side: Option<SideFlag>,
+    /// Width of the road's lanes, m [default: the scenario's where it is known, else 3.5]
+    #[arg(long, value_name = "M")]
+    lane_width: Option<f64>,
+    /// Folder of the files
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc")]
+    out: PathBuf,
+    #[command(flatten)]
+    profile: ProfileFlags,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum EgoFlag {
+    /// Follows the path that the driver model drove
+    #[default]
+    Model,
+    /// Your own controller: only position and speed at the start are written
+    External,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SideFlag {
+    Left,
+    Right,
+}
+
+impl Xosc {
+    fn run(&self) -> Result<Exit> {
+        let extras = self.extras()?;
+        check_folder(&self.out)?;
+        let Exported { scenarios, notes } = self.lanes(&extras)?;
+        notes.iter().for_each(|note| tracing::warn!("{note}"));
+        let rows = export_folder(&self.out, &scenarios)?;
+        let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
+        console::print(&lines)?;
+        tracing::info!("{} scenarios written to {}", rows.len(), self.out.display());
+        Ok(Exit::Ok)
+    }
+
+    fn lanes(&self, extras: &Extras) -> Result<Exported> {
+        let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
+        let is_lane = self.from.is_some() || self.scenarios.is_some();
+        if is_lane && self.case.says_a_case() {
+            let help = "leave the case's flags out, or --from and --scenarios";
+            return wrong("--lane", "a lane is a whole case: the other flags would not be heeded", help);
+        }
+        let models = self.case.named_models()?;
+        let source = Source { keys: &self.lane, models };
+        match (&self.from, &self.scenarios) {
+            (Some(dir), scenarios) => {
+                if self.lane.is_empty() && self.worst.is_none() {
+                    return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
+                }
+                let worst = self.worst.map(|count| (count, &self.variant[..]));
+                of_run(dir, &source, worst, self.criterion()?, scenarios.as_deref(), extras)
+            }
+            (None, Some(path)) if self.lane.is_empty() => {
+                let problem = format!("{} has many lanes", path.display());
+                wrong("--scenarios", &problem, "add --lane SCENARIO/VARIANT/HEADWAY/MODEL")
+            }
+            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &source, extras),
+            (None, None) if !self.lane.is_empty() => {
+                let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
+                wrong("--lane", "a key alone does not say what it is of", help)
+            }
+            (None, None) => {
+                let file = self.case_file.as_deref().map(from_toml).transpose()?.unwrap_or_default();
+                of_case(&self.case.over(file), &self.profile.load()?, extras)
+            }
+        }
+    }
+
+    fn extras(&self) -> Result<Extras> {
+        let ego = match self.ego {
+            EgoFlag::Model => EgoMotion::Model,
+            EgoFlag::External => EgoMotion::External,
+        };
+        if self.duration.is_some() && ego == EgoMotion::Model {
+            let problem = "the ego follows the driver model, whose path ends with the lane";
+            return Err(Error::usage(Place::item("--duration"), problem, "add --ego external, or leave it out"));
+        }
+        if let Some(duration) = self.duration.filter(|d| !(*d > 0.0 && *d <= 3600.0)) {
+            let problem = format!("{duration} s cannot be played");
+            return Err(Error::usage(Place::item("--duration"), problem, "give seconds above 0 and at most 3600"));
+        }
+        if let Some(width) = self.lane_width.filter(|w| !(1.0..=20.0).contains(w)) {
+            let problem = format!("{width} m is no width of a lane");
+            return Err(Error::usage(Place::item("--lane-width"), problem, "give 1 to 20 m, such as 3.5"));
+        }
+        if self.worst == Some(0) {
+            return Err(Error::usage(Place::item("--worst"), "0 lanes are none", "give 1 or more"));
+        }
+        let side = self.side.map(|side| match side {
+            SideFlag::Left => Side::Left,
+            SideFlag::Right => Side::Right,
+        });
+        Ok(Extras { ego, duration_s: self.duration, side, lane_width_m: self.lane_width })
+    }
+
+    fn criterion(&self) -> Result<Criterion> {
+        Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
+            let problem = format!("there is no criterion `{}`", self.criterion);
+            Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
+        })
+    }
+}

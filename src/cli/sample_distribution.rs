@@ -1,0 +1,277 @@
+//! `lanesweep sample --distribution`: random parameters of an OpenSCENARIO file, sampled as lanes.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::Exit;
+use super::console::{self, Verbosity};
+use super::rerun::record_of;
+use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, SEED, Sample};
+use super::sample_checks::only_crude;
+use super::sample_lanes;
+use crate::density::Provenance;
+use crate::estimate::{BinomialInterval, Checkpoints, StopRule};
+use crate::grid::Parameter;
+use crate::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
+use crate::profile::Profile;
+use crate::report::files::{make_folder, write_atomically};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
+use crate::scenario::Category;
+use crate::sweep::{Headway, LanePlan, LaneRunner, ONE_IN, Recheck, sha256};
+use crate::{Error, Place, Result, input_file};
+
+/// What a run leaves of its input, so that its lanes can be made again.
+pub(super) const KEPT: &str = "distribution.json";
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Kept {
+    lanesweep_distribution: u64,
+    file: String,
+    text: String,
+    category: Category,
+    /// Theirs, ours, factor.
+    renames: Vec<(String, String, f64)>,
+    set: Vec<(String, f64)>,
+}
+
+impl Kept {
+    fn samples(&self) -> Result<DistributionSamples> {
+        let path = Path::new(&self.file);
+        let file = parse_distribution(&self.text, path)?;
+        let rename = |(theirs, ours, factor): &(String, String, f64)| Rename {
+            theirs: theirs.clone(),
+            ours: ours.clone(),
+            factor: *factor,
+        };
+        let renames: Vec<Rename> = self.renames.iter().map(rename).collect();
+        let fixed = |(name, value): &(String, f64)| {
+            let parameter = Parameter::find(self.category, name, "--set")?;
+            Ok((parameter, parameter.check(*value, "--set")?))
+        };
+        let fixed = self.set.iter().map(fixed).collect::<Result<Vec<_>>>()?;
+        DistributionSamples::of(&file, &Names { category: self.category, renames: &renames, path }, fixed)
+    }
+}
+
+/// Samples what a file says.
+pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verbosity) -> Result<Exit> {
+    if flags.estimator != EstimatorFlag::Mc {
+        return Err(only_crude("--distribution"));
+    }
+    if flags.points == PointsFlag::Sobol {
+        let help = "leave --points out: draws of a distribution file are independent";
+        return Err(Error::usage(Place::item("--points"), "there are no Sobol points of a distribution file", help));
+    }
+    let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
+    let name = flags.category.as_deref().unwrap_or_default();
+    let category = Category::parse(name).ok_or_else(|| {
+        let problem = format!("there is no category `{name}`");
+        Error::usage(Place::item("--category"), problem, "use cut-in, cut-out or lvd")
+    })?;
+    let kept = Kept {
+        lanesweep_distribution: 1,
+        file: path.display().to_string(),
+        text,
+        category,
+        renames: flags.rename.iter().map(|r| (r.theirs.clone(), r.ours.clone(), r.factor)).collect(),
+        set: flags.set.clone(),
+    };
+    let samples = kept.samples()?;
+    for p in samples.parameters.iter().filter(|p| p.kept_share < 1.0) {
+        tracing::warn!(
+            "{:.3} % of the distribution of {} lie outside {} … {} {} and are not drawn",
+            100.0 * (1.0 - p.kept_share),
+            p.parameter.key,
+            p.parameter.least,
+            p.parameter.most,
+            p.parameter.unit
+        );
+    }
+    let listed = flags.listed_headways()?;
+    if listed.is_some() && samples.has_distance() {
+        let problem = "the initial distance is a parameter already";
+        return Err(Error::usage(Place::item("--thw"), problem, "leave --thw out"));
+    }
+    let headways = listed.unwrap_or_else(Headway::paper);
+    let (profile, models, criterion) = (flags.load_profile()?, flags.models()?, flags.criterion()?);
+    let seed = flags.given_seed().or(samples.seed).unwrap_or(SEED);
+    let count = flags.samples.unwrap_or(samples.runs);
+    let opened = flags.open()?;
+    make_folder(&flags.out)?;
+    sample_lanes::check_writable(&flags.out)?;
+    let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
+    let recheck = opened.device().map(|_| Recheck::new(&plan, seed, ONE_IN));
+    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+    let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
+    let options = CrudeOptions {
+        stop: StopRule {
+            samples: count,
+            relative_half_width: flags.until,
+            time_limit: flags.time_limit.map(std::time::Duration::from_secs_f64),
+            checkpoints: Checkpoints::Doubling,
+        },
+        interval: match flags.interval {
+            IntervalFlag::Wilson => BinomialInterval::Wilson,
+            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
+        },
+        level: flags.level,
+        // Nobody said how often such scenarios occur.
+        exposure: None,
+        is_sampled_headway: samples.has_distance(),
+    };
+    tracing::info!("{count} samples on {}", lanes.backend.describe());
+    let bar = console::progress(verbosity, count, "sampling");
+    let crude = sample_crude(&plan, 0..count, &lanes, &counting, &options, |chunk| {
+        bar.inc(chunk.units.end - chunk.units.start);
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    let facts = RunFacts {
+        estimator: "mc",
+        profile,
+        models,
+        headways: plan.headways.clone(),
+        points: "random",
+        samples: count,
+        seed,
+        given: Vec::new(),
+    };
+    let host = HostRecord {
+        backend: opened.backend().describe(),
+        device: opened.device(),
+        rechecked_lanes: crude.summary.rechecked_lanes,
+        seconds: started.elapsed().as_secs_f64(),
+        threads: rayon::current_num_threads(),
+    };
+    let record = record(&kept, &samples, path);
+    let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
+    file.plan_sha256 = Some(plan.hash().to_owned());
+    let mut draws = DrawRecord::of(&crude.tally, &plan);
+    if draws.samples == count {
+        draws.tries = tries;
+        draws.rejected_share = (tries - count) as f64 / tries as f64;
+    }
+    file.draws = Some(draws);
+    write(flags, &kept, &samples, &plan, &crude, &counting, &file)?;
+    console::print(&file.text())?;
+    tracing::info!("results written to {}", flags.out.display());
+    Ok(Exit::Ok)
+}
+
+fn record(kept: &Kept, samples: &DistributionSamples, path: &Path) -> DensityRecord {
+    let mut data = format!("distributions of {}", path.file_name().unwrap_or_default().to_string_lossy());
+    for (parameter, value) in &samples.fixed {
+        let _ = write!(data, ", {} = {value}", parameter.key);
+    }
+    let sha = sha256(&kept.text);
+    DensityRecord {
+        sha256: sha.clone(),
+        category: kept.category.key(),
+        parameterization: "distribution".to_owned(),
+        parameters: samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect(),
+        kernels: 0,
+        provenance: Provenance {
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            data,
+            synthetic: false,
+            scenarios_sha256: sha,
+            found: 0,
+            kept: 0,
+            left_out: 0,
+        },
+    }
+}
+
+/// Tables, page and record; the record comes last.
+fn write(
+    flags: &Sample,
+    kept: &Kept,
+    samples: &DistributionSamples,
+    plan: &LanePlan,
+    crude: &CrudeRun,
+    counting: &TallyOptions,
+    file: &EstimateFile,
+) -> Result<()> {
+    let out = &flags.out;
+    sample_lanes::clear(out, &[])?;
+    // The density of another run in this folder would be taken for this one's.
+    let density = out.join("density.json");
+    if density.exists() {
+        std::fs::remove_file(&density).map_err(|e| Error::io(&density, "replace", e))?;
+    }
+    write_atomically(&out.join("convergence.csv"), &convergence_csv(&crude.convergence)?)?;
+    if counting.worst > 0 {
+        let runner = LaneRunner::<f32>::new(plan);
+        let missing = |lane: u64| Error::Internal(format!("lane {lane} is not in the plan"));
+        let mut found = Vec::new();
+        for (model, lanes) in crude.tally.worst.iter().enumerate() {
+            for (at, &lane) in lanes.iter().enumerate() {
+                let key = plan.key(lane.lane).ok_or_else(|| missing(lane.lane))?;
+                let point = samples.draw(file.seed, key.unit, &plan.profile)?.values;
+                found.push((model, at + 1, lane, key, point, runner.run(&key).widen()));
+            }
+        }
+        let mut rows: Vec<WorstRow> = Vec::new();
+        for (model, rank, lane, key, point, outcome) in &found {
+            let headway =
+                if samples.has_distance() { "sampled".to_owned() } else { plan.headways[key.headway].to_string() };
+            rows.push(WorstRow {
+                rank: *rank,
+                lane: *lane,
+                key: plan.key_text(key),
+                sample: key.unit,
+                model: plan.models[*model],
+                headway,
+                point: Vec::clone(point),
+                outcome,
+            });
+        }
+        let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
+        write_atomically(&out.join("worst.csv"), &worst_csv(&rows, &names, counting.criterion)?)?;
+    }
+    let mut figures = Vec::new();
+    if let Some(figure) = file.headways_figure() {
+        let svg = figure.svg();
+        write_atomically(&out.join("headways.svg"), svg.as_bytes())?;
+        write_atomically(&out.join("headways.csv"), &figure.csv()?)?;
+        figures.push(crate::report::html::PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
+    }
+    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
+    write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
+    let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
+    write_atomically(&out.join(KEPT), &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;
+    write_atomically(&out.join("estimate.json"), &file.to_json()?)
+}
+
+/// The plan of the run that wrote this folder, and what it is of.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Input`] where the folder does not hold such a run, whole and unchanged.
+pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
+    let path = dir.join(KEPT);
+    let wrong = |problem: String| {
+        let help = "give the folder (--out) of a `lanesweep sample --distribution` run by this version";
+        Error::input(Place::file(&path), problem, help)
+    };
+    let text = input_file::read(&path, input_file::LARGEST_TABLE_BYTES)?;
+    let kept: Kept = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no distribution: {e}")))?;
+    if kept.lanesweep_distribution != 1 {
+        return Err(wrong(format!("its version is {}, this program reads 1", kept.lanesweep_distribution)));
+    }
+    let (facts, plan_sha256) = record_of(dir)?;
+    let profile: &Profile = &facts.profile;
+    profile.check(&Place::file(dir.join("estimate.json")))?;
+    let samples = kept.samples()?;
+    let (plan, _) = samples.plan((facts.samples, facts.seed), profile, &facts.models, &facts.headways)?;
+    if plan_sha256.as_deref() != Some(plan.hash()) {
+        return Err(wrong("its plan is not the one that the distributions and the profile beside it make".to_owned()));
+    }
+    let file = Path::new(&kept.file).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok((plan, format!("distributions of {file}")))
+}

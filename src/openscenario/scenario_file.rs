@@ -1,0 +1,211 @@
+//! The scenario's file: ASAM OpenSCENARIO XML 1.2, the first revision whose header carries properties.
+//!
+//! Every vehicle that is not the user's follows a polyline with one vertex per time step, timed in simulation time. The
+//! heading is 0 throughout: the boxes of a lane stay parallel to the road, and so do these, so that vehicles touch when
+//! and where they touch in the lane.
+
+use super::concrete::{Concrete, EgoMotion, PlayedVehicle};
+use super::elements::{Attribute, Element, Elements, number, plain};
+use super::{AUTHOR, DATE};
+use crate::Result;
+
+/// Name of the parameter that an ego of the user's own starts with.
+const EGO_SPEED: &str = "ego_speed_mps";
+
+/// Height of every vehicle, m: no lane knows it.
+const HEIGHT_M: f64 = 1.5;
+
+/// The scenario's file; `road` is the name of the road's file beside it.
+///
+/// # Errors
+/// As [`Concrete::check`].
+pub fn scenario_file(scenario: &Concrete, road: &str) -> Result<Vec<u8>> {
+    scenario.check()?;
+    let mut xml = Elements::new()?;
+    xml.open("OpenSCENARIO", vec![])?;
+    header(&mut xml, scenario)?;
+    xml.open("ParameterDeclarations", vec![])?;
+    for (name, value) in &scenario.parameters {
+        let declared = vec![text("name", &identifier(name)), text("parameterType", "double"), float("value", *value)];
+        xml.empty("ParameterDeclaration", declared)?;
+    }
+    xml.close()?;
+    xml.empty("CatalogLocations", vec![])?;
+    xml.open("RoadNetwork", vec![])?;
+    xml.empty("LogicFile", vec![text("filepath", road)])?;
+    xml.close()?;
+    xml.open("Entities", vec![])?;
+    for vehicle in &scenario.vehicles {
+        entity(&mut xml, vehicle)?;
+    }
+    xml.close()?;
+    xml.open("Storyboard", vec![])?;
+    init(&mut xml, scenario)?;
+    story(&mut xml, scenario)?;
+    xml.open("StopTrigger", vec![])?;
+    at_time(&mut xml, "end", scenario.end_s())?;
+    xml.finish()
+}
+
+fn header(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
+    let synthetic = if scenario.is_synthetic { "SYNTHETIC DATA: " } else { "" };
+    let description = format!("{synthetic}{} {}", scenario.category.label(), scenario.key);
+    xml.open(
+        "FileHeader",
+        vec![
+            text("revMajor", "1"),
+            text("revMinor", "2"),
+            text("date", DATE),
+            text("description", &description),
+            text("author", AUTHOR),
+        ],
+    )?;
+    xml.open("Properties", vec![])?;
+    for (name, value) in &scenario.properties {
+        xml.empty("Property", vec![text("name", name), text("value", value)])?;
+    }
+    xml.close()?;
+    xml.close()
+}
+
+fn entity(xml: &mut Elements, vehicle: &PlayedVehicle) -> Result<()> {
+    let (length, width) = (vehicle.length_m, vehicle.width_m);
+    xml.open("ScenarioObject", vec![text("name", vehicle.name)])?;
+    xml.open("Vehicle", vec![text("name", vehicle.name), text("vehicleCategory", "car")])?;
+    xml.open("BoundingBox", vec![])?;
+    let centre = vec![float("x", vehicle.centre_offset_m()), float("y", 0.0), float("z", HEIGHT_M / 2.0)];
+    xml.empty("Center", centre)?;
+    let dimensions = vec![float("width", width), float("length", length), float("height", HEIGHT_M)];
+    xml.empty("Dimensions", dimensions)?;
+    xml.close()?;
+    let limits = vec![float("maxSpeed", 150.0), float("maxAcceleration", 10.0), float("maxDeceleration", 50.0)];
+    xml.empty("Performance", limits)?;
+    xml.open("Axles", vec![])?;
+    let axle = |at_m: f64, steering: f64| {
+        vec![
+            float("maxSteering", steering),
+            float("wheelDiameter", 0.6),
+            float("trackWidth", 0.85 * width),
+            float("positionX", at_m),
+            float("positionZ", 0.3),
+        ]
+    };
+    xml.empty("FrontAxle", axle(vehicle.wheelbase_m(), 0.5))?;
+    xml.empty("RearAxle", axle(0.0, 0.0))?;
+    xml.close()?;
+    xml.empty("Properties", vec![])?;
+    xml.close()?;
+    xml.close()
+}
+
+/// Where everybody starts, and how fast.
+fn init(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
+    xml.open("Init", vec![])?;
+    xml.open("Actions", vec![])?;
+    for (at, vehicle) in scenario.vehicles.iter().enumerate() {
+        let Some(first) = vehicle.path.first() else { continue };
+        xml.open("Private", vec![text("entityRef", vehicle.name)])?;
+        xml.nested(&[
+            ("PrivateAction", vec![]),
+            ("TeleportAction", vec![]),
+            ("Position", vec![]),
+            world(scenario, vehicle, first.x_m, first.y_m),
+        ])?;
+        let is_declared = at == 0 && scenario.parameters.iter().any(|(name, _)| name == EGO_SPEED);
+        let is_free = is_declared && scenario.ego == EgoMotion::External;
+        let speed = if is_free { ("value", format!("${EGO_SPEED}")) } else { float("value", first.v_mps) };
+        xml.open("PrivateAction", vec![])?;
+        xml.open("LongitudinalAction", vec![])?;
+        xml.open("SpeedAction", vec![])?;
+        xml.empty(
+            "SpeedActionDynamics",
+            vec![text("dynamicsShape", "step"), float("value", 0.0), text("dynamicsDimension", "time")],
+        )?;
+        xml.nested(&[("SpeedActionTarget", vec![]), ("AbsoluteTargetSpeed", vec![speed])])?;
+        for _ in 0..4 {
+            xml.close()?;
+        }
+    }
+    xml.close()?;
+    xml.close()
+}
+
+/// Everybody's path, from the beginning on.
+fn story(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
+    xml.open("Story", vec![text("name", "story")])?;
+    xml.open("Act", vec![text("name", "act")])?;
+    let skipped = usize::from(scenario.ego == EgoMotion::External);
+    for vehicle in scenario.vehicles.iter().skip(skipped) {
+        let name = vehicle.name;
+        let named = |what: &str| text("name", &format!("{name} {what}"));
+        xml.open("ManeuverGroup", vec![text("maximumExecutionCount", "1"), named("group")])?;
+        xml.open("Actors", vec![text("selectTriggeringEntities", "false")])?;
+        xml.empty("EntityRef", vec![text("entityRef", name)])?;
+        xml.close()?;
+        xml.open("Maneuver", vec![named("maneuver")])?;
+        xml.open("Event", vec![named("event"), text("priority", "parallel"), text("maximumExecutionCount", "1")])?;
+        xml.open("Action", vec![named("action")])?;
+        xml.open("PrivateAction", vec![])?;
+        xml.open("RoutingAction", vec![])?;
+        xml.open("FollowTrajectoryAction", vec![])?;
+        xml.open("TrajectoryRef", vec![])?;
+        xml.open("Trajectory", vec![named("trajectory"), text("closed", "false")])?;
+        xml.open("Shape", vec![])?;
+        xml.open("Polyline", vec![])?;
+        for v in &vehicle.path {
+            let vertex = ("Vertex", vec![float("time", v.time_s)]);
+            xml.nested(&[vertex, ("Position", vec![]), world(scenario, vehicle, v.x_m, v.y_m)])?;
+        }
+        for _ in 0..4 {
+            xml.close()?;
+        }
+        let timing = vec![text("domainAbsoluteRelative", "absolute"), float("scale", 1.0), float("offset", 0.0)];
+        xml.nested(&[("TimeReference", vec![]), ("Timing", timing)])?;
+        xml.empty("TrajectoryFollowingMode", vec![text("followingMode", "position")])?;
+        for _ in 0..4 {
+            xml.close()?;
+        }
+        xml.open("StartTrigger", vec![])?;
+        at_time(xml, &format!("{name} start"), 0.0)?;
+        for _ in 0..4 {
+            xml.close()?;
+        }
+    }
+    xml.open("StartTrigger", vec![])?;
+    at_time(xml, "act start", 0.0)?;
+    xml.close()?;
+    xml.close()?;
+    xml.close()
+}
+
+/// The condition that the simulation time has reached a value.
+fn at_time(xml: &mut Elements, name: &str, time_s: f64) -> Result<()> {
+    xml.open("ConditionGroup", vec![])?;
+    xml.nested(&[
+        ("Condition", vec![text("name", name), float("delay", 0.0), text("conditionEdge", "none")]),
+        ("ByValueCondition", vec![]),
+        ("SimulationTimeCondition", vec![float("value", time_s), text("rule", "greaterOrEqual")]),
+    ])?;
+    xml.close()
+}
+
+/// A position of a vehicle's centre as the position of its reference point.
+fn world<'a>(scenario: &Concrete, vehicle: &PlayedVehicle, x_m: f64, y_m: f64) -> Element<'a> {
+    let x_m = x_m - vehicle.centre_offset_m();
+    let place = vec![float("x", x_m), float("y", scenario.world_y_m(y_m)), float("z", 0.0), float("h", 0.0)];
+    ("WorldPosition", place)
+}
+
+fn text<'a>(name: &'a str, value: &str) -> Attribute<'a> {
+    (name, plain(value).into_owned())
+}
+
+fn float(name: &str, value: f64) -> Attribute<'_> {
+    (name, number(value))
+}
+
+/// A name that can be referred to: letters, digits and `_`, no digit first.
+fn identifier(name: &str) -> String {
+    let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }
+}

@@ -1,0 +1,420 @@
+//! Exported scenarios: read again, vertex by vertex, they are the lanes that `simulate` prints, to the bit.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::reader::Reader;
+
+fn lanesweep(dir: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lanesweep")).current_dir(dir).args(args).output().unwrap()
+}
+
+fn good(dir: &Path, args: &[&str]) -> String {
+    let output = lanesweep(dir, args);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(dir: &Path, args: &[&str], status: i32, says: &str) {
+    let output = lanesweep(dir, args);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(status), "{args:?}: {said}");
+    let joined = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    assert!(joined.contains(says), "{args:?}: {joined}");
+}
+
+/// An element of a document with the names above it.
+struct Found {
+    path: String,
+    attributes: HashMap<String, String>,
+}
+
+impl Found {
+    fn number(&self, name: &str) -> f64 {
+        self.attributes[name].parse().unwrap()
+    }
+}
+
+/// Every element in order; the document must be well-formed.
+fn elements(text: &str) -> Vec<Found> {
+    let mut reader = Reader::from_str(text);
+    reader.config_mut().enable_all_checks(true);
+    let (mut above, mut found): (Vec<String>, Vec<Found>) = (Vec::new(), Vec::new());
+    let mut take = |above: &[String], start: &BytesStart| {
+        let name = start.name().as_ref().to_owned();
+        let attributes = start.attributes().map(|a| {
+            let a = a.unwrap();
+            let value = a.normalized_value(quick_xml::XmlVersion::Implicit1_0).unwrap().into_owned();
+            (a.key.as_ref().to_owned(), value)
+        });
+        found.push(Found { path: format!("{}/{name}", above.join("/")), attributes: attributes.collect() });
+        name
+    };
+    loop {
+        match reader.read_event().unwrap() {
+            Event::Start(start) => {
+                let name = take(&above, &start);
+                above.push(name);
+            }
+            Event::Empty(start) => drop(take(&above, &start)),
+            Event::End(_) => drop(above.pop()),
+            Event::Text(text) => assert!(text.into_inner().trim().is_empty(), "no text stands outside of attributes"),
+            Event::Eof => break,
+            _ => {}
+        }
+    }
+    assert!(above.is_empty());
+    found
+}
+
+/// What a player has of a vehicle.
+#[derive(Default)]
+struct Played {
+    start: (f64, f64),
+    centre_m: f64,
+    length_m: f64,
+    width_m: f64,
+    /// Time, place of the box's centre.
+    path: Vec<(f64, f64, f64)>,
+    /// The same as it is written.
+    written: Vec<(f64, f64)>,
+}
+
+/// The vehicles of a scenario by name, and its other elements.
+fn played(text: &str) -> (HashMap<String, Played>, Vec<Found>) {
+    let all = elements(text);
+    let mut vehicles: HashMap<String, Played> = HashMap::new();
+    let mut name = String::new();
+    let mut time = 0.0;
+    for found in &all {
+        let last = found.path.rsplit('/').next().unwrap();
+        match last {
+            "ScenarioObject" => name = found.attributes["name"].clone(),
+            "Private" | "EntityRef" => name = found.attributes["entityRef"].clone(),
+            "Center" => vehicles.entry(name.clone()).or_default().centre_m = found.number("x"),
+            "Dimensions" => {
+                let vehicle = vehicles.entry(name.clone()).or_default();
+                (vehicle.length_m, vehicle.width_m) = (found.number("length"), found.number("width"));
+            }
+            "Vertex" => time = found.number("time"),
+            "WorldPosition" => {
+                let (x, y) = (found.number("x"), found.number("y"));
+                assert_eq!(found.number("h"), 0.0);
+                let vehicle = vehicles.get_mut(&name).unwrap();
+                if found.path.contains("Init") {
+                    vehicle.start = (x, y);
+                } else {
+                    vehicle.path.push((time, x + vehicle.centre_m, y));
+                    vehicle.written.push((x, y));
+                }
+            }
+            _ => {}
+        }
+    }
+    (vehicles, all)
+}
+
+/// Rows of `simulate` by column.
+fn series(text: &str) -> Vec<HashMap<String, String>> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+/// Every vertex against the series: time and place across the road to the bit, place along it to the bit of the
+/// difference that is written, and the gap between the boxes to 1e-6 m (a lane in binary32 rounds half the sum of two
+/// lengths).
+fn compare(scenario: &str, csv: &str) -> usize {
+    let (vehicles, _) = played(scenario);
+    let rows = series(csv);
+    let number = |row: &HashMap<String, String>, column: &str| row[column].parse::<f64>().unwrap();
+    let ego = &vehicles["Ego"];
+    for (name, prefix) in [("Other", "other"), ("Ahead", "ahead")] {
+        let Some(other) = vehicles.get(name) else { continue };
+        assert!(other.path.len() >= rows.len().max(2) && ego.path.len() >= rows.len().max(2));
+        for (at, row) in rows.iter().enumerate() {
+            let (t, x, y) = other.path[at];
+            assert_eq!(t, number(row, "t_s"), "{name} {at}");
+            assert_eq!(y, number(row, &format!("{prefix}_y_m")), "{name} {at}");
+            assert_eq!(other.written[at].0, number(row, &format!("{prefix}_x_m")) - other.centre_m, "{name} {at}");
+            assert_eq!(ego.path[at].0, t);
+            assert_eq!(ego.written[at], (number(row, "x_ego_m") - ego.centre_m, 0.0));
+            let gap = (x - other.length_m / 2.0) - (ego.path[at].1 + ego.length_m / 2.0);
+            assert!((gap - number(row, &format!("{prefix}_gap_m"))).abs() < 1e-6, "{name} {at}: {gap}");
+            let lateral = y.abs() - (other.width_m + ego.width_m) / 2.0;
+            assert!((lateral - number(row, &format!("{prefix}_lateral_gap_m"))).abs() < 1e-6, "{name} {at}");
+        }
+        assert_eq!(other.start, other.written[0]);
+    }
+    rows.len()
+}
+
+const CUT_IN: [&str; 12] = [
+    "--category",
+    "cut-in",
+    "--model",
+    "FSM",
+    "--ego-speed",
+    "30",
+    "--speed",
+    "20",
+    "--thw",
+    "1.2",
+    "--lateral-speed",
+    "1",
+];
+const CUT_OUT: [&str; 14] = [
+    "--category",
+    "cut-out",
+    "--model",
+    "RSS",
+    "--ego-speed",
+    "27.3",
+    "--gap",
+    "31",
+    "--lateral-speed",
+    "1.1",
+    "--ahead-gap",
+    "42",
+    "--ahead-speed",
+    "26",
+];
+const LVD: [&str; 10] =
+    ["--category", "lvd", "--model", "CCHDM", "--ego-speed", "25", "--gap", "20", "--acceleration", "-6.5"];
+
+fn only_scenario(dir: &Path) -> String {
+    let found: Vec<_> = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
+    let found: Vec<_> = found.iter().filter(|p| p.extension().is_some_and(|e| e == "xosc")).collect();
+    assert_eq!(found.len(), 1, "{found:?}");
+    std::fs::read_to_string(found[0]).unwrap()
+}
+
+#[test]
+fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
+    let dir = tempfile::tempdir().unwrap();
+    for flags in [&CUT_IN[..], &CUT_OUT, &LVD] {
+        for more in [&[][..], &["--profile", "jrc-2021"], &["--dt", "0.007"], &["--length", "11.3", "--width", "2.3"]] {
+            let csv = good(dir.path(), &[&["simulate"], flags, more].concat());
+            good(dir.path(), &[&["export", "xosc", "--out", "x"], flags, more].concat());
+            assert!(compare(&only_scenario(&dir.path().join("x")), &csv) > 20, "{flags:?} {more:?}");
+        }
+    }
+}
+
+#[test]
+fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    good(root, &["synth", "data", "--synth-recordings", "1"]);
+    good(root, &["mine", "data", "--output", "s.jsonl"]);
+    good(root, &["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--out", "study"]);
+    let check = |args: &[&str], from: &str| {
+        let listed = good(root, &[&["export", "xosc", "--out", "x"], args].concat());
+        for line in listed.lines() {
+            let (file, lane) = line.split_once("  ").unwrap();
+            let csv = good(root, &["simulate", "--from", from, "--lane", lane]);
+            let text = std::fs::read_to_string(root.join("x").join(file)).unwrap();
+            compare(&text, &csv);
+            let (_, all) = played(&text);
+            let named = |found: &&Found| found.attributes.get("name").is_some_and(|n| n == "lanesweep.lane");
+            assert_eq!(all.iter().find(named).unwrap().attributes["value"], lane);
+            let road = std::fs::read_to_string(root.join("x").join(file.replace(".xosc", ".xodr"))).unwrap();
+            assert!(elements(&road).iter().any(|e| e.path.ends_with("/line")));
+        }
+        listed.lines().count()
+    };
+    // Lengths by their sums, then by the scenarios; both keep every gap.
+    assert_eq!(check(&["--from", "study", "--worst", "3", "--model", "FSM,RSS", "--side", "left"], "study"), 6);
+    let listed = good(root, &["export", "xosc", "--from", "study", "--worst", "1", "--model", "RSS", "--out", "y"]);
+    let lane = listed.lines().next().unwrap().split_once("  ").unwrap().1;
+    let told = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
+    assert_eq!(check(&told, "study"), 1);
+    // What an earlier export left does not stand beside the new files.
+    assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 3);
+
+    good(
+        root,
+        &[
+            "fit",
+            "--scenarios",
+            "s.jsonl",
+            "--category",
+            "cut-in",
+            "--parameterization",
+            "2",
+            "--no-comparison",
+            "--out",
+            "d",
+        ],
+    );
+    good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
+    assert_eq!(check(&["--from", "run", "--worst", "2", "--model", "FSM"], "run"), 2);
+    refused(root, &["export", "xosc", "--from", "run"], 2, "a run has many lanes");
+    refused(
+        root,
+        &["export", "xosc", "--from", "study", "--lane", "no/S/1.2s/RSS"],
+        2,
+        "there is no lane `no/S/1.2s/RSS`",
+    );
+    refused(root, &["export", "xosc", "--from", "study", "--worst", "1", "--variant", "9"], 2, "variant `9`");
+}
+
+#[test]
+fn the_worst_lanes_of_a_study_are_those_with_the_smallest_margin() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let study =
+        ["study", "--synth-recordings", "1", "--backend", "cpu", "--out", "study", "--lanes", "study/lanes.csv"];
+    good(root, &study);
+    good(
+        root,
+        &["export", "xosc", "--from", "study", "--worst", "4", "--model", "CCHDM", "--variant", "S", "--out", "x"],
+    );
+    let mut reader = csv::Reader::from_path(root.join("study/lanes.csv")).unwrap();
+    let rows: Vec<HashMap<String, String>> = reader.deserialize().map(Result::unwrap).collect();
+    let of_model = rows.iter().filter(|r| r["model"] == "CCHDM" && r["param"] == "S");
+    // Per scenario whether any of its lanes ends in a contact, else its smallest TTC.
+    let mut least: HashMap<&str, (bool, f64)> = HashMap::new();
+    for row in of_model {
+        let (collides, ttc) = (row["collision"] == "1", row["min_ttc"].parse::<f64>().unwrap_or(f64::INFINITY));
+        let known = least.entry(&row["id"]).or_insert((false, f64::INFINITY));
+        *known = (known.0 || collides, known.1.min(ttc));
+    }
+    let index = std::fs::read_to_string(root.join("x/index.csv")).unwrap();
+    let chosen = series(&index);
+    assert_eq!(chosen.len(), 4);
+    let collisions = least.values().filter(|(collides, _)| *collides).count();
+    assert_eq!(chosen.iter().filter(|r| r["collision"] == "fail").count(), collisions.min(4));
+    let ids: std::collections::HashSet<_> = chosen.iter().map(|r| r["lane"].split('/').next().unwrap()).collect();
+    assert_eq!(ids.len(), 4, "every scenario once");
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = |out: &str, threads: &str| {
+        good(dir.path(), &[&["--threads", threads, "export", "xosc", "--out", out], &CUT_OUT[..]].concat());
+        let mut files: Vec<_> = std::fs::read_dir(dir.path().join(out)).unwrap().map(|e| e.unwrap().path()).collect();
+        files.sort();
+        files.iter().map(|f| (f.file_name().unwrap().to_owned(), std::fs::read(f).unwrap())).collect::<Vec<_>>()
+    };
+    assert_eq!(bytes("a", "1"), bytes("b", "2"));
+}
+
+#[test]
+fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let csv = good(dir.path(), &[&["simulate"], &CUT_IN[..]].concat());
+    let rows = series(&csv);
+    let end: f64 = rows.last().unwrap()["t_s"].parse().unwrap();
+    for (flags, least) in [(&[][..], end + 9.9), (&["--duration", "30"], 30.0)] {
+        good(dir.path(), &[&["export", "xosc", "--ego", "external", "--out", "x"], &CUT_IN[..], flags].concat());
+        let text = only_scenario(&dir.path().join("x"));
+        let (vehicles, all) = played(&text);
+        assert!(vehicles["Ego"].path.is_empty());
+        let path = &vehicles["Other"].path;
+        assert!(path.last().unwrap().0 >= least, "{:?}", path.last());
+        for (at, row) in rows.iter().enumerate() {
+            assert_eq!(path[at].2, row["other_y_m"].parse::<f64>().unwrap());
+        }
+        // 20 m/s in the middle of the lane, for ever.
+        let (a, b) = (path[path.len() - 2], path[path.len() - 1]);
+        assert!(((b.1 - a.1) / (b.0 - a.0) - 20.0).abs() < 1e-6 && b.2 == 0.0);
+        let stop = all.iter().rev().find(|e| e.path.ends_with("SimulationTimeCondition")).unwrap();
+        assert_eq!(stop.number("value"), b.0);
+        let declared = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "ego_speed_mps")).unwrap();
+        assert_eq!(declared.number("value"), 30.0);
+        assert!(text.contains("<AbsoluteTargetSpeed value=\"$ego_speed_mps\"/>"));
+    }
+    refused(dir.path(), &[&["export", "xosc", "--duration", "5"], &CUT_IN[..]].concat(), 2, "add --ego external");
+}
+
+#[test]
+fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
+    let dir = tempfile::tempdir().unwrap();
+    let read = |flags: &[&str]| {
+        good(dir.path(), &[&["export", "xosc", "--out", "x"], &CUT_IN[..], flags].concat());
+        let text = only_scenario(&dir.path().join("x"));
+        let road = std::fs::read_dir(dir.path().join("x")).unwrap().map(|e| e.unwrap().path());
+        let road = road.into_iter().find(|p| p.extension().is_some_and(|e| e == "xodr")).unwrap();
+        (played(&text).0, elements(&std::fs::read_to_string(road).unwrap()))
+    };
+    let (left, _) = read(&["--side", "left"]);
+    let (right, road) = read(&["--side", "right", "--lane-width", "3"]);
+    for (a, b) in left["Other"].path.iter().zip(&right["Other"].path) {
+        assert_eq!((a.0, a.1, a.2), (b.0, b.1, -b.2));
+    }
+    let geometry = road.iter().find(|e| e.path.ends_with("/geometry")).unwrap();
+    let lanes = road.iter().filter(|e| e.path.ends_with("/right/lane")).count() as f64;
+    let (top, from) = (geometry.number("y"), geometry.number("x"));
+    assert_eq!(top, 4.5, "the reference line is the left edge: one lane and a half left of the ego's middle");
+    for vehicle in right.values() {
+        for (_, x, y) in &vehicle.path {
+            assert!(*x > from && x - from < geometry.number("length"));
+            assert!(*y < top && *y > top - 3.0 * lanes);
+        }
+    }
+}
+
+#[test]
+fn odd_names_are_escaped_and_read_back_and_make_plain_file_names() {
+    let dir = tempfile::tempdir().unwrap();
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/paper_sumo_01_02_scenarios.jsonl");
+    let text = std::fs::read_to_string(golden).unwrap();
+    let line = text.lines().find(|l| l.contains("\"cut_in\"")).unwrap();
+    let mut scenario: serde_json::Value = serde_json::from_str(line).unwrap();
+    for (id, read) in [
+        ("a\"b<c>&'d\u{e9} \t\n/../e", "a\"b<c>&'d\u{e9} \t\n/../e"),
+        ("]]>--&lt;&#0;", "]]>--&lt;&#0;"),
+        ("\u{1}bell\u{7}", "\u{fffd}bell\u{fffd}"),
+        ("$dollar", " $dollar"),
+        ("..", ".."),
+    ] {
+        scenario["id"] = id.into();
+        std::fs::write(dir.path().join("s.jsonl"), scenario.to_string() + "\n").unwrap();
+        let lane = format!("{id}/S/1.2s/FSM");
+        good(dir.path(), &["export", "xosc", "--scenarios", "s.jsonl", "--lane", &lane, "--out", "x"]);
+        let (_, all) = played(&only_scenario(&dir.path().join("x")));
+        let property = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "lanesweep.lane")).unwrap();
+        assert_eq!(property.attributes["value"], format!("{read}/S/1.2s/FSM"));
+        for entry in std::fs::read_dir(dir.path().join("x")).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            assert!(name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b)), "{name}");
+        }
+        let index = series(&std::fs::read_to_string(dir.path().join("x/index.csv")).unwrap());
+        assert_eq!(index[0]["lane"], lane);
+    }
+}
+
+#[test]
+fn what_cannot_be_exported_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let xosc = |more: &[&'static str]| [&["export", "xosc"], more].concat();
+    refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not say what it is of");
+    refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
+    refused(root, &xosc(&["--category", "cut-in", "--model", "FSM"]), 2, "distance is missing");
+    refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "no width of a lane");
+    refused(root, &[&xosc(&["--out", "file/x"])[..], &CUT_IN].concat(), 0, "");
+    std::fs::write(root.join("taken"), "").unwrap();
+    refused(root, &[&xosc(&["--out", "taken"])[..], &CUT_IN].concat(), 6, "cannot create the folder");
+    // The JRC's frozen vehicle: its place before the crash is not in the lane.
+    let crash = [
+        "--category",
+        "cut-out",
+        "--model",
+        "FSM",
+        "--ego-speed",
+        "30",
+        "--gap",
+        "40",
+        "--lateral-speed",
+        "0.3",
+        "--ahead-gap",
+        "5",
+        "--profile",
+        "jrc-2021",
+    ];
+    refused(root, &[&xosc(&[])[..], &crash].concat(), 3, "hits the one ahead");
+}

@@ -1,0 +1,274 @@
+//! Distributions of an OpenSCENARIO file as maps and samples: the same draws whatever computes them, and one message
+//! with line and element for everything that is not understood.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use lanesweep::criterion::Criterion;
+use lanesweep::driver::ModelId;
+use lanesweep::openscenario::{DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations};
+use lanesweep::profile::Profile;
+use lanesweep::sampling::{SampleTally, TallyOptions};
+use lanesweep::scenario::Category;
+use lanesweep::sweep::{Backend, CpuBackend, Headway, SweepOptions, Wanted, sweep};
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name)
+}
+
+fn renames() -> Vec<Rename> {
+    ["Ego_Speed_kph=ego_speed_kmh", "Other_Speed_kph=other_speed_mps*0.2777777777777778"]
+        .map(|text| text.parse().unwrap())
+        .to_vec()
+}
+
+fn cut_ins() -> DistributionSamples {
+    let path = example("cut-in-stochastic.xosc");
+    let file = read_distribution(&path).unwrap();
+    let names = Names { category: Category::CutIn, renames: &renames(), path: &path };
+    DistributionSamples::of(&file, &names, Vec::new()).unwrap()
+}
+
+#[test]
+fn draws_keep_their_ranges_their_units_and_their_moments() {
+    let samples = cut_ins();
+    assert_eq!((samples.runs, samples.seed), (20_000, Some(157)));
+    let profile = Profile::load("paper").unwrap();
+    let n = 20_000;
+    let points: Vec<Vec<f64>> = (0..n).map(|index| samples.draw(157, index, &profile).unwrap().values).collect();
+    let mean = |at: usize| points.iter().map(|p| p[at]).sum::<f64>() / n as f64;
+    for p in &points {
+        assert!((60.0..=130.0).contains(&p[0]));
+        // 50 to 90 km/h in m/s.
+        assert!((50.0 / 3.6..=90.0 / 3.6).contains(&p[1]));
+        assert!((5.0..=40.0).contains(&p[2]));
+        assert!([0.5, 1.0, 1.5].contains(&p[3]));
+        assert!(p[4].fract() == 0.0 && (0.0..=6.0).contains(&p[4]));
+    }
+    // Normal of 100 and 15 cut at 60 and 130: 100 + 15 (φ(−8/3) − φ(2))/(Φ(2) − Φ(−8/3)).
+    assert!((mean(0) - 99.34).abs() < 0.5, "{}", mean(0));
+    assert!((mean(1) - 70.0 / 3.6).abs() < 0.12);
+    assert!((mean(2) - (0.2 * 10.0 + 0.8 * 27.5)).abs() < 0.3);
+    assert!((mean(3) - (0.3 * 0.5 + 0.5 + 0.2 * 1.5)).abs() < 0.01);
+    assert!((mean(4) - 0.5).abs() < 0.03);
+}
+
+#[test]
+fn a_sample_is_a_function_of_seed_and_index_and_parts_count_what_the_whole_counts() {
+    let samples = cut_ins();
+    let profile = Profile::load("paper").unwrap();
+    let draw = |seed, index| samples.draw(seed, index, &profile).unwrap();
+    assert_eq!(draw(157, 7), draw(157, 7));
+    assert_ne!(draw(157, 7), draw(157, 8));
+    assert_ne!(draw(157, 7), draw(158, 7));
+    let (plan, tries) = samples.plan((600, 157), &profile, &ModelId::ALL, &[]).unwrap();
+    assert_eq!(tries, 600);
+    let counting = TallyOptions { worst: 5, criterion: Criterion::Collision, map: None };
+    let tally = |units: std::ops::Range<u64>, backend: &dyn Backend| {
+        let mut tally = SampleTally::empty(&plan, &counting);
+        let options = SweepOptions { wanted: Wanted::Outcomes, fallback: None, recheck: None };
+        sweep(&plan, units, backend, &options, |chunk| {
+            tally = tally.clone().merge(SampleTally::of_chunk(&plan, &chunk, &counting)?)?;
+            Ok(())
+        })
+        .unwrap();
+        tally
+    };
+    let (batches, scalar) = (CpuBackend::lane_arithmetic(), CpuBackend::scalar());
+    let whole = tally(0..600, &batches);
+    assert!(whole.failures.iter().sum::<u64>() > 0 && whole.voids == 0);
+    assert_eq!(tally(0..600, &scalar), whole);
+    let parts = tally(417..600, &batches).merge(tally(0..1, &scalar)).unwrap();
+    assert_eq!(parts.merge(tally(1..417, &batches)).unwrap(), whole);
+    // A longer run begins with the same samples.
+    let (longer, _) = samples.plan((900, 157), &profile, &ModelId::ALL, &[]).unwrap();
+    assert!((0..600).all(|unit| longer.case(0, unit, 0) == plan.case(0, unit, 0)));
+}
+
+#[test]
+fn deterministic_distributions_are_axes_and_panels() {
+    let path = example("cut-in-deterministic.xosc");
+    let file = read_distribution(&path).unwrap();
+    let found = variations(&file, &Names { category: Category::CutIn, renames: &renames(), path: &path }).unwrap();
+    let keys: Vec<&str> = found.axes.iter().map(|a| a.parameter.key).collect();
+    assert_eq!(keys, ["gap_m", "lateral_speed_mps"]);
+    assert_eq!(found.axes[0].values, (1..=12).map(|k| 5.0 * f64::from(k)).collect::<Vec<_>>());
+    let keys: Vec<&str> = found.set_axes.iter().map(|a| a.parameter.key).collect();
+    assert_eq!(keys, ["ego_speed_kmh", "other_speed_mps"]);
+    assert_eq!(found.set_rows, [vec![60.0, 8.333333333], vec![120.0, 22.222222222]]);
+}
+
+fn lanesweep(dir: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lanesweep")).current_dir(dir).args(args).output().unwrap()
+}
+
+fn good(dir: &Path, args: &[&str]) -> String {
+    let output = lanesweep(dir, args);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// What a refused command says, on one line.
+fn said(dir: &Path, args: &[&str]) -> String {
+    let output = lanesweep(dir, args);
+    assert!(matches!(output.status.code(), Some(2 | 3)), "{args:?}: {:?}", output.status);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+const RENAME: [&str; 4] = ["--rename", "Ego_Speed_kph=ego_speed_kmh", "--rename", "Other_Speed_kph=other_speed_kmh"];
+
+#[test]
+fn a_stochastic_file_becomes_estimates_and_its_lanes_run_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let file = example("cut-in-stochastic.xosc");
+    let file = file.to_str().unwrap();
+    let sample = |out: &str, more: &[&str]| {
+        let fixed = ["sample", "--distribution", file, "--category", "cut-in", "--backend", "cpu", "--out", out];
+        good(root, &[&fixed[..], &RENAME, more].concat())
+    };
+    let text = sample("a", &["--samples", "3000", "--threads", "1"]);
+    assert!(text.contains("cut-in distribution: distributions of ego_speed_kmh"), "{text}");
+    assert!(!text.contains("kernels"), "{text}");
+    sample("b", &["--samples", "3000", "--threads", "2"]);
+    for name in ["estimates.csv", "worst.csv", "convergence.csv", "distribution.json"] {
+        let read = |folder: &str| std::fs::read(root.join(folder).join(name)).unwrap();
+        assert_eq!(read("a"), read("b"), "{name}");
+    }
+    // The file's own number and seed are the defaults.
+    sample("c", &["--models", "FSM"]);
+    let record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(root.join("c/estimate.json")).unwrap()).unwrap();
+    assert_eq!((record["samples"].as_u64(), record["seed"].as_u64()), (Some(20_000), Some(157)));
+    // The worst lane of the table is the lane that runs again.
+    let worst = std::fs::read_to_string(root.join("a/worst.csv")).unwrap();
+    let mut rows = csv::Reader::from_reader(worst.as_bytes());
+    let header = rows.headers().unwrap().clone();
+    let row = rows.records().next().unwrap().unwrap();
+    let value = |name: &str| row.get(header.iter().position(|h| h == name).unwrap()).unwrap().to_owned();
+    let series = good(root, &["simulate", "--from", "a", "--lane", &value("lane")]);
+    let first = series.lines().nth(1).unwrap();
+    let speed: f64 = first.split(',').nth(2).unwrap().parse().unwrap();
+    assert!((speed - value("ego_speed_kmh").parse::<f64>().unwrap() / 3.6).abs() < 1e-5);
+    let listed = good(root, &["export", "xosc", "--from", "a", "--worst", "1", "--model", "FSM", "--out", "x"]);
+    assert_eq!(listed.lines().count(), 1);
+    // Headways by flag where the file has no distance, other values by --set.
+    let text = std::fs::read_to_string(file).unwrap();
+    let (before, after) = text.split_once("      <StochasticDistribution parameterName=\"gap_m\">").unwrap();
+    let after = after.split_once("</StochasticDistribution>\n").unwrap().1;
+    std::fs::write(root.join("no-gap.xosc"), format!("{before}{after}")).unwrap();
+    let more = ["--samples", "500", "--thw", "1.2,0.4", "--set", "width_m=2.2", "--out", "d", "--backend", "cpu"];
+    let args = [&["sample", "--distribution", "no-gap.xosc", "--category", "cut-in"][..], &RENAME, &more].concat();
+    assert!(good(root, &args).contains("Means over all headways"));
+}
+
+#[test]
+fn a_deterministic_file_becomes_the_map_of_the_same_flags() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let file = example("cut-in-deterministic.xosc");
+    let by_file = ["map", "cut-in", "--distribution", file.to_str().unwrap(), "--backend", "cpu", "--out", "a"];
+    good(root, &[&by_file[..], &RENAME].concat());
+    let by_flags = |panel: [&'static str; 4], out: &'static str| {
+        let fixed = ["map", "cut-in", "--x", "gap_m=5..60/5", "--y", "lateral_speed_mps=0.5,1,1.5", "--backend", "cpu"];
+        good(root, &[&fixed[..], &panel, &["--out", out]].concat());
+        let cells = std::fs::read_to_string(root.join(out).join("cells.csv")).unwrap();
+        cells.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let first = by_flags(["--set", "ego_speed_kmh=60", "--set", "other_speed_kmh=30"], "b");
+    let second = by_flags(["--set", "ego_speed_kmh=120", "--set", "other_speed_kmh=80"], "c");
+    let cells = std::fs::read_to_string(root.join("a/cells.csv")).unwrap();
+    let cells: Vec<&str> = cells.lines().skip(1).collect();
+    assert_eq!(cells.len(), first.len() + second.len());
+    // The verdicts are at the end of a row, whatever stands before.
+    let end = |line: &str| line.rsplitn(4, ',').take(3).map(str::to_owned).collect::<Vec<_>>();
+    let mut theirs: Vec<_> = cells.iter().map(|l| end(l)).collect();
+    let mut ours: Vec<_> = first.iter().chain(&second).map(|l| end(l)).collect();
+    theirs.sort();
+    ours.sort();
+    assert_eq!(theirs, ours);
+    let x = ["--x", "lateral_speed_mps", "--y", "gap_m", "--models", "RSS"];
+    good(root, &[&by_file[..], &RENAME, &x].concat());
+    let says = said(root, &[&by_file[..], &RENAME, &["--x", "thw_s"]].concat());
+    assert!(says.contains("the file has no distribution of `thw_s` alone"), "{says}");
+}
+
+#[test]
+fn what_is_not_understood_is_named_with_line_and_element() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let good_text = std::fs::read_to_string(example("cut-in-stochastic.xosc")).unwrap();
+    let sample = ["sample", "--distribution", "f.xosc", "--category", "cut-in", "--samples", "10", "--out", "o"];
+    let changed = |old: &str, new: &str, line: &str, says: &str| {
+        assert!(good_text.contains(old), "{old}");
+        std::fs::write(root.join("f.xosc"), good_text.replacen(old, new, 1)).unwrap();
+        let message = said(root, &[&sample[..], &RENAME].concat());
+        assert!(message.contains(says) && message.contains(line), "{new}: {message}");
+    };
+    changed("<NormalDistribution", "<NormalDistributon", "line 8", "did you mean");
+    changed("variance=", "sigma=", "line 8", "there is no attribute `sigma`");
+    changed(" variance=\"225\"", "", "line 8", "the attribute `variance` is missing");
+    changed("\"225\"", "\"-225\"", "line 8", "at least 0");
+    changed("\"225\"", "\"$v\"", "line 8", "parameters and expressions are not evaluated");
+    changed("lowerLimit=\"60\"", "lowerLimit=\"160\"", "line 9", "above the upper limit");
+    changed("lowerLimit=\"15\"", "lowerLimit=\"12\"", "line 22", "begins before the one above it ends");
+    changed("weight=\"0.3\"", "weight=\"many\"", "line 29", "write a number");
+    changed("\"Other_Speed_kph\"", "\"Ego_Speed_kph\"", "line 12", "has a distribution already, in line 7");
+    changed("numberOfTestRuns=\"20000\"", "numberOfTestRuns=\"0\"", "line 6", "whole number of at least 1");
+    changed("randomSeed=\"157\"", "randomSeed=\"0.5\"", "line 6", "whole number");
+    changed("revMinor=\"2\"", "revMinor=\"9\"", "line 3", "revision 1.9");
+    changed("revMajor=\"1\"", "revMajor=\"2\"", "line 3", "revision 2.2");
+    changed(
+        "PoissonDistribution expectedValue=\"0.5\"",
+        "PoissonDistribution expectedValue=\"1e9\"",
+        "line 35",
+        "at most",
+    );
+    changed("</ParameterValueDistribution>", "", "line", "not well-formed");
+    changed("<OpenSCENARIO>", "<!DOCTYPE a [<!ENTITY b \"c\">]>\n<OpenSCENARIO>", "line 2", "document type");
+    changed("Ego_Speed_kph\"", "&b;\"", "line 7", "attribute `parameterName`");
+    let says = |args: &[&str], says: &str| {
+        let message = said(root, args);
+        assert!(message.contains(says), "{args:?}: {message}");
+    };
+    std::fs::write(root.join("f.xosc"), &good_text).unwrap();
+    says(&sample, "--rename Ego_Speed_kph=OURS");
+    says(&[&sample[..], &RENAME, &["--rename", "nobody=gap_m"]].concat(), "the file has no parameter `nobody`");
+    says(&[&sample[..], &RENAME, &["--set", "thw_s=1"]].concat(), "given twice");
+    says(&[&sample[..], &RENAME, &["--set", "gap_m=1"]].concat(), "say the same twice");
+    says(&[&sample[..], &RENAME, &["--thw", "1"]].concat(), "the initial distance is a parameter already");
+    says(&[&sample[..], &RENAME, &["--estimator", "ce"]].concat(), "crude Monte Carlo");
+    says(&["map", "cut-in", "--distribution", "f.xosc"], "lanesweep sample --distribution");
+    let cut_out = ["sample", "--distribution", "f.xosc", "--category", "cut-out", "--out", "o"];
+    says(&[&cut_out[..], &RENAME].concat(), "give it a distribution, or a value by --set ahead_gap_m=50");
+    let grid = example("cut-in-deterministic.xosc");
+    says(&["sample", "--distribution", grid.to_str().unwrap(), "--category", "cut-in"], "lanesweep map CATEGORY");
+}
+
+#[test]
+fn the_number_of_samples_and_what_cannot_be_a_case_have_limits() {
+    let profile = Profile::load("paper").unwrap();
+    let samples = cut_ins();
+    let plan = |n| samples.plan((n, 1), &profile, &[ModelId::Fsm], &[Headway::ThwS(1.0)]).map(|_| ());
+    assert!(plan(0).is_err());
+    assert!(plan(1_000_001).unwrap_err().help().unwrap().contains("1000000"));
+    // A deceleration never ends above the speed that it starts from.
+    let text = r#"<OpenSCENARIO><FileHeader revMajor="1" revMinor="1"/><ParameterValueDistribution><ScenarioFile filepath=""/>
+        <Stochastic numberOfTestRuns="5"><StochasticDistribution parameterName="ego_speed_mps"><UniformDistribution>
+        <Range lowerLimit="10" upperLimit="20"/></UniformDistribution></StochasticDistribution><StochasticDistribution
+        parameterName="end_speed_mps"><UniformDistribution><Range lowerLimit="LOW" upperLimit="30"/></UniformDistribution>
+        </StochasticDistribution><StochasticDistribution parameterName="deceleration_mps2"><NormalDistribution
+        expectedValue="3" variance="0"/></StochasticDistribution></Stochastic></ParameterValueDistribution></OpenSCENARIO>"#;
+    let of = |low: &str| {
+        let path = Path::new("x.xosc");
+        let file = parse_distribution(&text.replace("LOW", low), path).unwrap();
+        DistributionSamples::of(&file, &Names { category: Category::Lvd, renames: &[], path }, Vec::new()).unwrap()
+    };
+    let some = of("0");
+    let tries: u32 = (0..2000).map(|index| some.draw(1, index, &profile).unwrap().tries).sum();
+    // Half of the unit square's pairs are cases: one in two draws.
+    assert!((3700..4300).contains(&tries), "{tries}");
+    let error = of("25").draw(1, 0, &profile).unwrap_err();
+    assert!(error.to_string().contains("none of 64 draws is a case"), "{error}");
+}
