@@ -5,7 +5,7 @@
 //! (the number a lane computes with), [`random`], [`density`] and
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
 //! [`parts`] (shards, journals, merging), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
-//! good order) and [`cli`].
+//! good order), [`settings`] (what may be configured) and [`cli`].
 
 mod atomic_file;
 pub mod cli;
@@ -32,6 +32,7 @@ pub mod sampling;
 pub mod scalar;
 pub mod scenario;
 pub mod score;
+pub mod settings;
 pub mod sweep;
 mod toml_file;
 pub mod trajectory;

@@ -6,9 +6,9 @@ use std::time::Instant;
 use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source::{self, Source};
-use super::study::StudyConfig;
 use super::study_run::{How, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
@@ -79,9 +79,6 @@ pub struct Compare {
     /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
     #[arg(long, value_name = "KM")]
     km: Option<f64>,
-    /// Study options (TOML): tables `mining`, `parameterization`, `score`
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendFlags,
     #[command(flatten)]
@@ -106,9 +103,9 @@ struct Run<'a> {
 }
 
 impl Compare {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
-        let config = StudyConfig::read(self.config.as_deref())?;
+        let config = &configured.settings;
         let categories = source::categories(&self.categories, "--categories")?;
         let ids = lists::parameterizations(&categories, &self.parameterization)?;
         let models = lists::models(&self.models)?;
@@ -120,9 +117,9 @@ impl Compare {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()?),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        self.guard_inputs()?;
+        self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe());
@@ -146,7 +143,7 @@ impl Compare {
             return Err(Error::input(
                 Place::item(source.describe()),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
-                "use more recordings, or relax the filters in the study file (--config)",
+                "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }
         make_folder(&self.out)?;
@@ -269,8 +266,8 @@ impl Compare {
     }
 
     /// Results must not replace an input.
-    fn guard_inputs(&self) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(&self.config).cloned().collect();
+    fn guard_inputs(&self, configured: &Configured) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         for name in ["compare.csv", "compare.txt", "compare.json"] {
             source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
         }

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::lists;
 use super::sample_checks;
@@ -25,6 +26,7 @@ use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
+pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
 use crate::sweep::Headway;
 use crate::{Error, Place, Result};
 
@@ -129,42 +131,6 @@ pub struct Sample {
     profile: ProfileFlags,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum EstimatorFlag {
-    #[default]
-    Mc,
-    Is,
-    Ce,
-    Subset,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum PointsFlag {
-    /// Independent draws
-    #[default]
-    Random,
-    /// Owen-scrambled Sobol points
-    Sobol,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum IntervalFlag {
-    #[default]
-    Wilson,
-    ClopperPearson,
-}
-
-impl EstimatorFlag {
-    pub(super) fn key(self) -> &'static str {
-        match self {
-            EstimatorFlag::Mc => "mc",
-            EstimatorFlag::Is => "is",
-            EstimatorFlag::Ce => "ce",
-            EstimatorFlag::Subset => "subset",
-        }
-    }
-}
-
 /// Everything that a run was given, read and checked.
 pub(super) struct Run<'a> {
     pub(super) flags: &'a Sample,
@@ -178,11 +144,12 @@ pub(super) struct Run<'a> {
 }
 
 impl Sample {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         self.check()?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
+            configured.refuse_with_plan()?;
             return self.run_plan(path, started, verbosity);
         }
         let Some(density) = &self.density else {
