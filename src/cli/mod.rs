@@ -9,6 +9,7 @@ mod configured;
 mod conformance;
 mod console;
 mod devices;
+mod dry_run;
 mod environment;
 mod exit;
 mod fit;

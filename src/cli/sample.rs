@@ -123,6 +123,9 @@ pub struct Sample {
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    pub(super) dry_run: bool,
     #[command(flatten)]
     pub(super) shards: ShardFlags,
     #[command(flatten)]
@@ -176,6 +179,9 @@ impl Sample {
         }
         if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
             return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);
+        }
+        if self.dry_run {
+            return run.forecast_adaptive();
         }
         make_folder(&self.out)?;
         sample_lanes::check_writable(&self.out)?;

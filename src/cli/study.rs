@@ -8,12 +8,14 @@ use clap::Args;
 use super::backend_flags::{BackendFlags, Opened};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::dry_run::{self, BUDGET, DryRun};
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
 use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, compare_reference, finish_study, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
+use crate::criterion::Criterion;
 use crate::mining::{Collection, count};
 use crate::parameterization::{ParameterizationOptions, Reduction};
 use crate::report::distributions::parameter_histograms;
@@ -21,7 +23,10 @@ use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::scenario::{Category, Scenario};
-use crate::sweep::{Backend, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, plan_study};
+use crate::sweep::{
+    Backend, Block, Confusion, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, Wanted, forecast,
+    plan_study,
+};
 use crate::{Error, Place, Result, input_file};
 
 /// How far do parameterized scenarios agree with recorded ones?
@@ -70,6 +75,9 @@ pub struct Study {
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    dry_run: bool,
     #[command(flatten)]
     shards: ShardFlags,
     #[command(flatten)]
@@ -115,6 +123,9 @@ impl Study {
             if study.facts.reference {
                 self.backend.none_but("--reference")?;
             }
+            if self.dry_run {
+                return self.forecast(&study, &opened, None);
+            }
             if self.shards.is_part() {
                 let text = input_file::read(path, LARGEST_PLAN_BYTES)?;
                 leave_plan(&self.out, &text)?;
@@ -124,6 +135,9 @@ impl Study {
         // Before the work: a device that is not there is known at once.
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
+        if self.dry_run {
+            return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
+        }
         if self.shards.plan_only || self.shards.is_part() {
             let (text, run_sha256) = study.seal()?;
             leave_plan(&self.out, &text)?;
@@ -185,6 +199,34 @@ impl Study {
             score: config.score,
         };
         Ok((PlannedStudy { plan: planned.plan, facts }, timings))
+    }
+
+    /// What the run would be.
+    fn forecast(&self, study: &PlannedStudy, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
+        let plan = &study.plan;
+        let reference = CpuBackend::reference();
+        let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
+        let forecast =
+            forecast(plan, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(plan, &chunk).map(drop))?;
+        // The counts of every unit, in the ledger and joined; every draw's counts of every cell.
+        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
+        let cell = size_of::<Confusion>() as u64;
+        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (cell + 2) + 100);
+        let draws = |block: &Block| study.facts.score.bootstrap_draws as u64 * cells_of(block) * cell;
+        DryRun {
+            data: study.facts.data.clone(),
+            parts: dry_run::parts(plan),
+            units: "scenarios",
+            is_at_most: false,
+            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum(),
+            more: "counts and bootstrap",
+            forecast: Some(forecast),
+            backend: backend.describe(),
+            before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
+            besides: "scores, figures, the plan file; --lanes and --compare-reference",
+        }
+        .print()?;
+        Ok(Exit::Ok)
     }
 
     /// From a plan to a report, or to a part of one.
