@@ -155,7 +155,11 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
         ("[run]\nbackend = 3\n", "line 2, `run.backend`: 3", "one of \"auto\", \"cpu\", \"gpu\""),
         ("[run]\nprofile = \"papr\"\n", "a.toml, line 2, `run.profile`", "did you mean `paper`?"),
         ("[run]\ndevice = \"pci:zz\"\n", "a.toml, line 2, `run.device`", "no PCI bus id"),
-        ("[mining.cut_out]\nrequire_slower_lead = 1\n", "line 2, `mining.cut_out.require_slower_lead`", "true or false"),
+        (
+            "[mining.cut_out]\nrequire_slower_lead = 1\n",
+            "line 2, `mining.cut_out.require_slower_lead`",
+            "true or false",
+        ),
         ("mining = 3\n", "line 1, `mining`: this is a table, no key", "write [mining]"),
         ("[score]\nseed = 1\nseed = 2\n", "a.toml, line 3", "duplicate key"),
         ("[score\n", "a.toml, line 1", "lanesweep config init -"),
@@ -215,7 +219,10 @@ fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
     let toml = good(dir, &[], &args);
     std::fs::write(dir.join("again.toml"), &toml).unwrap();
     assert_eq!(toml, good(dir, &[], &["config", "show", "--format", "toml", "--config", "again.toml"]));
-    assert!(toml.contains("[run]\nthreads = 1\n") && toml.contains("[mining.cut_in]\nmin_duration_s = 0.1\n"), "{toml}");
+    assert!(
+        toml.contains("[run]\nthreads = 1\n") && toml.contains("[mining.cut_in]\nmin_duration_s = 0.1\n"),
+        "{toml}"
+    );
 }
 
 #[test]
@@ -235,8 +242,7 @@ fn the_schema_has_every_key_with_a_default_in_its_own_range() {
         assert!(leaf["description"].as_str().is_some_and(|text| !text.contains("[`")), "{name}: {leaf}");
         leaves.insert(name.to_owned());
     });
-    let shown: Value =
-        serde_json::from_str(&good(dir.path(), &[], &["config", "show", "--format", "json"])).unwrap();
+    let shown: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "show", "--format", "json"])).unwrap();
     let keys = shown.as_array().unwrap().iter().map(|one| one["key"].as_str().unwrap().to_owned());
     assert_eq!(leaves, keys.collect());
     assert_eq!(schema["additionalProperties"], false);

@@ -127,7 +127,7 @@ fn size(bytes: u64) -> String {
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.2} s"),
-        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 600.0 => format!("{s:.0} s"),
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
         s => format!("{:.1} days", s / 86_400.0),
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn numbers_read_as_a_person_writes_them() {
         assert_eq!([0, 999, 1000, 151_760].map(grouped), ["0", "999", "1,000", "151,760"]);
-        assert_eq!([0.3, 61.0, 600.0, 36_000.0].map(time), ["0.30 s", "61 s", "10 min", "10.0 h"]);
+        assert_eq!([0.3, 61.0, 900.0, 36_000.0].map(time), ["0.30 s", "61 s", "15 min", "10.0 h"]);
         assert_eq!([1 << 20, 200 << 20, 20 << 30].map(size), ["1.0 MiB", "200 MiB", "20.0 GiB"]);
     }
 }

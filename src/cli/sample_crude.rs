@@ -24,7 +24,7 @@ use crate::{Error, Place, Result, interrupt};
 const FEW_SCENARIOS: f64 = 5.0;
 
 /// Memory of the counts of every checkpoint and of the figures, bytes, measured.
-const BYTES_OF_COUNTS: u64 = 4 << 20;
+const BYTES_OF_COUNTS: u64 = 6 << 20;
 
 /// Samples what was planned: the whole run, or a shard of it.
 pub(super) fn run(

@@ -165,7 +165,7 @@ impl Layers {
         let name = name.trim();
         let Some(key) = Key::find(&self.keys, name).cloned() else {
             let place = Place::item(format!("--config {text}"));
-            return Err(file::unknown(place.of(format!("`{name}`")), name, false, &self.keys));
+            return Err(file::unknown(place, name, false, &self.keys));
         };
         let origin = Origin::Assignment(text.to_owned());
         if word.trim().is_empty() {
