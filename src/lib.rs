@@ -6,7 +6,7 @@
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
 //! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`openscenario`] (played scenarios and
 //! distributions of parameters), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
-//! good order) and [`cli`].
+//! good order), [`settings`] (what may be configured) and [`cli`].
 
 mod atomic_file;
 pub mod cli;
@@ -34,6 +34,7 @@ pub mod sampling;
 pub mod scalar;
 pub mod scenario;
 pub mod score;
+pub mod settings;
 pub mod sweep;
 pub mod table;
 mod toml_file;

@@ -142,8 +142,8 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Every constant must be finite and in its range; `place` names the profile in the error.
-    pub fn check(&self, place: &Place) -> Result<()> {
+    /// The constants that have a range: key, value, range.
+    pub(crate) fn bounds(&self) -> Vec<(String, f64, Bound)> {
         let (frame, criteria) = (&self.frame, &self.criteria);
         let own = [
             ("frame.dt_s", frame.dt_s, Bound::Above(0.0)),
@@ -157,7 +157,12 @@ impl Profile {
             ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::Above(0.0)),
         ];
         let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
-        let bad = own.chain(self.driver_bounds()).find(|(_, value, bound)| !bound.holds(*value));
+        own.chain(self.driver_bounds()).collect()
+    }
+
+    /// Every constant must be finite and in its range; `place` names the profile in the error.
+    pub fn check(&self, place: &Place) -> Result<()> {
+        let bad = self.bounds().into_iter().find(|(_, value, bound)| !bound.holds(*value));
         if let Some((key, value, expected)) = bad {
             return Err(Error::usage(
                 place.clone().of(format!("`{key}`")),

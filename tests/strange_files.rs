@@ -70,7 +70,7 @@ fn readers() -> Vec<Vec<&'static str>> {
         "study --profile @",
         "study --plan @",
         "study --plan @ --shard 0/2",
-        "mine recordings --mining @",
+        "mine recordings --config @",
         "fit --scenarios @",
         "fit --config @",
         "compare --scenarios @",

@@ -6,10 +6,11 @@ use std::time::Instant;
 use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
+use super::dry_run::{self, BUDGET, DryRun, Part};
 use super::source::{self, Source};
-use super::study::StudyConfig;
 use super::study_run::{How, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
@@ -29,8 +30,13 @@ use crate::sampling::{
     ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
 };
 use crate::scenario::Scenario;
-use crate::sweep::{Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepSummary, plan_study};
+use crate::sweep::{
+    Forecast, Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepSummary, Wanted, forecast, plan_study,
+};
 use crate::{Error, Place, Result};
+
+/// Memory of the counts of sampled lanes and of the figures, bytes, measured.
+const BYTES_OF_COUNTS: u64 = 8 << 20;
 
 /// Nominal level of every interval.
 const LEVEL: f64 = 0.95;
@@ -74,15 +80,15 @@ pub struct Compare {
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 157)]
     seed: u64,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long)]
+    dry_run: bool,
     /// Hours driven for the scenarios, of all egos together [default: from the recordings]
     #[arg(long, value_name = "H")]
     hours: Option<f64>,
     /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
     #[arg(long, value_name = "KM")]
     km: Option<f64>,
-    /// Study options (TOML): tables `mining`, `parameterization`, `score`
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -109,9 +115,9 @@ struct Run<'a> {
 }
 
 impl Compare {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
-        let config = StudyConfig::read(self.config.as_deref())?;
+        let config = &configured.settings;
         let categories = source::categories(&self.categories, "--categories")?;
         let ids = lists::parameterizations(&categories, &self.parameterization)?;
         let models = lists::models(&self.models)?;
@@ -123,9 +129,9 @@ impl Compare {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()?),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        self.guard_inputs()?;
+        self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe());
@@ -149,8 +155,11 @@ impl Compare {
             return Err(Error::input(
                 Place::item(source.describe()),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
-                "use more recordings, or relax the filters in the study file (--config)",
+                "use more recordings, or relax the filters ([mining] in --config)",
             ));
+        }
+        if self.dry_run {
+            return self.forecast(&source, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
         make_folder(&self.out)?;
         tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
@@ -233,6 +242,43 @@ impl Compare {
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
+    /// What the run would be. Sampled lanes are taken to cost what those of their category's scenarios do.
+    fn forecast(
+        &self,
+        source: &Source,
+        plan: &LanePlan,
+        ids: &[ParameterizationId],
+        opened: &Opened,
+        before_s: f64,
+    ) -> Result<Exit> {
+        let per_sample = (plan.headways.len() * plan.models.len()) as u64;
+        let mut parts = dry_run::parts(plan);
+        let mut whole = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
+            Partial::from_chunk(plan, &chunk).map(drop)
+        })?;
+        let per_lane_s = whole.seconds / whole.lanes.max(1) as f64;
+        for id in ids {
+            let lanes = self.samples.saturating_mul(per_sample);
+            let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
+            parts.push(Part { of, what, units: self.samples, lanes });
+            whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
+        }
+        DryRun {
+            data: source.describe(),
+            parts,
+            units: "cases",
+            is_at_most: false,
+            more_bytes: BYTES_OF_COUNTS,
+            more: "counts per scenario and figures",
+            forecast: Some(whole),
+            backend: opened.backend().describe(),
+            before: Some((before_s, "reading, mining and planning")),
+            besides: "fitting the densities",
+        }
+        .print()?;
+        Ok(Exit::Ok)
+    }
+
     /// Tables, figures and record; the record comes last.
     fn write(&self, file: &CompareFile) -> Result<()> {
         let text = file.text();
@@ -272,8 +318,8 @@ impl Compare {
     }
 
     /// Results must not replace an input.
-    fn guard_inputs(&self) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(&self.config).cloned().collect();
+    fn guard_inputs(&self, configured: &Configured) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         for name in ["compare.csv", "compare.txt", "compare.json"] {
             source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
         }

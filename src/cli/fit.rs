@@ -3,15 +3,15 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use sha2::{Digest, Sha256};
 
 use super::Exit;
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, Source};
-use super::study::StudyConfig;
 use super::synth::GeneratorFlags;
 use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use crate::mining::Collection;
@@ -20,6 +20,7 @@ use crate::report::density;
 use crate::report::files::{check_folder_of, make_folder};
 use crate::report::records;
 use crate::scenario::write_scenarios_to;
+use crate::settings::BandwidthInterval;
 use crate::{Error, Place, Result, input_file};
 
 /// How are the parameters of scenarios distributed?
@@ -54,7 +55,7 @@ pub struct Fit {
     with_thw: bool,
     /// Interval that the bandwidth is searched in
     #[arg(long, value_enum, default_value_t)]
-    bandwidth_rule: RuleFlag,
+    bandwidth_rule: BandwidthInterval,
     /// Seed of P_valid and of the splits for M
     #[arg(long, value_name = "N", default_value_t = FitOptions::default().seed)]
     seed: u64,
@@ -70,28 +71,15 @@ pub struct Fit {
     /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
     #[arg(long, value_name = "KM")]
     km: Option<f64>,
-    /// Study options (TOML): tables `mining`, `parameterization`
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
     generator: GeneratorFlags,
 }
 
-/// [`BandwidthRule`] as a flag.
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
-enum RuleFlag {
-    /// From 0.2 times Silverman's to Silverman's, as with the reduction of scenarios
-    #[default]
-    Reduction,
-    /// From 0.2 to 5 times Silverman's, up to 1 at least
-    Wide,
-}
-
 impl Fit {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
-        let config = StudyConfig::read(self.config.as_deref())?;
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+        let config = &configured.settings;
         let ids = self.ids()?;
         let typed = Driven { hours: self.hours, kilometres: self.km };
         typed.validate()?;
@@ -99,8 +87,8 @@ impl Fit {
             parameterization: config.parameterization.clone(),
             with_thw: self.with_thw,
             rule: match self.bandwidth_rule {
-                RuleFlag::Reduction => BandwidthRule::Reduction,
-                RuleFlag::Wide => BandwidthRule::Wide,
+                BandwidthInterval::Reduction => BandwidthRule::Reduction,
+                BandwidthInterval::Wide => BandwidthRule::Wide,
             },
             valid_draws: self.valid_draws,
             seed: self.seed,
@@ -116,9 +104,9 @@ impl Fit {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()?),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        let files = self.files(&ids)?;
+        let files = self.files(&ids, configured)?;
         tracing::info!("{}", source.describe());
         let collection = source.load(&config.mining, verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
@@ -166,7 +154,7 @@ impl Fit {
     }
 
     /// One file per density, none of them an input.
-    fn files(&self, ids: &[ParameterizationId]) -> Result<Vec<PathBuf>> {
+    fn files(&self, ids: &[ParameterizationId], configured: &Configured) -> Result<Vec<PathBuf>> {
         let single = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         if single && ids.len() != 1 {
             return Err(Error::usage(
@@ -180,7 +168,7 @@ impl Fit {
             false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
-        let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(&self.config).cloned().collect();
+        let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         inputs.extend(self.scenarios.as_deref().map(ExposureFile::path_of));
         for file in &files {
             source::refuse_overwriting(file, &inputs, "--out")?;

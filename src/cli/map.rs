@@ -8,6 +8,7 @@ use clap::Args;
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
+use super::dry_run::{BUDGET, DryRun, Part};
 use super::{Exit, lists};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
@@ -20,11 +21,14 @@ use crate::profile::Profile;
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
 use crate::scenario::Category;
-use crate::sweep::{Backend, CpuBackend, SweepSummary};
+use crate::sweep::{Backend, CpuBackend, Forecast, SweepSummary, Verdicts, Wanted, forecast};
 use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.
 const RECHECK_SEED: u64 = 1;
+
+/// Memory of the sheets that are being drawn, bytes: those of the presets, measured.
+const BYTES_OF_SHEETS: u64 = 3 << 20;
 
 /// Map outcomes over two parameters, and where two models or profiles differ
 ///
@@ -86,6 +90,9 @@ pub struct Map {
     /// Compute in binary64 on the CPU: the reference of the lane arithmetic
     #[arg(long)]
     reference: bool,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long)]
+    dry_run: bool,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "lanesweep-map")]
     out: PathBuf,
@@ -136,6 +143,9 @@ impl Map {
             Some(wide) => wide,
             None => opened.backend(),
         };
+        if self.dry_run {
+            return forecast_maps(&planned, backend);
+        }
         let recheck_seed = opened.device().map(|_| RECHECK_SEED);
         let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
         let is_jrc = self.preset.is_some()
@@ -343,6 +353,41 @@ impl Map {
 
 /// A grid, its plan, and its name and plan under another profile.
 type Planned = (Preset, GridPlan, Option<(String, GridPlan)>);
+
+/// What the maps would be.
+fn forecast_maps(planned: &[Planned], backend: &dyn Backend) -> Result<Exit> {
+    let plans = || {
+        planned.iter().flat_map(|(_, plan, other)| {
+            let other = other.iter().map(|(name, plan)| (format!("under {name}"), plan));
+            std::iter::once((String::new(), plan)).chain(other)
+        })
+    };
+    let all: u64 = plans().map(|(_, plan)| plan.lane_count()).sum();
+    let (mut whole, mut parts) = (Forecast::default(), Vec::new());
+    for (what, plan) in plans() {
+        for part in &plan.parts {
+            let budget = BUDGET.mul_f64(part.plan.lane_count() as f64 / all.max(1) as f64);
+            whole.add(&forecast(&part.plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
+        }
+        let (of, units, lanes) = (plan.grid.name().to_owned(), plan.grid.cell_count() as u64, plan.lane_count());
+        parts.push(Part { of, what, units, lanes });
+    }
+    DryRun {
+        data: "the grids' own cases".to_owned(),
+        parts,
+        units: "cells",
+        is_at_most: false,
+        // A verdict per cell and model, and the sheets drawn of them.
+        more_bytes: all * (size_of::<Verdicts>() as u64 + 1) + BYTES_OF_SHEETS,
+        more: "verdicts and sheets",
+        forecast: Some(whole),
+        backend: backend.describe(),
+        before: None,
+        besides: "drawing and writing the sheets",
+    }
+    .print()?;
+    Ok(Exit::Ok)
+}
 
 fn swept(plan: &GridPlan, how: MapBackend, summary: &mut SweepSummary) -> Result<GridMap> {
     let (map, of_map) = GridMap::sweep(plan, how)?;

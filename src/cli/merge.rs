@@ -89,7 +89,13 @@ fn merge_study(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
         let problem = "the parts do not hold every unit that their names stand for";
         return Err(Error::input(Place::file(dir), problem, "make them again"));
     }
-    let host = Host { backend: format!("{count} parts merged"), device: None, swept, timings: Timings::default() };
+    let host = Host {
+        backend: format!("{count} parts merged"),
+        device: None,
+        swept,
+        timings: Timings::default(),
+        settings: Vec::new(),
+    };
     finish_study(&study, &partial, None, host, dir, format)
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::configured::Configured;
 use super::console::Verbosity;
 use super::source::{self, Source};
 use super::{Exit, console};
@@ -26,25 +27,22 @@ pub struct Mine {
     /// File to write: .jsonl or .parquet [default: standard output, JSON Lines]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Mining options (TOML) [default: the paper's]
-    #[arg(long, value_name = "FILE")]
-    mining: Option<PathBuf>,
     /// Only scenarios that pass the paper's filters
     #[arg(long)]
     kept: bool,
 }
 
 impl Mine {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.output {
             source::refuse_recording(path, &self.dir, "--output")?;
             check_scenario_file(path)?;
+            source::refuse_overwriting(path, configured.files(), "--output")?;
             // Before the work: a file that cannot be written is known at once.
             AtomicFile::create(path).map(drop)?;
         }
-        let options = source::mining_options(self.mining.as_deref())?;
         let from = Source::Folder(self.dir.clone());
-        let mut collection = from.load(&options, verbosity)?;
+        let mut collection = from.load(&configured.settings.mining, verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);

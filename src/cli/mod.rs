@@ -4,9 +4,12 @@
 mod backend_flags;
 mod case_flags;
 mod compare;
+mod config;
+mod configured;
 mod conformance;
 mod console;
 mod devices;
+mod dry_run;
 mod environment;
 mod exit;
 mod export;
@@ -46,7 +49,8 @@ pub use exit::Exit;
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use configured::Configured;
 use console::Verbosity;
 
 use crate::profile::Profile;
@@ -81,6 +85,9 @@ struct Common {
     /// Threads; results do not depend on it [default: all cores]
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
+    /// Configuration file (`lanesweep config init` writes one), or one key of it; repeatable [default: LANESWEEP_CONFIG]
+    #[arg(long, global = true, value_name = "FILE|KEY=VALUE")]
+    config: Vec<String>,
 }
 
 impl Common {
@@ -111,6 +118,7 @@ enum Verb {
     Conformance(conformance::Conformance),
     Verify(verify::Verify),
     Devices(devices::Devices),
+    Config(config::Config),
     Completions(shell::Completions),
     Man(shell::Man),
 }
@@ -142,8 +150,8 @@ const MOST_THREADS: usize = 4096;
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
     environment::quiet_drivers();
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let matches = match Cli::command().try_get_matches() {
+        Ok(matches) => matches,
         Err(error) => {
             let asked_for = !error.use_stderr();
             // A closed pipe on `--help | head` is success.
@@ -151,9 +159,15 @@ pub fn main() -> ExitCode {
             return if asked_for { Exit::Ok } else { Exit::Usage }.into();
         }
     };
-    console::start_log(cli.common.verbosity());
+    if let Ok(common) = Common::from_arg_matches(&matches) {
+        console::start_log(common.verbosity());
+    }
     crate::interrupt::install();
-    told(|| run(&cli)).into()
+    told(|| {
+        let (cli, configured) = Configured::of(&matches)?;
+        run(&cli, &configured)
+    })
+    .into()
 }
 
 /// Does the work and tells the user how it ended. A defect, in any thread that the work waits for, must not look like
@@ -172,7 +186,7 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
     Exit::from(&error)
 }
 
-fn run(cli: &Cli) -> Result<Exit> {
+fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     if let Some(threads) = cli.common.threads {
         if threads == 0 || threads > MOST_THREADS {
             let problem = format!("{threads} threads cannot work");
@@ -185,20 +199,21 @@ fn run(cli: &Cli) -> Result<Exit> {
             .map_err(|e| Error::Internal(format!("the thread pool did not start: {e}")))?;
     }
     match &cli.verb {
-        Verb::Study(verb) => verb.run(cli.common.verbosity()),
-        Verb::Mine(verb) => verb.run(cli.common.verbosity()),
-        Verb::Fit(verb) => verb.run(cli.common.verbosity()),
-        Verb::Sample(verb) => verb.run(cli.common.verbosity()),
+        Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Fit(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Merge(verb) => verb.run(),
-        Verb::Compare(verb) => verb.run(cli.common.verbosity()),
-        Verb::Synth(verb) => verb.run(cli.common.verbosity()),
+        Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(),
         Verb::Export(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
-        Verb::Verify(verb) => verb.run(cli.common.verbosity()),
+        Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Devices(verb) => verb.run(),
+        Verb::Config(verb) => verb.run(configured),
         Verb::Completions(verb) => verb.run(),
         Verb::Man(verb) => verb.run(),
     }

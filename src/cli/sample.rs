@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
+use super::configured::Configured;
 use super::console::Verbosity;
 use super::format::FormatFlag;
 use super::lists;
@@ -28,6 +29,7 @@ use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
+pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
 use crate::sweep::Headway;
 use crate::table::TableFormat;
 use crate::{Error, Place, Result};
@@ -139,6 +141,9 @@ pub struct Sample {
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    pub(super) dry_run: bool,
     #[command(flatten)]
     pub(super) format: FormatFlag,
     #[command(flatten)]
@@ -147,45 +152,6 @@ pub struct Sample {
     backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
-}
-
-/// Seed where none is given.
-pub(super) const SEED: u64 = 157;
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum EstimatorFlag {
-    #[default]
-    Mc,
-    Is,
-    Ce,
-    Subset,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum PointsFlag {
-    /// Independent draws
-    #[default]
-    Random,
-    /// Owen-scrambled Sobol points
-    Sobol,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum IntervalFlag {
-    #[default]
-    Wilson,
-    ClopperPearson,
-}
-
-impl EstimatorFlag {
-    pub(super) fn key(self) -> &'static str {
-        match self {
-            EstimatorFlag::Mc => "mc",
-            EstimatorFlag::Is => "is",
-            EstimatorFlag::Ce => "ce",
-            EstimatorFlag::Subset => "subset",
-        }
-    }
 }
 
 /// Everything that a run was given, read and checked.
@@ -201,11 +167,12 @@ pub(super) struct Run<'a> {
 }
 
 impl Sample {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         self.check()?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
+            configured.refuse_with_plan()?;
             return self.run_plan(path, started, verbosity);
         }
         if let Some(path) = &self.distribution {
@@ -235,6 +202,9 @@ impl Sample {
         }
         if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
             return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);
+        }
+        if self.dry_run {
+            return run.forecast_adaptive();
         }
         make_folder(&self.out)?;
         sample_lanes::check_writable(&self.out)?;

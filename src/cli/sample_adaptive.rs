@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
+use super::Exit;
+use super::dry_run::{DryRun, Part};
 use super::sample::{EstimatorFlag, Run, one_headway};
+use super::sample_checks::MOST_HELD;
 use crate::Result;
 use crate::density::{BandwidthRule, Kde, Mixture};
 use crate::driver::ModelId;
@@ -44,6 +47,48 @@ impl Run<'_> {
         let mut file = self.file(samples, rows)?;
         file.levels = levels;
         Ok(file)
+    }
+
+    /// What the run would be, at most: how many levels there are is seen on the way.
+    pub(super) fn forecast_adaptive(&self) -> Result<Exit> {
+        let flags = self.flags;
+        let given = |usual: u64| flags.samples.unwrap_or(usual);
+        let lanes = match flags.estimator {
+            EstimatorFlag::Subset => {
+                let options = Subset::new(flags.seed, given(2000));
+                options.samples_per_level.saturating_mul(options.levels as u64)
+            }
+            EstimatorFlag::Ce => {
+                let samples = given(100_000);
+                let options = CrossEntropy::new(flags.seed, (samples / 10).max(2000), samples);
+                samples.saturating_add(options.samples_per_level.saturating_mul(options.levels as u64))
+            }
+            EstimatorFlag::Mc | EstimatorFlag::Is if flags.proposal.is_empty() => {
+                given(100_000).saturating_add(flags.pilot)
+            }
+            EstimatorFlag::Mc | EstimatorFlag::Is => given(100_000),
+        };
+        let part = |model: &ModelId| Part {
+            of: model.name().to_owned(),
+            what: format!("estimator {}", flags.estimator.key()),
+            units: lanes,
+            lanes,
+        };
+        DryRun {
+            data: self.density.provenance.data.clone(),
+            parts: self.models.iter().map(part).collect(),
+            units: "samples",
+            is_at_most: true,
+            // The points of a level or pilot, with their limit states and the fit's responsibilities.
+            more_bytes: lanes.min(MOST_HELD) * (self.density.space.parameters().len() as u64 + 8) * 8,
+            more: "the points that are held at once",
+            forecast: None,
+            backend: self.opened.backend().describe(),
+            before: None,
+            besides: "",
+        }
+        .print()?;
+        Ok(Exit::Ok)
     }
 
     /// The limit state of one model.

@@ -4,7 +4,7 @@ use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use crate::{Error, Place, Result};
 
 /// Points that an adaptive estimator holds at once, at most.
-const MOST_HELD: u64 = 10_000_000;
+pub(super) const MOST_HELD: u64 = 10_000_000;
 
 /// The complaint about a flag that the weighing estimators do not have.
 pub(super) fn only_crude(flag: &str) -> Error {

@@ -7,6 +7,7 @@ use super::Exit;
 use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
+use super::dry_run::{self, BUDGET, DryRun};
 use super::merge::read_parts;
 use super::sample::Sample;
 use super::sample_lanes;
@@ -17,11 +18,14 @@ use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
 use crate::sampling::{
     BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
 };
-use crate::sweep::{ONE_IN, Recheck};
+use crate::sweep::{ONE_IN, Outcome, Recheck, Wanted, forecast};
 use crate::{Error, Place, Result, interrupt};
 
 /// A condition that so few scenarios are near is outside the data.
 const FEW_SCENARIOS: f64 = 5.0;
+
+/// Memory of the counts of every checkpoint and of the figures, bytes, measured.
+const BYTES_OF_COUNTS: u64 = 6 << 20;
 
 /// Samples what was planned: the whole run, or a shard of it.
 pub(super) fn run(
@@ -33,6 +37,9 @@ pub(super) fn run(
     verbosity: Verbosity,
 ) -> Result<Exit> {
     let (plan, out, shard) = (&planned.plan, &flags.out, flags.shards.shard);
+    if flags.dry_run {
+        return forecast_crude(planned, opened, &stop);
+    }
     let (text, run_sha256) = planned.seal()?;
     if flags.shards.plan_only || shard.is_some() {
         leave_plan(out, &text)?;
@@ -106,6 +113,30 @@ pub(super) fn run(
     };
     write_run(planned, crude, record, host, out, flags.format)?;
     work.forget()?;
+    Ok(Exit::Ok)
+}
+
+/// What the run would be.
+fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule) -> Result<Exit> {
+    let (plan, counting) = (&planned.plan, planned.counting());
+    let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
+    let forecast = forecast(plan, opened.backend(), wanted, BUDGET, |chunk| {
+        SampleTally::of_chunk(plan, &chunk, &counting).map(drop)
+    })?;
+    let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
+    DryRun {
+        data: planned.density.provenance.data.clone(),
+        parts: dry_run::parts(plan),
+        units: "samples",
+        is_at_most: stop.relative_half_width.is_some() || stop.time_limit.is_some(),
+        more_bytes: BYTES_OF_COUNTS + forecast.lanes_at_once * bytes_of_lane,
+        more: "lanes at once, counts and figures, however many samples",
+        forecast: Some(forecast),
+        backend: opened.backend().describe(),
+        before: None,
+        besides: "figures; --bootstrap and --rows",
+    }
+    .print()?;
     Ok(Exit::Ok)
 }
 

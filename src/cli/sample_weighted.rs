@@ -7,6 +7,7 @@ use super::Exit;
 use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
+use super::dry_run::{BUDGET, DryRun, Part};
 use super::merge::read_parts;
 use super::sample::Sample;
 use super::sample_lanes;
@@ -18,7 +19,11 @@ use crate::parts::{Countable, Ledger};
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
+use crate::sweep::Forecast;
 use crate::{Error, Place, Result, interrupt};
+
+/// Memory of a sample while it is judged (point, case, motion, outcome), bytes, measured.
+const BYTES_PER_SAMPLE: u64 = 280;
 
 /// Samples that are judged between two looks at the journal.
 const CHUNK: u64 = 1 << 16;
@@ -32,6 +37,9 @@ pub(super) fn run(
     verbosity: Verbosity,
 ) -> Result<Exit> {
     let (samples, out, shard) = (planned.facts.samples, &flags.out, flags.shards.shard);
+    if flags.dry_run {
+        return forecast(planned, opened);
+    }
     let (text, run_sha256) = planned.seal()?;
     if flags.shards.plan_only || shard.is_some() {
         leave_plan(out, &text)?;
@@ -70,6 +78,45 @@ pub(super) fn run(
     let tally = work.ledger.counts(0..samples)?;
     write_run(planned, tally, host, out, flags.format)?;
     work.forget()?;
+    Ok(Exit::Ok)
+}
+
+/// What the run would be: drawing and weighing cost more than the lanes, so all of it is measured.
+fn forecast(planned: &PlannedWeighted, opened: &Opened) -> Result<Exit> {
+    let (facts, density) = (&planned.facts, &planned.density);
+    let most = facts.samples.min(CHUNK);
+    let (mut samples, mut took) = (most.min(256), 0.0);
+    loop {
+        let started = Instant::now();
+        sample(planned, opened, &mut Ledger::new(0..samples, &[]), |_| ())?;
+        let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
+        if samples >= most || took + last >= BUDGET.as_secs_f64() / 2.0 {
+            break;
+        }
+        samples = (2 * samples).min(most);
+    }
+    let models = facts.models.len() as u64;
+    let lanes = facts.samples.saturating_mul(models);
+    let seconds = took / samples as f64 * facts.samples as f64;
+    let part = |model: &ModelId| Part {
+        of: model.name().to_owned(),
+        what: format!("headway {}", planned.headway_name()),
+        units: facts.samples,
+        lanes: facts.samples,
+    };
+    DryRun {
+        data: density.provenance.data.clone(),
+        parts: facts.models.iter().map(part).collect(),
+        units: "samples",
+        is_at_most: false,
+        more_bytes: most * BYTES_PER_SAMPLE,
+        more: "the samples that are judged at once",
+        forecast: Some(Forecast { lanes, seconds, measured_lanes: samples * models, lanes_at_once: most }),
+        backend: opened.backend().describe(),
+        before: None,
+        besides: "",
+    }
+    .print()?;
     Ok(Exit::Ok)
 }
 

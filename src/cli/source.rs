@@ -7,7 +7,7 @@ use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generate
 use crate::scenario::{Category, Scenario, read_scenarios};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::trajectory::highd;
-use crate::{Error, Place, Result, input_file, toml_file};
+use crate::{Error, Place, Result, input_file};
 
 /// What the scenarios of a run are.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,19 +97,6 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     list.sort();
     list.dedup();
     Ok(list)
-}
-
-/// Mining options from a TOML file, or the paper's.
-pub fn mining_options(path: Option<&Path>) -> Result<MiningOptions> {
-    let Some(path) = path else { return Ok(MiningOptions::default()) };
-    let options: MiningOptions = read_toml(path)?;
-    options.validate()?;
-    Ok(options)
-}
-
-/// A TOML file as options; errors name the line.
-pub fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    toml_file::read(path, "the keys and their defaults are in the folder `configs`")
 }
 
 /// File that `synth` leaves beside its recordings, so that a study on them says what they are.

@@ -1,13 +1,14 @@
 //! `lanesweep study`: trajectories in, F1 out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use serde::{Deserialize, Serialize};
 
 use super::backend_flags::{BackendFlags, Opened};
+use super::configured::Configured;
 use super::console::Verbosity;
+use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
 use super::source::{self, Source};
@@ -15,15 +16,18 @@ use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFa
 use super::study_run::{Host, How, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
-use crate::mining::{Collection, MiningOptions, count};
+use crate::criterion::Criterion;
+use crate::mining::{Collection, count};
 use crate::parameterization::{ParameterizationOptions, Reduction};
 use crate::report::distributions::parameter_histograms;
 use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::scenario::{Category, Scenario};
-use crate::score::ScoreOptions;
-use crate::sweep::{Backend, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, plan_study};
+use crate::sweep::{
+    Backend, Block, Confusion, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, Wanted, forecast,
+    plan_study,
+};
 use crate::{Error, Place, Result, input_file};
 
 /// How far do parameterized scenarios agree with recorded ones?
@@ -33,7 +37,7 @@ use crate::{Error, Place, Result, input_file};
 /// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "config" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
+    "dir" | "scenarios" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
     "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
@@ -62,9 +66,6 @@ pub struct Study {
     /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
     #[arg(long, conflicts_with = "reference")]
     compare_reference: bool,
-    /// Study options (TOML): tables `mining`, `parameterization`, `score`
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
     /// Seed of the bootstrap [default: 157]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -75,6 +76,9 @@ pub struct Study {
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
+    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    dry_run: bool,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -109,46 +113,34 @@ impl KeepPlan {
     }
 }
 
-/// The study file.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct StudyConfig {
-    pub mining: MiningOptions,
-    pub parameterization: ParameterizationOptions,
-    pub score: ScoreOptions,
-}
-
-impl StudyConfig {
-    pub fn read(path: Option<&Path>) -> Result<StudyConfig> {
-        let config: StudyConfig = path.map_or(Ok(StudyConfig::default()), source::read_toml)?;
-        config.mining.validate()?;
-        config.parameterization.validate()?;
-        config.score.validate()?;
-        Ok(config)
-    }
-}
-
 impl Study {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
-        self.guard_inputs()?;
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+        self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.lanes.as_deref().map_or(Ok(()), check_folder_of)?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
+            configured.refuse_with_plan()?;
             let opened = self.backend.open()?;
             let (study, run_sha256) = PlannedStudy::read(path)?;
             if study.facts.reference {
                 self.backend.none_but("--reference")?;
             }
+            if self.dry_run {
+                return self.forecast(&study, &opened, None);
+            }
             if self.shards.is_part() {
                 let text = input_file::read(path, LARGEST_PLAN_BYTES)?;
                 leave_plan(&self.out, &text)?;
             }
-            return self.sweep(&study, &opened, run_sha256, Timings::default(), verbosity);
+            return self.sweep(&study, &opened, run_sha256, configured, Timings::default(), verbosity);
         }
         // Before the work: a device that is not there is known at once.
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
-        let (study, timings) = self.prepare(verbosity)?;
+        let (study, timings) = self.prepare(configured, verbosity)?;
+        if self.dry_run {
+            return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
+        }
         if self.shards.plan_only || self.shards.is_part() {
             let (text, run_sha256) = study.seal()?;
             leave_plan(&self.out, &text)?;
@@ -158,16 +150,16 @@ impl Study {
                 self.format.print_plan(lanes, &path)?;
                 return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
             }
-            return self.sweep(&study, &opened, run_sha256, timings, verbosity);
+            return self.sweep(&study, &opened, run_sha256, configured, timings, verbosity);
         }
         // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.
         let run_sha256 = crate::sweep::sha256(&format!("{} reference {}", study.plan.hash(), study.facts.reference));
-        self.sweep(&study, &opened, run_sha256, timings, verbosity)
+        self.sweep(&study, &opened, run_sha256, configured, timings, verbosity)
     }
 
     /// From data to a plan.
-    fn prepare(&self, verbosity: Verbosity) -> Result<(PlannedStudy, Timings)> {
-        let mut config = StudyConfig::read(self.config.as_deref())?;
+    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(PlannedStudy, Timings)> {
+        let mut config = configured.settings.clone();
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let profile = self.profile.load()?;
         let options = StudyOptions {
@@ -178,7 +170,7 @@ impl Study {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()?),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
         };
         tracing::info!("{}", source.describe());
         let mut timings = Timings::default();
@@ -192,7 +184,7 @@ impl Study {
             return Err(Error::input(
                 Place::item(source.describe()),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
-                "use more recordings, or relax the filters in the study file (--config)",
+                "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }
         let facts = StudyFacts {
@@ -212,12 +204,41 @@ impl Study {
         Ok((PlannedStudy { plan: planned.plan, facts }, timings))
     }
 
+    /// What the run would be.
+    fn forecast(&self, study: &PlannedStudy, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
+        let plan = &study.plan;
+        let reference = CpuBackend::reference();
+        let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
+        let forecast =
+            forecast(plan, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(plan, &chunk).map(drop))?;
+        // The counts of every unit, in the ledger and joined; every draw's counts of every cell.
+        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
+        let cell = size_of::<Confusion>() as u64;
+        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (cell + 2) + 100);
+        let draws = |block: &Block| study.facts.score.bootstrap_draws as u64 * cells_of(block) * cell;
+        DryRun {
+            data: study.facts.data.clone(),
+            parts: dry_run::parts(plan),
+            units: "scenarios",
+            is_at_most: false,
+            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum(),
+            more: "counts and bootstrap",
+            forecast: Some(forecast),
+            backend: backend.describe(),
+            before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
+            besides: "scores, figures, the plan file; --lanes and --compare-reference",
+        }
+        .print()?;
+        Ok(Exit::Ok)
+    }
+
     /// From a plan to a report, or to a part of one.
     fn sweep(
         &self,
         study: &PlannedStudy,
         opened: &Opened,
         run_sha256: String,
+        configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Exit> {
@@ -255,6 +276,7 @@ impl Study {
             device: opened.device(),
             swept,
             timings,
+            settings: configured.record(),
         };
         self.leave_plan(study)?;
         let exit = finish_study(study, &partial, comparison, host, &self.out, self.format)?;
@@ -276,13 +298,13 @@ impl Study {
     }
 
     /// The lane table must replace neither an input nor another result.
-    fn guard_inputs(&self) -> Result<()> {
+    fn guard_inputs(&self, configured: &Configured) -> Result<()> {
         let Some(lanes) = &self.lanes else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         others.extend(self.scenarios.clone());
-        others.extend(self.config.clone());
+        others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         lane_format(lanes)?;
         source::refuse_overwriting(lanes, &others, "--lanes")?;

@@ -10,7 +10,7 @@ use super::study_plan::PlannedStudy;
 use crate::report::files::make_folder;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
-use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SweepRecord, Timings};
+use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
 use crate::score::{ScoreTable, f1, judge_claims, score};
@@ -117,6 +117,8 @@ pub(super) struct Host {
     pub device: Option<DeviceRecord>,
     pub swept: SweepSummary,
     pub timings: Timings,
+    /// What was configured.
+    pub settings: Vec<SettingRecord>,
 }
 
 /// Scores, tables, figures and the record, from the counts of all lanes.
@@ -154,6 +156,7 @@ pub(super) fn finish_study(
         mining: facts.mining,
         parameterization: facts.parameterization,
         score: facts.score,
+        settings: host.settings,
         timings: host.timings,
     };
     let claims = judge_claims(&scores);

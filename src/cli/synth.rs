@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Exit;
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source::{SYNTHETIC_MARKER, Source};
 use crate::report::files::{make_folder, write_atomically};
@@ -27,12 +28,13 @@ pub struct GeneratorFlags {
 }
 
 impl GeneratorFlags {
-    pub fn options(&self) -> Result<GeneratorOptions> {
+    /// The flags, over what is configured of the rest.
+    pub fn options(&self, configured: &Configured) -> Result<GeneratorOptions> {
         let options = GeneratorOptions {
             seed: self.synth_seed,
             recordings: self.synth_recordings,
             duration_s: self.synth_duration,
-            ..GeneratorOptions::default()
+            ..configured.settings.generator.clone()
         };
         options.validate()?;
         Ok(options)
@@ -53,8 +55,8 @@ pub struct Synth {
 }
 
 impl Synth {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
-        let options = self.generator.options()?;
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+        let options = self.generator.options(configured)?;
         let taken = |id: &str| HighdFiles::named(&self.dir, id).tracks.exists();
         if let Some(id) = (1..=options.recordings).map(|k| format!("{k:02}")).find(|id| taken(id)) {
             return Err(Error::usage(

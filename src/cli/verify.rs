@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::backend_flags::BackendFlags;
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
-use crate::mining::MiningOptions;
 use crate::profile::Profile;
 use crate::report::{records, verification};
 use crate::scenario::Category;
@@ -61,7 +61,7 @@ pub struct Verify {
 const MOST_LANES: u64 = 100_000_000;
 
 impl Verify {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         for (flag, value, most) in
             [("--lanes", self.lanes, MOST_LANES), ("--threshold-units", self.threshold_units, MOST_LANES / 1000)]
         {
@@ -74,7 +74,7 @@ impl Verify {
         let opened = self.backend.open_to_verify()?;
         let tested = opened.backend();
         if let Some(key) = &self.lane {
-            return self.one_lane(key, &profile, tested, verbosity);
+            return self.one_lane(key, configured, &profile, tested, verbosity);
         }
         let head = format!("Under test: {}\nProfile {}, seed {}\n", tested.describe(), profile.name, self.seed);
         let is_text = !self.format.is_json();
@@ -83,7 +83,7 @@ impl Verify {
         }
         let mut sets = Vec::new();
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
-        for (name, plan) in self.sets(&profile, verbosity)? {
+        for (name, plan) in self.sets(configured, &profile, verbosity)? {
             let bar = console::progress(verbosity, plan.lane_count(), name);
             let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
             bar.finish_and_clear();
@@ -118,11 +118,16 @@ impl Verify {
     }
 
     /// The sets, by name.
-    fn sets(&self, profile: &Profile, verbosity: Verbosity) -> Result<Vec<(&'static str, LanePlan)>> {
+    fn sets(
+        &self,
+        configured: &Configured,
+        profile: &Profile,
+        verbosity: Verbosity,
+    ) -> Result<Vec<(&'static str, LanePlan)>> {
         Ok(vec![
             ("Random lanes", self.random(profile)?),
             ("Lanes on thresholds", self.thresholds(profile)?),
-            ("Study", self.study(profile, verbosity)?),
+            ("Study", self.study(configured, profile, verbosity)?),
         ])
     }
 
@@ -136,13 +141,13 @@ impl Verify {
         threshold_plan(profile, &ThresholdOptions { seed: self.seed, units_per_threshold, ..Default::default() })
     }
 
-    fn study(&self, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
+    fn study(&self, configured: &Configured, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options()?),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        let collection = source.load(&MiningOptions::default(), verbosity)?;
+        let collection = source.load(&configured.settings.mining, verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
         if plan.unit_count() == 0 {
@@ -154,13 +159,20 @@ impl Verify {
     }
 
     /// One lane on the three backends.
-    fn one_lane(&self, text: &str, profile: &Profile, tested: &dyn Backend, verbosity: Verbosity) -> Result<Exit> {
+    fn one_lane(
+        &self,
+        text: &str,
+        configured: &Configured,
+        profile: &Profile,
+        tested: &dyn Backend,
+        verbosity: Verbosity,
+    ) -> Result<Exit> {
         // The sets' own keys name their seed; a user's scenario may begin as it likes.
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
             () if own("random-") => self.random(profile)?,
             () if own("threshold-") => self.thresholds(profile)?,
-            () => self.study(profile, verbosity)?,
+            () => self.study(configured, profile, verbosity)?,
         };
         let key = plan.parse_key(text).ok_or_else(|| {
             Error::usage(

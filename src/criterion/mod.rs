@@ -14,12 +14,13 @@ pub use btn::{BrakeThreat, BrakeThreatMaximum, BtnContact, BtnForm};
 pub use collision::{Contact, contact};
 pub use ttc::{TimeToCollision, TtcMinimum};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::Real;
 
 /// The registry of criteria, in the order of every table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
     /// The vehicles touch.

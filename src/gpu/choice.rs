@@ -5,6 +5,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::adapters::{AdapterCard, DeviceKind, pci_bus_id};
 use crate::{Error, Place, Result};
 
@@ -58,7 +61,8 @@ impl fmt::Display for DeviceName {
 }
 
 /// What is to compute the lanes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum BackendChoice {
     /// The first GPU; the processor where there is none.
     #[default]

@@ -1,18 +1,20 @@
 //! Every threshold of the mining and every filter of the paper, by name, with its published value as
 //! default (method.md §2 and §3). Serialized into `run.json` and read from a study's TOML.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Place, Result};
 use crate::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
 
 /// All options of [`mine`](super::mine).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MiningOptions {
     /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
     pub ego_view: EgoViewOptions,
     /// A vehicle ahead in the ego's lane is its leader up to this time headway, s. Default 2.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub leader_max_thw_s: f64,
     /// Detection of acceleration, deceleration and cruising.
     pub longitudinal: LongitudinalOptions,
@@ -27,41 +29,50 @@ pub struct MiningOptions {
 }
 
 /// Longitudinal activities (method.md §3, table).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LongitudinalOptions {
     /// Window over which a speed change is seen, s. Default 1 (k_h).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub window_s: f64,
     /// Mean acceleration over the window below which a vehicle cruises, m/s². Default 0.1 (a_cruise).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub cruise_acceleration_mps2: f64,
     /// An activity changes the speed by more than this, m/s. Default 1 (Δv).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_speed_change_mps: f64,
     /// Cruising shorter than this between two activities is removed, s. Default 4 (N_cruise).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_cruise_s: f64,
 }
 
 /// Lane changes (method.md §3, table).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LateralOptions {
     /// Window over which lateral motion is seen, s. Default 1 (k_h).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub window_s: f64,
     /// Mean lateral speed over the window below which a vehicle is calm, m/s. Default 0.25 (v_lat).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub calm_speed_mps: f64,
     /// Beyond this share of the lane width from the line, the change has certainly ended or not yet
     /// begun. Default 0.5 (α_max).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub far_share: f64,
     /// Beyond this share of the lane width from the line, calm means that the change has ended or not
     /// yet begun. Default 0.1 (α_min).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub near_share: f64,
     /// How far from the crossing a start and an end are looked for, s. Default 10.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub search_s: f64,
     /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
     pub lc_end: LaneChangeEnd,
 }
 
 /// Where the window lies that finds a vehicle calm at the end of a lane change. It drives T.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LaneChangeEnd {
     /// The window begins at the sample: the published formula; ends the change up to 1 s early.
@@ -72,26 +83,32 @@ pub enum LaneChangeEnd {
 }
 
 /// The cut-in: what counts as found, and the filters of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CutInOptions {
     /// Shorter ones are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_duration_s: f64,
     /// The search goes on this long after a cut-in of the same ego and target, s. Default 5.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub pause_s: f64,
     /// Kept only if the target's initial speed is below this share of the ego's. Default 0.95 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub max_speed_share: f64,
     /// Kept only if the initial THW is below this, s. Default 2 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub max_thw_s: f64,
 }
 
 /// The cut-out: what counts as found, and the filters of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CutOutOptions {
     /// Shorter ones are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_duration_s: f64,
     /// The search goes on this long after a cut-out of the same ego and target, s. Default 5.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub pause_s: f64,
     /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true
     /// (paper). A cut-out without a vehicle ahead is never kept: there is nothing to uncover.
@@ -99,14 +116,17 @@ pub struct CutOutOptions {
 }
 
 /// The leader deceleration: what counts as found, and the filter of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LvdOptions {
     /// Intervals of the tags up to this long are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub max_discarded_s: f64,
     /// Dropped if shorter than this after trimming to the speed's maximum and minimum, s. Default 0.5.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_duration_s: f64,
     /// Kept only if the peak deceleration is above this, m/s². Default 2 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_peak_deceleration_mps2: f64,
 }
 

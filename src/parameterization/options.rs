@@ -1,11 +1,12 @@
 //! Named options where the paper is silent or leaves a choice; defaults are the specification's.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Place, Result};
 
 /// What a constant acceleration does after the scenario's duration T.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AfterDuration {
     /// The speed is held: only this reproduces the paper's ordering.
@@ -15,7 +16,7 @@ pub enum AfterDuration {
 }
 
 /// Which lateral speed a constant one stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LateralSpeed {
     /// |y(0) − y(T)|/T: higher F1 on real cut-ins.
@@ -25,7 +26,7 @@ pub enum LateralSpeed {
 }
 
 /// Where a cut-in with constant lateral speed starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LateralStart {
     /// At 3.5 m (the paper).
@@ -35,7 +36,7 @@ pub enum LateralStart {
 }
 
 /// Weight of a series in the decomposition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SeriesScale {
     /// 1/(n_t σ̄), as published.
@@ -45,7 +46,7 @@ pub enum SeriesScale {
 }
 
 /// Sign of the lateral series in the decomposition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SvdLateral {
     /// Left positive, as published; the reconstruction is mirrored by the recorded side.
@@ -55,7 +56,7 @@ pub enum SvdLateral {
 }
 
 /// Which scenarios the decomposition is fitted on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SvdFit {
     /// Those that passed the filters.
@@ -65,7 +66,7 @@ pub enum SvdFit {
 }
 
 /// Options of all parameterizations.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ParameterizationOptions {
     /// Constant acceleration after T (2, 4, b, d).
@@ -75,13 +76,17 @@ pub struct ParameterizationOptions {
     /// Start of 1 and 2.
     pub lateral_start: LateralStart,
     /// Lateral distance of a lane change, m (3.5).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lane_change_m: f64,
     /// Least lateral speed, m/s (1e-3).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub least_lateral_speed_mps: f64,
     /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
     /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
+    #[schemars(range(max = 1_000_000))]
     pub sinusoid_intervals: usize,
     /// n_t: instants of a series in the decomposition (50).
+    #[schemars(range(min = 2, max = 10_000))]
     pub svd_instants: usize,
     /// Weight of a series.
     pub series_scale: SeriesScale,

@@ -81,6 +81,17 @@ pub struct SweepRecord {
     pub device_s: Option<f64>,
 }
 
+/// An option that somebody set.
+#[derive(Debug, Clone, Serialize)]
+pub struct SettingRecord {
+    /// Key, as `lanesweep config show` has it.
+    pub key: String,
+    /// Value.
+    pub value: serde_json::Value,
+    /// Line of a file, variable or flag.
+    pub source: String,
+}
+
 /// The whole record.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunRecord {
@@ -116,6 +127,8 @@ pub struct RunRecord {
     pub parameterization: ParameterizationOptions,
     /// Bootstrap and its seed.
     pub score: ScoreOptions,
+    /// Options that were set for this command, and by what; those of a merged result were the parts' own.
+    pub settings: Vec<SettingRecord>,
     /// Seconds; they differ from run to run.
     pub timings: Timings,
 }

@@ -4,6 +4,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::Category;
@@ -11,14 +12,16 @@ use crate::sweep::{Confusion, UnitCounts};
 use crate::{Error, Place, Result};
 
 /// How scores are made.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScoreOptions {
     /// Number of resamples (1000).
+    #[schemars(range(min = 20, max = 100_000))]
     pub bootstrap_draws: usize,
     /// Seed of the resamples.
     pub seed: u64,
     /// Coverage of the intervals (0.95).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
     /// Below so many failures in S a claim is not judged (10).
     pub least_failures: u32,

@@ -8,13 +8,15 @@ use super::{Recording, Track};
 pub const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
 /// Extent of an ego-centric view.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EgoViewOptions {
     /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub range_m: f64,
     /// Distance before the ego's final position at which the view ends, m; vehicles that travel less have
     /// no view. Paper: 100.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub cut_m: f64,
 }
 

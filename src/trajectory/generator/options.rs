@@ -1,31 +1,39 @@
 //! What a user may choose about the synthetic recordings, and the defaults of the embedded ones.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Place, Result};
 
 /// Options of the generator. The default is the data `lanesweep study` runs on when it is given none.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GeneratorOptions {
     /// Seed of every random number. Same seed and options, same bits.
     pub seed: u64,
     /// Number of recordings, 1 to 99 (they are called `01`, `02`, …).
+    #[schemars(range(min = 1, max = 99))]
     pub recordings: usize,
     /// Length of each recording, s.
+    #[schemars(range(min = 1.0, max = 7200.0))]
     pub duration_s: f64,
     /// Samples per second; the simulation's own step is the largest fraction of a sample ≤ 0.04 s.
+    #[schemars(range(min = 1.0, max = 200.0))]
     pub frame_rate_hz: f64,
     /// Length of road that the camera sees, m.
+    #[schemars(range(min = 50.0, max = 5000.0))]
     pub window_m: f64,
     /// Mean flow per direction of travel, vehicles per hour, for roads with the default mix of two and
     /// three lanes (published: 3,350).
+    #[schemars(range(min = 60.0, max = 4500.0))]
     pub flow_vehph: f64,
     /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_share: f64,
     /// How much more often than on a real motorway lane changes are made and leaders brake hard, within
     /// the camera's view; 1 is the published rate. Raised so that a few minutes hold enough scenarios;
     /// how an event looks, once it happens, does not depend on it.
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
 }
 

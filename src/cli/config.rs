@@ -1,0 +1,216 @@
+//! `lanesweep config`: the configuration file, its schema, its check, and what is in force.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde_json::json;
+
+use super::backend_flags::BackendFlags;
+use super::configured::Configured;
+use super::synth::GeneratorFlags;
+use super::{Exit, ProfileFlags, console};
+use crate::report::files::{make_folder, write_atomically};
+use crate::settings::{
+    Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
+};
+use crate::{Error, Place, Result};
+
+/// Write, check and explain configurations
+///
+/// Every option has a default; a file (--config FILE), the environment (LANESWEEP_RUN_BACKEND, …), --config KEY=VALUE and
+/// a flag of its own (--backend) set it, the later winning. No file is read that is not named.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  lanesweep config init\n  lanesweep config show --config lanesweep.toml\n  lanesweep \
+                        study --config lanesweep.toml --config mining.leader_max_thw_s=2.5"
+)]
+pub struct Config {
+    #[command(subcommand)]
+    verb: ConfigVerb,
+}
+
+#[derive(Debug, Subcommand)]
+enum ConfigVerb {
+    Init(Init),
+    Show(Box<Show>),
+    Check(Check),
+    Schema(Schema),
+}
+
+/// Write the commented default configuration: every key with its default, unit, range and source
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep config init")]
+struct Init {
+    /// File to write; `-` prints it
+    #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME)]
+    file: PathBuf,
+}
+
+/// Show every value that is in force, and where it comes from
+///
+/// After all layers: defaults, file, environment, flags. With --format toml it prints a file that sets the same, for
+/// another machine or an appendix.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep config show --config mining.leader_max_thw_s=2.5 --backend cpu")]
+struct Show {
+    /// How to print
+    #[arg(long, value_enum, default_value_t)]
+    format: ShowFormat,
+    /// Only what is not the default's
+    #[arg(long)]
+    changed: bool,
+    #[command(flatten)]
+    backend: BackendFlags,
+    #[command(flatten)]
+    profile: ProfileFlags,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum ShowFormat {
+    /// A table
+    #[default]
+    Text,
+    /// An array of objects: key, value, source, default
+    Json,
+    /// A configuration file
+    Toml,
+}
+
+/// Check a configuration file: every key known, every value of its type and in its range
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep config check lanesweep.toml")]
+struct Check {
+    /// The file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+/// Print the JSON Schema of a configuration file, or of a profile: editors complete and check by it
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
+struct Schema {
+    /// Of what
+    #[arg(value_enum, default_value_t)]
+    of: SchemaOf,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum SchemaOf {
+    /// A configuration file (--config)
+    #[default]
+    Config,
+    /// A profile (--profile)
+    Profile,
+}
+
+impl Config {
+    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+        match &self.verb {
+            ConfigVerb::Init(verb) => verb.run(),
+            ConfigVerb::Show(verb) => verb.run(configured),
+            ConfigVerb::Check(verb) => verb.run(),
+            ConfigVerb::Schema(verb) => verb.run(),
+        }
+    }
+}
+
+impl Init {
+    fn run(&self) -> Result<Exit> {
+        if self.file == Path::new("-") {
+            console::print(DEFAULT_FILE)?;
+            return Ok(Exit::Ok);
+        }
+        if self.file.exists() {
+            let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
+            return Err(Error::usage(Place::file(&self.file), "it is there already and is not overwritten", help));
+        }
+        if let Some(folder) = self.file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            make_folder(folder)?;
+        }
+        write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
+        console::print(&format!("{} written; use it with --config {0}\n", self.file.display()))?;
+        Ok(Exit::Ok)
+    }
+}
+
+impl Show {
+    fn run(&self, configured: &Configured) -> Result<Exit> {
+        // What only a profile can tell of its own time step.
+        self.profile.load()?;
+        let shown: Vec<Setting> = match self.changed {
+            true => configured.layers.given().collect(),
+            false => configured.layers.list().collect(),
+        };
+        console::print(&match self.format {
+            ShowFormat::Text => table(&shown),
+            ShowFormat::Json => json_list(&shown)?,
+            ShowFormat::Toml => toml_file(&shown),
+        })?;
+        Ok(Exit::Ok)
+    }
+}
+
+impl Check {
+    fn run(&self) -> Result<Exit> {
+        let layers = Layers::read(&[Assignment::File(self.file.clone())], &[])?;
+        layers.settings()?.validate()?;
+        let count = layers.given().count();
+        console::print(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))?;
+        Ok(Exit::Ok)
+    }
+}
+
+impl Schema {
+    fn run(&self) -> Result<Exit> {
+        let schema = match self.of {
+            SchemaOf::Config => settings_schema(),
+            SchemaOf::Profile => profile_schema()?,
+        };
+        console::print(&format!("{schema:#}\n"))?;
+        Ok(Exit::Ok)
+    }
+}
+
+fn value(setting: &Setting) -> String {
+    setting.value.map_or("-".to_owned(), text_of)
+}
+
+fn table(shown: &[Setting]) -> String {
+    let width = |of: &dyn Fn(&Setting) -> usize| shown.iter().map(of).max().unwrap_or(0);
+    let keys = width(&|setting| setting.key.name.len());
+    let values = width(&|setting| value(setting).len());
+    let line =
+        |setting: &Setting| format!("{:keys$}  {:values$}  {}\n", setting.key.name, value(setting), setting.origin);
+    shown.iter().map(line).collect()
+}
+
+fn json_list(shown: &[Setting]) -> Result<String> {
+    let object = |setting: &Setting| {
+        json!({
+            "key": setting.key.name,
+            "value": setting.value,
+            "source": setting.origin.to_string(),
+            "default": setting.key.default,
+        })
+    };
+    let list: Vec<_> = shown.iter().map(object).collect();
+    let text = serde_json::to_string_pretty(&list);
+    text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("settings cannot be written: {e}")))
+}
+
+fn toml_file(shown: &[Setting]) -> String {
+    let (mut text, mut table) = (String::new(), "");
+    for setting in shown {
+        let (of, name) = setting.key.name.rsplit_once('.').unwrap_or(("", &setting.key.name));
+        let Some(value) = setting.value else { continue };
+        if of != table {
+            let gap = if text.is_empty() { "" } else { "\n" };
+            text += &format!("{gap}[{of}]\n");
+            table = of;
+        }
+        text += &format!("{name} = {}\n", text_of(value));
+    }
+    text
+}

@@ -1,0 +1,154 @@
+//! `--dry-run`: how many lanes, how much memory, how long; nothing is written.
+
+use std::time::Duration;
+
+use super::console;
+use crate::Result;
+use crate::sweep::{Block, Forecast, LanePlan};
+
+/// Time that lanes are run for to know their speed.
+pub(super) const BUDGET: Duration = Duration::from_millis(200);
+
+/// One line of the table of lanes.
+pub(super) struct Part {
+    pub of: String,
+    pub what: String,
+    pub units: u64,
+    pub lanes: u64,
+}
+
+/// What a run would be.
+pub(super) struct DryRun {
+    /// What it would run on.
+    pub data: String,
+    pub parts: Vec<Part>,
+    /// What a part's units are: `scenarios`, `samples`, `cells`.
+    pub units: &'static str,
+    /// All lanes, or the most that there can be.
+    pub is_at_most: bool,
+    /// Bytes that the run will hold beyond what is held now.
+    pub more_bytes: u64,
+    /// What those are.
+    pub more: &'static str,
+    /// None where the lanes follow from one another.
+    pub forecast: Option<Forecast>,
+    pub backend: String,
+    /// Seconds that this dry run took for what the run does again, and what that is.
+    pub before: Option<(f64, &'static str)>,
+    /// What comes on top of the lanes' time.
+    pub besides: &'static str,
+}
+
+/// The lanes of a plan by category and variant.
+pub(super) fn parts(plan: &LanePlan) -> Vec<Part> {
+    let of_block = |block: &'_ Block| {
+        let lanes = block.units.len() * (plan.headways.len() * plan.models.len()) as u64;
+        let (of, units) = (block.category.label().to_owned(), block.units.len());
+        let part = move |what: &String| Part { of: of.clone(), what: what.clone(), units, lanes };
+        block.variants.iter().map(part).collect::<Vec<_>>()
+    };
+    plan.blocks.iter().flat_map(of_block).collect()
+}
+
+impl DryRun {
+    /// Prints it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] where standard output cannot be written.
+    pub fn print(&self) -> Result<()> {
+        console::print(&self.text(peak_bytes()))
+    }
+
+    fn text(&self, now: Option<u64>) -> String {
+        let mut text = format!("Dry run: nothing is written.\nData    {}\n", self.data);
+        let lanes: u64 = self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
+        let most = if self.is_at_most { "at most " } else { "" };
+        text += &format!("Lanes   {most}{}\n", grouped(lanes));
+        let wide = |of: &dyn Fn(&Part) -> usize| self.parts.iter().map(of).max().unwrap_or(0);
+        let (a, b) = (wide(&|part| part.of.chars().count()), wide(&|part| part.what.chars().count()));
+        let c = wide(&|part| grouped(part.units).len());
+        let d = wide(&|part| grouped(part.lanes).len());
+        for Part { of, what, units, lanes } in &self.parts {
+            let (count, lanes) = (grouped(*units), grouped(*lanes));
+            text += &format!("        {of:a$}  {what:b$}  {count:>c$} {}  {lanes:>d$} lanes\n", self.units);
+        }
+        let more = size(self.more_bytes);
+        text += &match now {
+            Some(now) => format!(
+                "Memory  about {} at the peak: {} resident so far (with the plan and some of its lanes run), {more} for {}\n",
+                size(now + self.more_bytes),
+                size(now),
+                self.more
+            ),
+            None => format!("Memory  {more} for {}, beside the program and the plan\n", self.more),
+        };
+        text += &match &self.forecast {
+            Some(forecast) => format!(
+                "Time    {most}{} for the lanes, from {} of them run just now ({:.3} \u{b5}s each): an estimate, on this \
+                 machine as it is loaded now\n        on {}\n",
+                time(forecast.seconds),
+                grouped(forecast.measured_lanes),
+                1e6 * forecast.seconds / forecast.lanes.max(1) as f64,
+                self.backend
+            ),
+            None => format!(
+                "Time    not estimated: each step of this estimator follows from the last\n        on {}\n",
+                self.backend
+            ),
+        };
+        if let Some((seconds, what)) = self.before {
+            text += &format!("        {what} took {}, and will again\n", time(seconds));
+        }
+        if !self.besides.is_empty() {
+            text += &format!("        not counted: {}\n", self.besides);
+        }
+        text
+    }
+}
+
+/// `1,234,567`.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let head = digits.len() % 3;
+    let mut groups: Vec<&str> = if head > 0 { vec![&digits[..head]] } else { Vec::new() };
+    groups.extend((head..digits.len()).step_by(3).map(|at| &digits[at..at + 3]));
+    groups.join(",")
+}
+
+fn size(bytes: u64) -> String {
+    let mebibytes = bytes as f64 / f64::from(1 << 20);
+    match mebibytes {
+        m if m < 10.0 => format!("{m:.1} MiB"),
+        m if m < 10_240.0 => format!("{m:.0} MiB"),
+        m => format!("{:.1} GiB", m / 1024.0),
+    }
+}
+
+fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.2} s"),
+        s if s < 600.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+/// Most memory that this process had resident so far, bytes, where the system tells (Linux).
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.split_whitespace().next()?.parse::<u64>().ok()? << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_a_person_writes_them() {
+        assert_eq!([0, 999, 1000, 151_760].map(grouped), ["0", "999", "1,000", "151,760"]);
+        assert_eq!([0.3, 61.0, 900.0, 36_000.0].map(time), ["0.30 s", "61 s", "15 min", "10.0 h"]);
+        assert_eq!([1 << 20, 200 << 20, 20 << 30].map(size), ["1.0 MiB", "200 MiB", "20.0 GiB"]);
+    }
+}

@@ -1,0 +1,256 @@
+//! Defaults, files, environment, flags: one over the other, key by key.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
+
+use super::default_file::keys_in_order;
+use super::keys::{Key, Kind};
+use super::value::{Wrong, check, from_word};
+use super::{FILE_VARIABLE, Settings, environment, file};
+use crate::{Error, Place, Result};
+
+/// Where a value comes from; a later one wins.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Origin {
+    /// The program.
+    Default,
+    /// A line of a file.
+    File {
+        /// The file, as it was named.
+        path: PathBuf,
+        /// Its line, from 1.
+        row: u64,
+    },
+    /// A variable of the environment.
+    Environment(String),
+    /// `--config KEY=VALUE`.
+    Assignment(String),
+    /// A flag of its own, by its name with the dashes.
+    Flag(String),
+}
+
+impl Origin {
+    /// As errors name it.
+    pub fn place(&self, key: &str) -> Place {
+        match self {
+            Origin::File { path, row } => Place::file(path).row(*row).of(format!("`{key}`")),
+            Origin::Default => Place::item(format!("`{key}`")),
+            Origin::Environment(name) => Place::item(format!("environment variable {name}")),
+            Origin::Assignment(text) => Place::item(format!("--config {text}")),
+            Origin::Flag(flag) => Place::item(flag),
+        }
+    }
+
+    /// Position among the layers, from 0.
+    pub fn layer(&self) -> usize {
+        match self {
+            Origin::Default => 0,
+            Origin::File { .. } => 1,
+            Origin::Environment(_) => 2,
+            Origin::Assignment(_) => 3,
+            Origin::Flag(_) => 4,
+        }
+    }
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Origin::Default => f.write_str("default"),
+            Origin::File { path, row } => write!(f, "file {}, line {row}", path.display()),
+            Origin::Environment(name) => write!(f, "environment {name}"),
+            Origin::Assignment(_) => f.write_str("flag --config"),
+            Origin::Flag(flag) => write!(f, "flag {flag}"),
+        }
+    }
+}
+
+/// What `--config` takes: a file or a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Assignment {
+    /// A file to read.
+    File(PathBuf),
+    /// `KEY=VALUE`.
+    Value(String),
+}
+
+impl Assignment {
+    /// A text with `=` that names no file is a value.
+    pub fn of(text: &str) -> Assignment {
+        match text.contains('=') && !Path::new(text).exists() {
+            true => Assignment::Value(text.to_owned()),
+            false => Assignment::File(PathBuf::from(text)),
+        }
+    }
+}
+
+/// A key with its value and where that comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting<'a> {
+    /// The key.
+    pub key: &'a Key,
+    /// Its value; `None` where it is not set.
+    pub value: Option<&'a Value>,
+    /// Where the value comes from.
+    pub origin: &'a Origin,
+}
+
+/// The layers of a configuration, put together.
+#[derive(Debug, Clone)]
+pub struct Layers {
+    keys: Vec<Key>,
+    values: BTreeMap<String, (Option<Value>, Origin)>,
+    files: Vec<PathBuf>,
+}
+
+impl Default for Layers {
+    fn default() -> Self {
+        Layers::defaults()
+    }
+}
+
+impl Layers {
+    /// The defaults alone.
+    pub fn defaults() -> Layers {
+        let keys = keys_in_order();
+        let values = keys.iter().map(|key| (key.name.clone(), (key.default.clone(), Origin::Default))).collect();
+        Layers { keys, values, files: Vec::new() }
+    }
+
+    /// Files, environment and `--config`, in their order. A file that `--config` names takes the place of the one that
+    /// the environment names.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming file and line, variable or flag: unknown keys, with the nearest known one; values that
+    /// the key does not take. [`Error::Io`], [`Error::Input`] of the files.
+    pub fn read(typed: &[Assignment], variables: &[(OsString, OsString)]) -> Result<Layers> {
+        let mut layers = Layers::defaults();
+        let named = typed.iter().filter_map(|one| match one {
+            Assignment::File(path) => Some(path.clone()),
+            Assignment::Value(_) => None,
+        });
+        let mut files: Vec<PathBuf> = named.collect();
+        if files.is_empty() {
+            let value = variables.iter().find(|(name, _)| name == FILE_VARIABLE).map(|(_, value)| value);
+            files.extend(environment::file(value.map(OsString::as_os_str)));
+        }
+        for path in files {
+            for line in file::read(&path, &layers.keys)? {
+                layers.set(&line.key, line.value, Origin::File { path: path.clone(), row: line.row });
+            }
+            layers.files.push(path);
+        }
+        let keys = layers.keys.clone();
+        for (key, name, word) in environment::read(variables, &keys)? {
+            layers.set_word(key, &word, Origin::Environment(name))?;
+        }
+        for one in typed {
+            if let Assignment::Value(text) = one {
+                layers.assign(text)?;
+            }
+        }
+        Ok(layers)
+    }
+
+    /// `KEY=VALUE`; nothing after the `=` is the default again.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown key and a value that it does not take.
+    pub fn assign(&mut self, text: &str) -> Result<()> {
+        let (name, word) = text.split_once('=').unwrap_or((text, ""));
+        let name = name.trim();
+        let Some(key) = Key::find(&self.keys, name).cloned() else {
+            let place = Place::item(format!("--config {text}"));
+            return Err(file::unknown(place, name, false, &self.keys));
+        };
+        let origin = Origin::Assignment(text.to_owned());
+        if word.trim().is_empty() {
+            self.values.insert(key.name, (key.default, origin));
+            return Ok(());
+        }
+        self.set_word(&key, word, origin)
+    }
+
+    /// What a flag of its own was given. A value that the key does not take is the flag's to complain of.
+    pub fn flag(&mut self, name: &str, flag: &str, word: &str) {
+        let Some(key) = Key::find(&self.keys, name) else { return };
+        let is_number = matches!(key.kind, Kind::Number { .. });
+        let read = |word: &str| from_word(key, word).ok().filter(|value| is_number || check(key, value).is_ok());
+        if let Some(value) = read(word).or_else(|| read(&word.to_ascii_lowercase())) {
+            self.set(name, value, Origin::Flag(flag.to_owned()));
+        }
+    }
+
+    fn set_word(&mut self, key: &Key, word: &str, origin: Origin) -> Result<()> {
+        let refused = |wrong: Wrong| Error::usage(origin.place(&key.name), wrong.problem, wrong.help);
+        let value = from_word(key, word).map_err(refused)?;
+        check(key, &value).map_err(refused)?;
+        self.set(&key.name, value, origin);
+        Ok(())
+    }
+
+    fn set(&mut self, key: &str, value: Value, origin: Origin) {
+        self.values.insert(key.to_owned(), (Some(value), origin));
+    }
+
+    /// All keys with their values, in the order of the default file.
+    pub fn list(&self) -> impl Iterator<Item = Setting<'_>> {
+        self.keys.iter().filter_map(|key| {
+            let (value, origin) = self.values.get(&key.name)?;
+            Some(Setting { key, value: value.as_ref(), origin })
+        })
+    }
+
+    /// The values that somebody set, equal to the default or not.
+    pub fn given(&self) -> impl Iterator<Item = Setting<'_>> {
+        self.list().filter(|setting| *setting.origin != Origin::Default)
+    }
+
+    /// One key.
+    pub fn get(&self, name: &str) -> Option<Setting<'_>> {
+        self.list().find(|setting| setting.key.name == name)
+    }
+
+    /// The files that were read.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// As a tree of tables.
+    pub fn tree(&self) -> Value {
+        let mut root = Map::new();
+        for Setting { key, value, .. } in self.list() {
+            if let Some(value) = value {
+                insert(&mut root, &key.name, value.clone());
+            }
+        }
+        Value::Object(root)
+    }
+
+    /// As the program takes them.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the checks let pass what the types refuse.
+    pub fn settings(&self) -> Result<Settings> {
+        let refused = |e: serde_json::Error| Error::Internal(format!("a checked configuration is refused: {e}"));
+        serde_json::from_value(self.tree()).map_err(refused)
+    }
+}
+
+fn insert(table: &mut Map<String, Value>, name: &str, value: Value) {
+    match name.split_once('.') {
+        Some((first, rest)) => {
+            let inner = table.entry(first).or_insert_with(|| Value::Object(Map::new()));
+            if let Value::Object(inner) = inner {
+                insert(inner, rest, value);
+            }
+        }
+        None => {
+            table.insert(name.to_owned(), value);
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! The JSON Schema of a profile, from the profiles that ship: every key is there in each of them.
+
+use serde_json::{Map, Value, json};
+
+use crate::driver::Bound;
+use crate::profile::Profile;
+use crate::{Error, Result};
+
+/// JSON Schema (draft 2020-12) of a profile file. Names of options have the values of the profiles that ship as examples.
+///
+/// # Errors
+/// None for what this program is built with.
+pub fn profile_schema() -> Result<Value> {
+    let profiles = Profile::names().map(Profile::load).collect::<Result<Vec<_>>>()?;
+    let bounds: Vec<(String, Bound)> =
+        profiles.iter().flat_map(Profile::bounds).map(|(key, _, bound)| (key, bound)).collect();
+    let unwritten = |e: serde_json::Error| Error::Internal(format!("a profile cannot be written: {e}"));
+    let values =
+        profiles.iter().map(serde_json::to_value).collect::<std::result::Result<Vec<_>, _>>().map_err(unwritten)?;
+    let mut schema = of(&values.iter().collect::<Vec<_>>(), "", &bounds);
+    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = json!("lanesweep profile");
+    Ok(schema)
+}
+
+fn of(values: &[&Value], name: &str, bounds: &[(String, Bound)]) -> Value {
+    match values {
+        [Value::Object(first), ..] => {
+            let property = |key: &String| {
+                let inner: Vec<&Value> =
+                    values.iter().filter_map(|value| value.get(key)).filter(|value| !value.is_null()).collect();
+                let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+                (key.clone(), of(&inner, &name, bounds))
+            };
+            let properties: Map<String, Value> = first.keys().map(property).collect();
+            let required: Vec<&String> = first.keys().collect();
+            json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+        }
+        [first, ..] => {
+            let mut schema = json!({ "type": match first {
+                Value::Bool(_) => "boolean",
+                Value::Number(n) if n.is_f64() => "number",
+                Value::Number(_) => "integer",
+                _ => "string",
+            }});
+            match bounds.iter().find(|(key, _)| key == name) {
+                Some((_, Bound::Above(limit))) => schema["exclusiveMinimum"] = json!(limit),
+                Some((_, Bound::AtLeast(limit))) => schema["minimum"] = json!(limit),
+                None => (),
+            }
+            let mut examples: Vec<&Value> = Vec::new();
+            for value in values {
+                if !examples.contains(value) {
+                    examples.push(value);
+                }
+            }
+            if first.is_string() {
+                schema["examples"] = json!(examples);
+            }
+            schema
+        }
+        [] => json!({}),
+    }
+}

@@ -1,0 +1,109 @@
+//! Values: from TOML, from a word of the environment or the command line; checked against what the key takes.
+
+use serde_json::{Number, Value};
+use toml::de::DeValue;
+
+use super::keys::{Key, Kind, nearest};
+
+/// A problem of a value, and what to write instead.
+pub(super) struct Wrong {
+    pub problem: String,
+    pub help: String,
+}
+
+impl Wrong {
+    fn of(key: &Key, found: &str) -> Wrong {
+        let near = match &key.kind {
+            Kind::Choice(choices) => nearest(found.trim_matches('"'), choices.iter().map(|c| c.word.as_str())),
+            _ => None,
+        };
+        let near = near.map_or(String::new(), |word| format!("did you mean \"{word}\"? "));
+        Wrong { problem: format!("{found} cannot be used; expected {}", key.expected()), help: near + &key.description }
+    }
+}
+
+/// What stands in a file, as a value for a key: of its type, not yet within its range.
+pub(super) fn from_toml(key: &Key, found: &DeValue) -> Result<Value, Wrong> {
+    let text = shown(found);
+    let value = match found {
+        DeValue::Boolean(b) => Some(Value::Bool(*b)),
+        DeValue::String(s) => Some(Value::String(s.clone().into_owned())),
+        DeValue::Integer(i) => i128::from_str_radix(i.as_str(), i.radix()).ok().and_then(whole),
+        DeValue::Float(f) => f.as_str().parse().ok().and_then(Number::from_f64).map(Value::Number),
+        DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => None,
+    };
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| Wrong::of(key, &text))
+}
+
+/// A word of the environment or the command line, as a value for a key; quotes around it may be there.
+pub(super) fn from_word(key: &Key, word: &str) -> Result<Value, Wrong> {
+    let word = word.trim();
+    let unquoted = ['"', '\''].iter().find_map(|q| word.strip_prefix(*q)?.strip_suffix(*q)).unwrap_or(word);
+    let digits = unquoted.replace('_', "");
+    let value = match key.kind {
+        Kind::Text | Kind::Choice(_) => (!unquoted.is_empty()).then(|| Value::String(unquoted.to_owned())),
+        Kind::Boolean => word.parse().ok().map(Value::Bool),
+        Kind::Number { .. } => match digits.parse::<i128>() {
+            Ok(i) => whole(i),
+            Err(_) => digits.parse().ok().and_then(Number::from_f64).map(Value::Number),
+        },
+    };
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| Wrong::of(key, &format!("`{word}`")))
+}
+
+/// Checks the range.
+pub(super) fn check(key: &Key, value: &Value) -> Result<(), Wrong> {
+    let fits = match &key.kind {
+        Kind::Number { least, most, .. } => value.as_f64().is_some_and(|x| {
+            least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
+                && most.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
+        }),
+        Kind::Choice(choices) => choices.iter().any(|choice| value == choice.word.as_str()),
+        Kind::Boolean | Kind::Text => true,
+    };
+    if fits { Ok(()) } else { Err(Wrong::of(key, &text_of(value))) }
+}
+
+/// A value as TOML writes it.
+pub fn text_of(value: &Value) -> String {
+    match value {
+        Value::String(text) => toml::Value::String(text.clone()).to_string(),
+        Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
+            Some(x) => toml::Value::Float(x).to_string(),
+            None => number.to_string(),
+        },
+        other => other.to_string(),
+    }
+}
+
+fn whole(i: i128) -> Option<Value> {
+    u64::try_from(i).map(Value::from).or_else(|_| i64::try_from(i).map(Value::from)).ok()
+}
+
+/// A value of the key's type: whole numbers stand for others, and 1e6 for a whole one.
+fn fitted(key: &Key, value: Value) -> Option<Value> {
+    match (&key.kind, value) {
+        (Kind::Number { is_whole: false, .. }, Value::Number(n)) => n.as_f64().map(Value::from),
+        (Kind::Number { is_whole: true, .. }, Value::Number(n)) => match n.as_f64().filter(|_| n.is_f64()) {
+            // Beyond 2^53 a floating-point number does not tell which whole one is meant.
+            Some(x) => (x.fract() == 0.0 && x.abs() < 9e15).then(|| whole(x as i128)).flatten(),
+            None => Some(Value::Number(n)),
+        },
+        (Kind::Boolean, value @ Value::Bool(_)) => Some(value),
+        (Kind::Text | Kind::Choice(_), value @ Value::String(_)) => Some(value),
+        _ => None,
+    }
+}
+
+/// What was found, as a message shows it.
+fn shown(value: &DeValue) -> String {
+    match value {
+        DeValue::Boolean(b) => b.to_string(),
+        DeValue::String(s) => format!("\"{s}\""),
+        DeValue::Integer(i) => i.to_string(),
+        DeValue::Float(f) => f.to_string(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(_) => "an array".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}
