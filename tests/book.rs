@@ -39,6 +39,9 @@ const COMING: [&str; 15] = [
     "docs/src/glossary.md",
 ];
 
+/// Programs of the system that a block may call; trycmd leaves out what it does not know.
+const TOOLS: [&str; 7] = ["cat", "cp", "grep", "head", "ls", "tail", "wc"];
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -115,13 +118,42 @@ fn commands_print_what_the_book_says() {
     let tests = trycmd::TestCases::new();
     tests.case(work.path().join("*.md")).timeout(Duration::from_secs(120)).env("NO_COLOR", "1");
     tests.register_bin("lanesweep", Path::new(env!("CARGO_BIN_EXE_lanesweep")));
+    tests.register_bins(TOOLS.map(|tool| (tool, on_path(tool))));
     tests.run();
 
     if std::env::var_os("TRYCMD").is_some_and(|mode| mode == "overwrite") {
         for (case, chapter) in cases {
-            let text = markdown::from_trycmd(&fs::read_to_string(case).unwrap());
+            let text = markdown::from_trycmd(fs::read_to_string(case).unwrap());
             if text != chapter.text {
                 fs::write(root().join(&chapter.path), text).unwrap();
+            }
+        }
+    }
+}
+
+fn on_path(program: &str) -> PathBuf {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&folders).map(|folder| folder.join(program)).find(|path| path.is_file());
+    found.unwrap_or_else(|| panic!("the book's commands need `{program}`"))
+}
+
+#[test]
+fn the_commands_of_console_blocks_are_ours_or_tools_that_are_known() {
+    for chapter in chapters() {
+        for block in chapter.blocks().filter(|block| block.language == "console") {
+            for (at, command) in
+                block.content.lines().enumerate().filter_map(|(at, l)| Some((at, l.strip_prefix("$ ")?)))
+            {
+                let program = command.split_whitespace().find(|word| !word.contains('=')).unwrap_or_default();
+                let known = program == "lanesweep" || TOOLS.contains(&program);
+                // There is no shell between: a pipe or a redirection would be an argument.
+                let plain = !command.split_whitespace().any(|word| ["|", ">", ">>", "&&", ";", "2>&1"].contains(&word));
+                assert!(
+                    known && plain,
+                    "{}:{}: `{command}` would not be run as it stands",
+                    chapter.path,
+                    block.line + at
+                );
             }
         }
     }
@@ -193,7 +225,10 @@ fn the_table_of_contents_holds_every_chapter_once() {
         assert!(!COMING.contains(&path.as_str()), "{path} has come: take it from the list in tests/book.rs");
     }
     for path in &listed {
-        assert!(present.contains(path) || COMING.contains(&path.as_str()), "SUMMARY.md names {path}, which is not there");
+        assert!(
+            present.contains(path) || COMING.contains(&path.as_str()),
+            "SUMMARY.md names {path}, which is not there"
+        );
     }
 }
 

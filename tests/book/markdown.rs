@@ -57,7 +57,8 @@ impl Document {
 
     /// Files that the chapter shows and its commands use: name and content.
     pub fn files(&self) -> Vec<(String, String)> {
-        let name = |block: &Block| Some(block.attributes.split([' ', ',']).find_map(|a| a.strip_prefix("file="))?.to_owned());
+        let name =
+            |block: &Block| Some(block.attributes.split([' ', ',']).find_map(|a| a.strip_prefix("file="))?.to_owned());
         self.blocks().filter_map(|block| Some((name(&block)?, block.content))).collect()
     }
 
@@ -103,7 +104,8 @@ impl Document {
     pub fn links(&self) -> Vec<Link> {
         let mut links = Vec::new();
         for (line, text) in self.prose() {
-            let marks = [("](", ')'), ("<https:", '>'), ("<http:", '>'), ("src=\"", '"'), ("srcset=\"", '"'), ("href=\"", '"')];
+            let marks =
+                [("](", ')'), ("<https:", '>'), ("<http:", '>'), ("src=\"", '"'), ("srcset=\"", '"'), ("href=\"", '"')];
             for (open, close) in marks {
                 for (at, _) in text.match_indices(open) {
                     let begin = if open.starts_with('<') { at + 1 } else { at + open.len() };
@@ -115,20 +117,57 @@ impl Document {
         links
     }
 
-    /// The same for trycmd, to which a fence without a language would be a command.
+    /// The same as trycmd wants it: bare fences, which it would take for commands, get a language; and every output of a
+    /// command ends as it does on the terminal, which a reader does not have to see: with a newline, and a report of an
+    /// error with an empty line besides.
     pub fn for_trycmd(&self) -> String {
-        let mut inside = false;
-        let line = |line: &str| {
-            let is_fence = line.trim_start().starts_with("```");
-            let opens = is_fence && !inside;
-            inside ^= is_fence;
-            if opens && line.trim() == "```" { format!("{BARE}\n") } else { format!("{line}\n") }
+        let ending = |output: &[&str]| match output.last() {
+            None | Some(&"...") => "",
+            Some(_) if output.rsplit(|line| line.is_empty()).next().is_some_and(is_report) => "\n\n",
+            Some(_) => "\n",
         };
-        self.text.lines().map(line).collect()
+        self.rewritten(|text, fence| if text == "```" { BARE.to_owned() } else { fence.to_owned() }, ending)
+    }
+
+    /// The chapter with its fences as `fence` says (trimmed and as it is) and something after each command's output.
+    fn rewritten(&self, fence: impl Fn(&str, &str) -> String, ending: impl Fn(&[&str]) -> &'static str) -> String {
+        let (mut text, mut output, mut block) = (String::new(), Vec::new(), None);
+        for line in self.text.lines() {
+            let is_fence = line.trim_start().starts_with("```");
+            let is_console = block.is_some_and(|info: &str| info.starts_with("```console"));
+            if is_console && !is_fence && !line.starts_with("$ ") {
+                output.push(line);
+                continue;
+            }
+            while output.last().is_some_and(|line| line.is_empty()) {
+                output.pop();
+            }
+            let printed: Vec<&str> =
+                output.iter().copied().filter(|l| !l.starts_with("> ") && !l.starts_with("? ")).collect();
+            output.iter().for_each(|line| text.push_str(&format!("{line}\n")));
+            text.push_str(ending(&printed));
+            output.clear();
+            if is_fence && block.is_none() {
+                text.push_str(&fence(line.trim(), line));
+            } else {
+                text.push_str(line);
+            }
+            text.push('\n');
+            if is_fence {
+                block = if block.is_none() { Some(line.trim_start()) } else { None };
+            }
+        }
+        text
     }
 }
 
+/// Lines that end with an error's report.
+fn is_report(lines: &[&str]) -> bool {
+    lines.iter().any(|line| line.starts_with("  × "))
+}
+
 /// Back from [`Document::for_trycmd`].
-pub fn from_trycmd(text: &str) -> String {
-    text.replace(BARE, "```")
+pub fn from_trycmd(text: String) -> String {
+    let document = Document { path: String::new(), text };
+    document.rewritten(|text, fence| if text == BARE { "```".to_owned() } else { fence.to_owned() }, |_| "")
 }
