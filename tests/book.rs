@@ -280,6 +280,46 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
     assert!(checked > 60, "only {checked} commands: are they found?");
 }
 
+/// Figures of the book: file, the command that draws it, and where.
+const FIGURES: [(&str, &str, &str); 3] = [
+    ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
+    (
+        "case.svg",
+        "simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
+        "case.svg",
+    ),
+    (
+        "lvd_cchdm_against_fsm.svg",
+        "map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM --out OUT",
+        "lvd_cchdm_against_fsm.svg",
+    ),
+];
+
+/// `LANESWEEP_RENEW_FIGURES=1` draws them anew.
+#[test]
+fn figures_are_what_their_commands_draw() {
+    let renew = std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some();
+    let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
+    listed.sort_unstable();
+    let folder = root().join("docs/src/figures");
+    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut present: Vec<String> = names.filter(|name| name.ends_with(".svg")).collect();
+    present.sort_unstable();
+    assert_eq!(present, listed, "every figure has its command");
+    for (figure, command, drawn) in FIGURES {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().to_str().unwrap();
+        let command = format!("-q {}", command.replace("OUT", out));
+        lanesweep(&command.split(' ').collect::<Vec<_>>());
+        let now = fs::read(dir.path().join(drawn)).unwrap();
+        if renew {
+            fs::write(folder.join(figure), now).unwrap();
+        } else {
+            assert!(fs::read(folder.join(figure)).unwrap() == now, "{figure} is not what `{command}` draws");
+        }
+    }
+}
+
 #[test]
 fn the_code_of_the_chapter_on_driver_models_is_that_of_the_example_which_a_test_builds() {
     let chapter = Document::read(root(), "docs/src/extend/driver-model.md");
