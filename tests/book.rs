@@ -209,7 +209,9 @@ fn beside(file: &str, relative: &str) -> String {
     parts.pop();
     for part in relative.split('/').filter(|part| *part != ".") {
         match part {
-            ".." => drop(parts.pop()),
+            ".." => {
+                parts.pop();
+            }
             part => parts.push(part),
         }
     }
