@@ -61,7 +61,7 @@ fn rates_are_those_of_study_and_of_fit_and_sample() {
     let failures = rows(&study.join("failures.csv"));
     let scores = rows(&study.join("f1.csv"));
     let cells = rows(&compared.join("compare.csv"));
-    assert_eq!(cells.len(), 3 * 12);
+    assert_eq!(cells.len(), 3 * 3 * lanesweep::driver::MODELS);
     let share = |cell: &HashMap<String, String>, variant: &str| {
         let is_cell = |row: &&HashMap<String, String>| {
             ["category", "model", "criterion"].iter().all(|c| row[*c] == cell[*c]) && row["variant"] == variant
@@ -240,7 +240,7 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
         (&["--categories", "lvd", "--parameterization", "2"], 2, "of LVD"),
         (&["--categories", "lane-change"], 2, "use cut-in, cut-out, lvd"),
         (&["--samples", "0"], 2, "0 samples estimate nothing"),
-        (&["--models", "IDM"], 2, "there is no driver model `IDM`"),
+        (&["--models", "Nobody"], 2, "there is no driver model `Nobody`"),
         (&["--thw", "sampled"], 2, "separated by commas, or `paper`"),
         (&["--scenarios", text(&none)], 3, "no scenario to simulate"),
         (&["--scenarios", text(&input), "--out", text(dir.path())], 2, "would be overwritten"),

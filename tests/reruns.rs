@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use assert_cmd::Command;
 use lanesweep::Place;
 use lanesweep::density::{DataFacts, DensityModel, FitOptions};
-use lanesweep::driver::ModelId;
+use lanesweep::driver::{MODELS, ModelId};
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
 use lanesweep::profile::Profile;
@@ -256,9 +256,9 @@ fn models_and_variants_stand_together_in_the_table_and_on_the_sheet() {
     // The rows of the lane itself are those that it has alone.
     let rows_of_own: Vec<&str> = compared.lines().filter_map(|line| line.strip_prefix(&format!("{own},"))).collect();
     assert_eq!(rows_of_own, alone.lines().skip(1).collect::<Vec<_>>());
-    assert_eq!(lanes(&of_lane(&["--model", "all", "--plot", "figures/four.svg"])).len(), 4);
+    assert_eq!(lanes(&of_lane(&["--model", "all", "--plot", "figures/all.svg"])).len(), MODELS);
     assert_eq!(lanes(&of_lane(&["--model", "RSS,FSM", "--compare", "S,1"])).len(), 6);
-    for (figure, names) in [("one.svg", 1), ("two.svg", 2), ("figures/four.svg", 4)] {
+    for (figure, names) in [("one.svg", 1), ("two.svg", 2), ("figures/all.svg", MODELS)] {
         let svg = std::fs::read_to_string(dir.join(figure)).unwrap();
         assert!(svg.contains("SYNTHETIC DATA"), "{figure} says what its data are");
         assert_eq!(svg.matches("class=\"legend\"").count(), names, "{figure}");

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use assert_cmd::Command;
 use lanesweep::criterion::Criterion;
 use lanesweep::density::{DataFacts, DensityModel, FitOptions, read_density, write_density};
-use lanesweep::driver::ModelId;
+use lanesweep::driver::{MODELS, ModelId};
 use lanesweep::gpu::{GpuBackend, GpuOptions};
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
@@ -131,11 +131,11 @@ fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
     for file in files {
         assert!(read(&format!("whole/{file}")) == read(&format!("joined/{file}")), "{file}");
     }
-    assert_eq!(read("rows.csv").lines().count(), 1 + 3000 * 2 * 4);
+    assert_eq!(read("rows.csv").lines().count(), 1 + 3000 * 2 * MODELS);
     // The worst lanes say how to run them again, and it is the same lane.
     let mut reader = csv::Reader::from_reader(std::fs::File::open(dir.path().join("whole/worst.csv")).unwrap());
     let rows: Vec<std::collections::HashMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
-    assert_eq!(rows.len(), 80);
+    assert_eq!(rows.len(), 20 * MODELS);
     for row in rows.iter().step_by(9) {
         let (code, trace, summary) = lanesweep(dir.path(), &["simulate", "--from", "whole", "--lane", &row["lane"]]);
         assert_eq!(code, 0, "{summary}");
@@ -161,7 +161,7 @@ fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
     assert_eq!(code, 0, "{err}");
     let mut reader = csv::Reader::from_path(dir.path().join("rows.csv")).unwrap();
     let rows: Vec<std::collections::HashMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
-    assert_eq!(rows.len(), 200 * 4);
+    assert_eq!(rows.len(), 200 * MODELS);
     assert!(rows.iter().all(|row| row["c5"].parse::<f32>().is_ok() && row["headway"] == "0.6s"));
     let failed = rows.iter().filter(|row| row["collision"] == "1" && row["model"] == "FSM").count();
     let table = std::fs::read_to_string(dir.path().join("lanesweep-sample/estimates.csv")).unwrap();

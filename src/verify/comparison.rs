@@ -40,7 +40,7 @@ pub struct Tally {
     /// Lanes that the backend under test computed itself.
     pub lanes: u64,
     /// Of these, on the CPU, failed: in the order of [`Criterion::ALL`].
-    pub failed: [u64; 3],
+    pub failed: [u64; Criterion::ALL.len()],
     /// Evaluated steps of all lanes.
     pub steps: u64,
     /// Lanes with a word that differs from the CPU's.
@@ -187,7 +187,7 @@ fn tallies(plan: &LanePlan) -> Vec<Tally> {
             category,
             model,
             lanes: 0,
-            failed: [0; 3],
+            failed: [0; Criterion::ALL.len()],
             steps: 0,
             lanes_differing: 0,
             words_differing: 0,
