@@ -275,7 +275,7 @@ impl Compare {
             before: Some((before_s, "reading, mining and planning")),
             besides: "fitting the densities",
         }
-        .print()?;
+        .print(self.format)?;
         Ok(Exit::Ok)
     }
 

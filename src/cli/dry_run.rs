@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use super::console;
+use super::format::FormatFlag;
 use crate::Result;
+use crate::report::records::document;
 use crate::sweep::{Block, Forecast, LanePlan};
 
 /// Time that lanes are run for to know their speed.
@@ -55,8 +56,25 @@ impl DryRun {
     ///
     /// # Errors
     /// [`crate::Error::Io`] where standard output cannot be written.
-    pub fn print(&self) -> Result<()> {
-        console::print(&self.text(peak_bytes()))
+    pub fn print(&self, format: FormatFlag) -> Result<()> {
+        format.print(|| self.text(peak_bytes()), || self.json(peak_bytes()))
+    }
+
+    fn json(&self, now: Option<u64>) -> Result<String> {
+        let part = |Part { of, what, units, lanes }: &Part| {
+            serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes})
+        };
+        document(&serde_json::json!({
+            "data": self.data,
+            "lanes": self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add),
+            "at_most": self.is_at_most,
+            "parts": self.parts.iter().map(part).collect::<Vec<_>>(),
+            "peak_bytes": now.map(|now| now + self.more_bytes),
+            "lanes_s": self.forecast.as_ref().map(|forecast| forecast.seconds),
+            "measured_lanes": self.forecast.as_ref().map(|forecast| forecast.measured_lanes),
+            "before_s": self.before.map(|(seconds, _)| seconds),
+            "backend": self.backend,
+        }))
     }
 
     fn text(&self, now: Option<u64>) -> String {

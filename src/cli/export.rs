@@ -6,10 +6,12 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::case_flags::{CaseFlags, from_toml};
 use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
-use super::{Exit, ProfileFlags, console};
+use super::format::FormatFlag;
+use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::openscenario::{EgoMotion, export_folder};
 use crate::report::files::check_folder;
+use crate::report::records::document;
 use crate::scenario::Side;
 use crate::{Error, Place, Result};
 
@@ -53,6 +55,8 @@ impl Export {
 pub struct Xosc {
     #[command(flatten)]
     case: CaseFlags,
+    #[command(flatten)]
+    format: FormatFlag,
     /// TOML file with the case
     #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"])]
     case_file: Option<PathBuf>,
@@ -117,7 +121,11 @@ impl Xosc {
         notes.iter().for_each(|note| tracing::warn!("{note}"));
         let rows = export_folder(&self.out, &scenarios)?;
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
-        console::print(&lines)?;
+        let list = || {
+            let rows = rows.iter().map(|row| serde_json::json!({"file": row.file, "lane": row.lane}));
+            document(&rows.collect())
+        };
+        self.format.print(|| lines, list)?;
         tracing::info!("{} scenarios written to {}", rows.len(), self.out.display());
         Ok(Exit::Ok)
     }

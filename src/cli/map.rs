@@ -144,7 +144,7 @@ impl Map {
             None => opened.backend(),
         };
         if self.dry_run {
-            return forecast_maps(&planned, backend);
+            return forecast_maps(&planned, backend, self.format);
         }
         let recheck_seed = opened.device().map(|_| RECHECK_SEED);
         let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
@@ -355,7 +355,7 @@ impl Map {
 type Planned = (Preset, GridPlan, Option<(String, GridPlan)>);
 
 /// What the maps would be.
-fn forecast_maps(planned: &[Planned], backend: &dyn Backend) -> Result<Exit> {
+fn forecast_maps(planned: &[Planned], backend: &dyn Backend, format: FormatFlag) -> Result<Exit> {
     let plans = || {
         planned.iter().flat_map(|(_, plan, other)| {
             let other = other.iter().map(|(name, plan)| (format!("under {name}"), plan));
@@ -385,7 +385,7 @@ fn forecast_maps(planned: &[Planned], backend: &dyn Backend) -> Result<Exit> {
         before: None,
         besides: "drawing and writing the sheets",
     }
-    .print()?;
+    .print(format)?;
     Ok(Exit::Ok)
 }
 

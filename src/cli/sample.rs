@@ -29,6 +29,7 @@ use crate::profile::Profile;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
+use crate::settings::SampleSettings;
 pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
 use crate::sweep::Headway;
 use crate::table::TableFormat;
@@ -236,7 +237,7 @@ impl Sample {
 
     /// The seed of the draws.
     pub(super) fn seed(&self) -> u64 {
-        self.seed.unwrap_or(SEED)
+        self.seed.unwrap_or(SampleSettings::default().seed)
     }
 
     /// The seed as it was typed.

@@ -55,12 +55,12 @@ impl Run<'_> {
         let given = |usual: u64| flags.samples.unwrap_or(usual);
         let lanes = match flags.estimator {
             EstimatorFlag::Subset => {
-                let options = Subset::new(flags.seed, given(2000));
+                let options = Subset::new(flags.seed(), given(2000));
                 options.samples_per_level.saturating_mul(options.levels as u64)
             }
             EstimatorFlag::Ce => {
                 let samples = given(100_000);
-                let options = CrossEntropy::new(flags.seed, (samples / 10).max(2000), samples);
+                let options = CrossEntropy::new(flags.seed(), (samples / 10).max(2000), samples);
                 samples.saturating_add(options.samples_per_level.saturating_mul(options.levels as u64))
             }
             EstimatorFlag::Mc | EstimatorFlag::Is if flags.proposal.is_empty() => {
@@ -87,7 +87,7 @@ impl Run<'_> {
             before: None,
             besides: "",
         }
-        .print()?;
+        .print(self.flags.format)?;
         Ok(Exit::Ok)
     }
 

@@ -38,7 +38,7 @@ pub(super) fn run(
 ) -> Result<Exit> {
     let (plan, out, shard) = (&planned.plan, &flags.out, flags.shards.shard);
     if flags.dry_run {
-        return forecast_crude(planned, opened, &stop);
+        return forecast_crude(planned, opened, &stop, flags.format);
     }
     let (text, run_sha256) = planned.seal()?;
     if flags.shards.plan_only || shard.is_some() {
@@ -117,7 +117,7 @@ pub(super) fn run(
 }
 
 /// What the run would be.
-fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule) -> Result<Exit> {
+fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule, format: FormatFlag) -> Result<Exit> {
     let (plan, counting) = (&planned.plan, planned.counting());
     let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
     let forecast = forecast(plan, opened.backend(), wanted, BUDGET, |chunk| {
@@ -136,7 +136,7 @@ fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule) -> 
         before: None,
         besides: "figures; --bootstrap and --rows",
     }
-    .print()?;
+    .print(format)?;
     Ok(Exit::Ok)
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Exit;
 use super::console::{self, Verbosity};
 use super::rerun::record_of;
-use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, SEED, Sample};
+use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
 use super::sample_lanes;
 use crate::density::Provenance;
@@ -100,7 +100,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     }
     let headways = listed.unwrap_or_else(Headway::paper);
     let (profile, models, criterion) = (flags.load_profile()?, flags.models()?, flags.criterion()?);
-    let seed = flags.given_seed().or(samples.seed).unwrap_or(SEED);
+    let seed = flags.given_seed().or(samples.seed).unwrap_or(flags.seed());
     let count = flags.samples.unwrap_or(samples.runs);
     let opened = flags.open()?;
     make_folder(&flags.out)?;
@@ -159,7 +159,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     }
     file.draws = Some(draws);
     write(flags, &kept, &samples, &plan, &crude, &counting, &file)?;
-    console::print(&file.text())?;
+    flags.format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", flags.out.display());
     Ok(Exit::Ok)
 }
@@ -246,7 +246,7 @@ fn write(
     write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
     write_atomically(&out.join(KEPT), &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;
-    write_atomically(&out.join("estimate.json"), &file.to_json()?)
+    write_atomically(&out.join("estimate.json"), file.json()?.as_bytes())
 }
 
 /// The plan of the run that wrote this folder, and what it is of.

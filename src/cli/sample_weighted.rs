@@ -38,7 +38,7 @@ pub(super) fn run(
 ) -> Result<Exit> {
     let (samples, out, shard) = (planned.facts.samples, &flags.out, flags.shards.shard);
     if flags.dry_run {
-        return forecast(planned, opened);
+        return forecast(planned, opened, flags.format);
     }
     let (text, run_sha256) = planned.seal()?;
     if flags.shards.plan_only || shard.is_some() {
@@ -82,7 +82,7 @@ pub(super) fn run(
 }
 
 /// What the run would be: drawing and weighing cost more than the lanes, so all of it is measured.
-fn forecast(planned: &PlannedWeighted, opened: &Opened) -> Result<Exit> {
+fn forecast(planned: &PlannedWeighted, opened: &Opened, format: FormatFlag) -> Result<Exit> {
     let (facts, density) = (&planned.facts, &planned.density);
     let most = facts.samples.min(CHUNK);
     let (mut samples, mut took) = (most.min(256), 0.0);
@@ -116,7 +116,7 @@ fn forecast(planned: &PlannedWeighted, opened: &Opened) -> Result<Exit> {
         before: None,
         besides: "",
     }
-    .print()?;
+    .print(format)?;
     Ok(Exit::Ok)
 }
 

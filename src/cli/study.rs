@@ -228,7 +228,7 @@ impl Study {
             before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
             besides: "scores, figures, the plan file; --lanes and --compare-reference",
         }
-        .print()?;
+        .print(self.format)?;
         Ok(Exit::Ok)
     }
 
