@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
 use crate::profile::Profile;
@@ -59,15 +59,29 @@ pub(super) const FLAGS: [(&str, &str, &str); 30] = [
 const OF_THE_PLAN: [&str; 7] =
     ["generator.", "mining.", "parameterization.", "score.", "sample.", "run.profile", "run.dt_s"];
 
+/// The command line, with `--config` for every verb.
+pub(super) fn command() -> Command {
+    with_config(Cli::command())
+}
+
+/// A flag of each level's own: of a global one, what stands before the verb is lost where it stands after it too.
+fn with_config(mut command: Command) -> Command {
+    let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
+    for name in names {
+        command = command.mut_subcommand(name, with_config);
+    }
+    let help = "Configuration file (`lanesweep config init` writes one), or one key of it; repeatable [default: \
+                LANESWEEP_CONFIG]";
+    command.arg(Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append).help(help))
+}
+
 impl Configured {
     /// Puts the layers together, and gives the command line with what they set.
     ///
     /// # Errors
     /// As [`Layers::read`]; [`Error::Usage`] for a value that the verb's flag does not take.
     pub fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
-        let typed: Vec<Assignment> =
-            matches.get_many::<String>("config").into_iter().flatten().map(|text| Assignment::of(text)).collect();
-        let (path, last) = verb_of(matches);
+        let (path, typed, last) = verb_of(matches);
         if path == ["slurm"] && !typed.is_empty() {
             let help = "give it to the run: lanesweep slurm … -- study --config FILE";
             return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
@@ -77,7 +91,7 @@ impl Configured {
             return Ok((cli, Configured::default()));
         }
         let mut layers = Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?;
-        let command = Cli::command();
+        let command = command();
         let flags: Vec<(&str, &str)> = flags_of(&command, &path);
         for (id, key) in &flags {
             if last.value_source(id) == Some(ValueSource::CommandLine)
@@ -195,14 +209,15 @@ fn reads_configuration(path: &[&str]) -> bool {
     !matches!(path, ["completions" | "man" | "slurm", ..] | ["config", "init" | "schema" | "check"])
 }
 
-/// The verb, and the verb below it, with the last one's matches.
-fn verb_of(matches: &ArgMatches) -> (Vec<&str>, &ArgMatches) {
-    let (mut path, mut last) = (Vec::new(), matches);
-    while let Some((name, inner)) = last.subcommand() {
+/// The verb, and the verb below it, with what `--config` was given before and after them, and the last one's matches.
+fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
+    let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
+    loop {
+        typed.extend(last.get_many::<String>("config").into_iter().flatten().map(|text| Assignment::of(text)));
+        let Some((name, inner)) = last.subcommand() else { return (path, typed, last) };
         path.push(name);
         last = inner;
     }
-    (path, last)
 }
 
 /// The flags of a verb that set a key.
@@ -252,7 +267,7 @@ mod tests {
 
     #[test]
     fn every_flag_that_sets_a_key_exists_with_the_same_default_and_the_same_words() {
-        let command = Cli::command();
+        let command = command();
         let keys = Key::all();
         for (of, id, name) in FLAGS {
             let key = Key::find(&keys, name).unwrap_or_else(|| panic!("{name}"));

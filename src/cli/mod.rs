@@ -49,7 +49,7 @@ pub use exit::Exit;
 
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
 use console::Verbosity;
 
@@ -85,9 +85,6 @@ struct Common {
     /// Threads; results do not depend on it [default: all cores]
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
-    /// Configuration file (`lanesweep config init` writes one), or one key of it; repeatable [default: LANESWEEP_CONFIG]
-    #[arg(long, global = true, value_name = "FILE|KEY=VALUE")]
-    config: Vec<String>,
 }
 
 impl Common {
@@ -150,7 +147,7 @@ const MOST_THREADS: usize = 4096;
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
     environment::quiet_drivers();
-    let matches = match Cli::command().try_get_matches() {
+    let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => {
             let asked_for = !error.use_stderr();
@@ -222,12 +219,11 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
 #[cfg(test)]
 mod tests {
     use super::{Exit, told};
-    use clap::CommandFactory;
     use rayon::prelude::*;
 
     #[test]
     fn the_flags_do_not_contradict_one_another() {
-        super::Cli::command().debug_assert();
+        super::configured::command().debug_assert();
     }
 
     #[test]

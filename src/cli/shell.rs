@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
-use super::{Cli, Exit, console};
+use super::configured::command;
+use super::{Exit, console};
 use crate::report::files::{make_folder, write_atomically};
 use crate::{Error, Result};
 
@@ -24,7 +25,7 @@ pub struct Completions {
 impl Completions {
     pub fn run(&self) -> Result<Exit> {
         let mut text = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "lanesweep", &mut text);
+        clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
         console::print(&text)?;
         Ok(Exit::Ok)
@@ -45,7 +46,7 @@ pub struct Man {
 impl Man {
     pub fn run(&self) -> Result<Exit> {
         make_folder(&self.dir)?;
-        let mut program = Cli::command();
+        let mut program = command();
         // Global flags and versions reach the verbs.
         program.build();
         let verbs: Vec<clap::Command> = program.get_subcommands().filter(|verb| !verb.is_hide_set()).cloned().collect();

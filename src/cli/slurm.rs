@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser};
+use clap::Args;
 
-use super::{Cli, Exit, console};
+use super::configured::command;
+use super::{Exit, console};
 use crate::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
 use crate::report::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
@@ -104,7 +105,7 @@ impl Slurm {
             None => self.run.clone(),
         };
         let run = SplitRun::new(&words)?;
-        if let Err(error) = Cli::try_parse_from(["lanesweep".to_owned()].into_iter().chain(words)) {
+        if let Err(error) = command().try_get_matches_from(["lanesweep".to_owned()].into_iter().chain(words)) {
             let message = error.to_string();
             let problem = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
             let help = format!("see lanesweep {} --help", run.verb());
