@@ -202,11 +202,11 @@ fn what_is_not_understood_is_named_with_line_and_element() {
     let sample = ["sample", "--distribution", "f.xosc", "--category", "cut-in", "--samples", "10", "--out", "o"];
     let changed = |old: &str, new: &str, line: &str, says: &str| {
         assert!(good_text.contains(old), "{old}");
-        std::fs::write(root.join("f.xosc"), good_text.replacen(old, new, 1)).unwrap();
+        std::fs::write(root.join("f.xosc"), good_text.replace(old, new)).unwrap();
         let message = said(root, &[&sample[..], &RENAME].concat());
         assert!(message.contains(says) && message.contains(line), "{new}: {message}");
     };
-    changed("<NormalDistribution", "<NormalDistributon", "line 8", "did you mean");
+    changed("NormalDistribution", "NormalDistributon", "line 8", "did you mean");
     changed("variance=", "sigma=", "line 8", "there is no attribute `sigma`");
     changed(" variance=\"225\"", "", "line 8", "the attribute `variance` is missing");
     changed("\"225\"", "\"-225\"", "line 8", "at least 0");
@@ -238,7 +238,7 @@ fn what_is_not_understood_is_named_with_line_and_element() {
     says(&[&sample[..], &RENAME, &["--set", "thw_s=1"]].concat(), "given twice");
     says(&[&sample[..], &RENAME, &["--set", "gap_m=1"]].concat(), "say the same twice");
     says(&[&sample[..], &RENAME, &["--thw", "1"]].concat(), "the initial distance is a parameter already");
-    says(&[&sample[..], &RENAME, &["--estimator", "ce"]].concat(), "crude Monte Carlo");
+    says(&[&sample[..], &RENAME, &["--estimator", "is"]].concat(), "crude Monte Carlo");
     says(&["map", "cut-in", "--distribution", "f.xosc"], "lanesweep sample --distribution");
     let cut_out = ["sample", "--distribution", "f.xosc", "--category", "cut-out", "--out", "o"];
     says(&[&cut_out[..], &RENAME].concat(), "give it a distribution, or a value by --set ahead_gap_m=50");
@@ -271,4 +271,29 @@ fn the_number_of_samples_and_what_cannot_be_a_case_have_limits() {
     assert!((3700..4300).contains(&tries), "{tries}");
     let error = of("25").draw(1, 0, &profile).unwrap_err();
     assert!(error.to_string().contains("none of 64 draws is a case"), "{error}");
+}
+
+#[test]
+fn hostile_xml_is_refused_at_once() {
+    let path = Path::new("x.xosc");
+    let refused = |text: &str, says: &str| {
+        let error = parse_distribution(text, path).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+        assert!(error.help().is_some_and(|help| !help.is_empty()));
+    };
+    refused(&"<a>".repeat(1_000_000), "within one another");
+    refused(&format!("<a>{}</a>", "<b/>".repeat(600_000)), "more than 500000 elements");
+    refused("", "there is no element");
+    refused("<a/><b/>", "a second root element `b`");
+    refused("<a x=\"1\" x=\"2\"/>", "attributes of `a` are broken");
+    refused("<a x=1/>", "attributes of `a` are broken");
+    refused("<a x=\"&lol;\"/>", "attribute `x` of `a` is broken");
+    refused("<a><b></a>", "not well-formed");
+    refused("<a>", "does not end");
+    refused("<a/>text", "text outside");
+    refused("\u{feff}<a/>", "the root element is not `OpenSCENARIO`");
+    refused("<OpenSCENARIO><Storyboard/></OpenSCENARIO>", "this is a scenario or a catalog");
+    // Entities of its own would be declared here.
+    let bomb = "<!DOCTYPE l [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><OpenSCENARIO x=\"&b;\"/>";
+    refused(bomb, "document type");
 }
