@@ -20,25 +20,6 @@ use std::time::Duration;
 use markdown::{Document, Link};
 use shell::commands;
 
-/// Chapters that the table of contents names and that are still to come; links to them are not followed.
-const COMING: [&str; 15] = [
-    "docs/src/tables.md",
-    "docs/src/openscenario.md",
-    "docs/src/configuration.md",
-    "docs/src/methods/index.md",
-    "docs/src/methods/mining.md",
-    "docs/src/methods/parameterizations.md",
-    "docs/src/methods/lane.md",
-    "docs/src/methods/drivers.md",
-    "docs/src/methods/criteria.md",
-    "docs/src/methods/scores.md",
-    "docs/src/methods/densities.md",
-    "docs/src/methods/estimators.md",
-    "docs/src/methods/options.md",
-    "docs/src/validation.md",
-    "docs/src/glossary.md",
-];
-
 /// Programs of the system that a block may call; trycmd leaves out what it does not know.
 const TOOLS: [&str; 7] = ["cat", "cp", "grep", "head", "ls", "tail", "wc"];
 
@@ -185,9 +166,6 @@ fn every_link_leads_somewhere() {
                 // mdBook makes pages of the chapters only: as HTML such a link would lead nowhere.
                 wrong.push(format!("{place} leaves the book: write the path as code"));
             }
-            if COMING.contains(&path.as_str()) {
-                continue;
-            }
             let at = root().join(&path);
             if !at.exists() {
                 wrong.push(format!("{place} leads to no file"));
@@ -228,13 +206,9 @@ fn the_table_of_contents_holds_every_chapter_once() {
     present.retain(|path| path != "docs/src/SUMMARY.md");
     for path in &present {
         assert!(once.contains(path), "{path} is not in SUMMARY.md");
-        assert!(!COMING.contains(&path.as_str()), "{path} has come: take it from the list in tests/book.rs");
     }
     for path in &listed {
-        assert!(
-            present.contains(path) || COMING.contains(&path.as_str()),
-            "SUMMARY.md names {path}, which is not there"
-        );
+        assert!(present.contains(path), "SUMMARY.md names {path}, which is not there");
     }
 }
 

@@ -74,6 +74,10 @@ fn every_example_of_the_help_runs() {
                     std::fs::copy(fitted, dir.join(name)).unwrap();
                 }
             }
+            for name in ["cut-in-stochastic.xosc", "cut-in-deterministic.xosc"] {
+                let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name);
+                std::fs::copy(shipped, dir.join(name)).unwrap();
+            }
             std::fs::write(dir.join("study.toml"), "[score]\nbootstrap_draws = 100\n").unwrap();
             if verb == "conformance" {
                 let Some(tables) = shared("golden/jrc") else { continue };

@@ -128,7 +128,8 @@ fn maps_traces_and_checks_print_documents() {
     let printed = json(dir.path(), &verify);
     let sets = printed["sets"].as_array().unwrap();
     assert_eq!((printed["equal"].as_bool(), sets.len()), (Some(true), 3));
-    let lanes = |set: &Value| set["tallies"].as_array().unwrap().iter().map(|t| t["lanes"].as_u64().unwrap()).sum::<u64>();
+    let lanes =
+        |set: &Value| set["tallies"].as_array().unwrap().iter().map(|t| t["lanes"].as_u64().unwrap()).sum::<u64>();
     assert_eq!(sets.iter().map(lanes).sum::<u64>(), printed["lanes"].as_u64().unwrap());
 
     let devices = json(dir.path(), &["devices", "--no-self-check"]);

@@ -61,9 +61,7 @@ impl DryRun {
     }
 
     fn json(&self, now: Option<u64>) -> Result<String> {
-        let part = |Part { of, what, units, lanes }: &Part| {
-            serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes})
-        };
+        let part = |Part { of, what, units, lanes }: &Part| serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes});
         document(&serde_json::json!({
             "data": self.data,
             "lanes": self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add),

@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::format::FormatFlag;
 use super::dry_run::{BUDGET, DryRun, Part};
+use super::format::FormatFlag;
 use super::{Exit, lists};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
@@ -105,7 +105,7 @@ fn after_help() -> String {
          gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 --panel ego_speed_kmh=60,90,120 --panel \
          other_speed_kmh=30,50 --models FSM,RSS --against un-r157\n  lanesweep map lvd --x \
          deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM\n  lanesweep map cut-in \
-         --distribution cut-ins.xosc --rename Ego_Speed_kph=ego_speed_kmh --set thw_s=1.2",
+         --distribution cut-in-deterministic.xosc --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh",
         names.join(", ")
     )
 }
@@ -188,7 +188,10 @@ impl Map {
         let written = report.write(&self.out)?;
         let name =
             |path: &PathBuf| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        self.format.print(|| report.text(), || report.json(written.iter().map(name).filter(|name| name != "map.json").collect()))?;
+        self.format.print(
+            || report.text(),
+            || report.json(written.iter().map(name).filter(|name| name != "map.json").collect()),
+        )?;
         let (count, seconds, host) = (report.simulations(), report.host.sweep_s, &report.host.backend);
         tracing::info!("{count} simulations in {seconds:.3} s on {host}");
         tracing::info!("{} files written to {}", written.len(), self.out.display());
@@ -206,7 +209,11 @@ impl Map {
             Some("jrc") => presets::jrc(category, profile)?,
             Some(unknown) => {
                 let problem = format!("there is no preset `{unknown}`");
-                return Err(Error::usage(Place::item("--preset"), problem, format!("presets: {}", presets::NAMES.join(", "))));
+                return Err(Error::usage(
+                    Place::item("--preset"),
+                    problem,
+                    format!("presets: {}", presets::NAMES.join(", ")),
+                ));
             }
             None => {
                 let grid = match &self.distribution {

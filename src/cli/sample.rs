@@ -53,7 +53,8 @@ use crate::{Error, Place, Result};
     after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
                         sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
                         cut-in-1.json --samples 100000000 --shard 0/2 --out big\n  lanesweep sample --distribution \
-                        cut-ins.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --set lateral_speed_mps=1"
+                        cut-in-stochastic.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --rename \
+                        Other_Speed_kph=other_speed_kmh"
 )]
 pub struct Sample {
     /// Density file

@@ -42,6 +42,7 @@ impl CaseParameters {
     /// [`Error::Usage`] that names what is missing or out of range.
     pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
+        self.refuse_of_other_categories(category)?;
         let ego_speed_mps =
             at_least(*needed(self.ego_speed.as_ref(), "ego_speed", "a speed in m/s")?, 0.0, "ego_speed")?;
         let length_m = above_zero(self.length.unwrap_or(length_m), "length")?;
@@ -77,6 +78,23 @@ impl CaseParameters {
             length_m,
             width_m,
         })
+    }
+
+    /// What the category does not have would not be heeded. 0 says that there is none, which is true.
+    fn refuse_of_other_categories(&self, category: Category) -> Result<()> {
+        let given = [
+            ("lateral_speed", self.lateral_speed, category == Category::Lvd),
+            ("lateral_distance", self.lateral_distance, category == Category::Lvd),
+            ("ahead_speed", self.ahead_speed, category != Category::CutOut),
+            ("ahead_gap", self.ahead_gap, category != Category::CutOut),
+        ];
+        match given.iter().find(|(_, value, is_foreign)| *is_foreign && value.is_some_and(|value| value != 0.0)) {
+            None => Ok(()),
+            Some((key, ..)) => {
+                let problem = format!("{} has no such parameter", category.label());
+                Err(Error::usage(Place::item(*key), problem, "leave it out, or choose the category that has it"))
+            }
+        }
     }
 }
 
