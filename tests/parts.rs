@@ -39,7 +39,7 @@ fn results(dir: &Path) -> Vec<(String, String)> {
         let mut content = std::fs::read_to_string(&path).unwrap();
         if ["run.json", "estimate.json"].contains(&name.as_str()) {
             let mut record: serde_json::Value = serde_json::from_str(&content).unwrap();
-            for host in ["timings", "backend", "device", "sweep", "host"] {
+            for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
                 record.as_object_mut().unwrap().remove(host);
             }
             content = record.to_string();

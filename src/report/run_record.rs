@@ -127,7 +127,8 @@ pub struct RunRecord {
     pub parameterization: ParameterizationOptions,
     /// Bootstrap and its seed.
     pub score: ScoreOptions,
-    /// Options that were set for this command, and by what; those of a merged result were the parts' own.
+    /// Options that were set for this command, and by what. As the backend's, they are of the command and not of the
+    /// result: a merge has none, its parts had their own.
     pub settings: Vec<SettingRecord>,
     /// Seconds; they differ from run to run.
     pub timings: Timings,
