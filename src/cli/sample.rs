@@ -422,6 +422,6 @@ fn given(text: &str) -> std::result::Result<(String, f64), String> {
 fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
-    TableFormat::of(rows, &TableFormat::EVERY, "--rows")?;
-    super::source::refuse_overwriting(rows, &others, "--rows")
+    super::source::refuse_overwriting(rows, &others, "--rows")?;
+    TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
 }

@@ -306,8 +306,8 @@ impl Study {
         others.extend(self.scenarios.clone());
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
-        lane_format(lanes)?;
         source::refuse_overwriting(lanes, &others, "--lanes")?;
+        lane_format(lanes)?;
         self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--lanes"))
     }
 
