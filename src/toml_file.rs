@@ -16,9 +16,41 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, place: &Place, help: &str) 
         if let Some(span) = e.span() {
             let before = text.bytes().take(span.start);
             place.row = Some(1 + before.filter(|&byte| byte == b'\n').count() as u64);
+            place.column = key_before(text, span.start);
         }
-        Error::usage(place, e.message().to_owned(), help)
+        let problem = in_words(e.message());
+        match meant(e.message()) {
+            Some(name) => Error::usage(place, problem, format!("did you mean `{name}`? {help}")),
+            None => Error::usage(place, problem, help),
+        }
     })
+}
+
+/// The key whose value begins at `at`.
+fn key_before(text: &str, at: usize) -> Option<String> {
+    let line = text.get(..at)?.lines().next_back()?;
+    let key = line.strip_suffix(['=', ' ']).and_then(|_| line.split('=').next())?.trim();
+    (!key.is_empty() && !key.starts_with(['#', '['])).then(|| key.to_owned())
+}
+
+/// The reader's types in a user's words.
+fn in_words(message: &str) -> String {
+    let words = [("floating point", "number"), ("f64", "a number"), ("f32", "a number"), ("usize", "a whole number")];
+    let whole = ["u8", "u16", "u32", "u64"].map(|name| (name, "a whole number of at least 0"));
+    let mut text = message.to_owned();
+    for (name, word) in words.into_iter().chain(whole) {
+        text = text.replace(&format!("expected {name}"), &format!("expected {word}"));
+    }
+    text
+}
+
+/// The name that an unknown one resembles, of those that the message lists.
+fn meant(message: &str) -> Option<&str> {
+    let mut names = message.strip_prefix("unknown field `")?.split('`').step_by(2);
+    let unknown = names.next()?;
+    let near = names.map(|name| (strsim::damerau_levenshtein(unknown, name), name));
+    let (distance, name) = near.min_by_key(|(distance, _)| *distance)?;
+    (distance <= 2 + unknown.len() / 6).then_some(name)
 }
 
 /// The settings in a regular file.
@@ -32,6 +64,31 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Lengths {
+        #[allow(dead_code)]
+        gap_m: f64,
+        #[allow(dead_code)]
+        rows: Option<u32>,
+    }
+
+    #[test]
+    fn an_error_names_the_key_and_what_was_meant() {
+        let told = |text: &str| {
+            let error = parse::<Lengths>(text, &Place::item("here"), "see there").unwrap_err();
+            (error.to_string(), error.help().unwrap_or_default())
+        };
+        let (text, _) = told("# far\ngap_m = 'far'\n");
+        assert!(text.contains("line 2") && text.contains("`gap_m`") && text.ends_with("expected a number"), "{text}");
+        let (text, _) = told("gap_m = 1.0\nrows = -1\n");
+        assert!(text.contains("`rows`") && text.contains("a whole number"), "{text}");
+        let (text, help) = told("gap = 1.0\n");
+        assert!(text.contains("unknown field `gap`") && help == "did you mean `gap_m`? see there", "{text}; {help}");
+        let (_, help) = told("colour = 1.0\n");
+        assert_eq!(help, "see there");
+    }
 
     #[test]
     fn an_error_names_the_line_also_after_letters_of_several_bytes() {

@@ -190,7 +190,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let cases: [(&[&str], i32, &str); 16] = [
         (&["study", "--profile", "papr"], 2, "did you mean `paper`"),
         (&["study", "--profile", &profile], 2, "missing field"),
-        (&["study", "--dt", "0"], 2, "frame.dt_s"),
+        (&["study", "--dt", "0"], 2, "--dt"),
         (&["study", "--dt", "NaN"], 2, "frame.dt_s"),
         (&["study", "--config", &key], 2, "bootstrap_drawz"),
         (&["study", "--config", &range], 2, "score.bootstrap_draws"),

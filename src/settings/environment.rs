@@ -9,11 +9,12 @@ use crate::{Error, Place, Result};
 pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
 
 /// Variables of the program's own tests; the program does not read them.
-pub const TEST_VARIABLES: [&str; 8] = [
+pub const TEST_VARIABLES: [&str; 9] = [
     "LANESWEEP_DLR_HT",
     "LANESWEEP_KILLS",
     "LANESWEEP_MUTATED_FIRST",
     "LANESWEEP_MUTATED_INPUTS",
+    "LANESWEEP_RENEW_FIGURES",
     "LANESWEEP_REQUIRE_DEVICE",
     "LANESWEEP_SHARED",
     "LANESWEEP_SLURM_TEST",
