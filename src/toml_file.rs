@@ -16,7 +16,9 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, place: &Place, help: &str) 
         if let Some(span) = e.span() {
             let before = text.bytes().take(span.start);
             place.row = Some(1 + before.filter(|&byte| byte == b'\n').count() as u64);
-            place.column = key_before(text, span.start);
+            if place.item.is_none() {
+                place.item = key_before(text, span.start).map(|key| format!("`{key}`"));
+            }
         }
         let problem = in_words(e.message());
         match meant(e.message()) {
@@ -77,7 +79,7 @@ mod tests {
     #[test]
     fn an_error_names_the_key_and_what_was_meant() {
         let told = |text: &str| {
-            let error = parse::<Lengths>(text, &Place::item("here"), "see there").unwrap_err();
+            let error = parse::<Lengths>(text, &Place::file("a.toml"), "see there").unwrap_err();
             (error.to_string(), error.help().unwrap_or_default())
         };
         let (text, _) = told("# far\ngap_m = 'far'\n");

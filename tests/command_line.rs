@@ -191,7 +191,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--profile", "papr"], 2, "did you mean `paper`"),
         (&["study", "--profile", &profile], 2, "missing field"),
         (&["study", "--dt", "0"], 2, "--dt"),
-        (&["study", "--dt", "NaN"], 2, "frame.dt_s"),
+        (&["study", "--dt", "NaN"], 2, "--dt"),
         (&["study", "--config", &key], 2, "bootstrap_drawz"),
         (&["study", "--config", &range], 2, "score.bootstrap_draws"),
         (&["study", "--config", &svd], 2, "svd_instants"),
