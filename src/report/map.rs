@@ -382,8 +382,7 @@ struct DifferenceRecord {
 
 impl DifferenceRecord {
     fn of(difference: &Difference) -> DifferenceRecord {
-        let [both_pass, both_fail, only_first_fails, only_second_fails] =
-            count(&difference.cells).map(|cells| cells as u64);
+        let [both_pass, both_fail, only_first_fails, only_second_fails] = count(&difference.cells);
         DifferenceRecord {
             map: difference.grid.name().to_owned(),
             model: difference.model.name(),
