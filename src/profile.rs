@@ -112,6 +112,11 @@ impl Profile {
         BUILT_IN.iter().map(|(name, _)| *name)
     }
 
+    /// The files of those profiles, in the same order.
+    pub(crate) fn files() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(_, text)| *text)
+    }
+
     /// A profile by name, or from a TOML file where the text is a path.
     pub fn load(name_or_path: &str) -> Result<Profile> {
         if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use lanesweep::driver::ModelId;
 use serde_json::Value;
 
 /// Runs the program with nothing configured but what the test configures.
@@ -255,6 +256,48 @@ fn the_schema_has_every_key_with_a_default_in_its_own_range() {
     }
 }
 
+/// The part of JSON Schema that [`lanesweep config schema profile`] uses.
+fn fits(value: &Value, schema: &Value, at: &str) {
+    match (schema["type"].as_str(), value) {
+        (Some("object"), Value::Object(fields)) => {
+            for key in schema["required"].as_array().into_iter().flatten() {
+                assert!(fields.contains_key(key.as_str().unwrap()), "{at} has no {key}");
+            }
+            for (key, value) in fields {
+                let property = &schema["properties"][key];
+                assert!(property.is_object(), "{at}.{key} is not in the schema");
+                fits(value, property, &format!("{at}.{key}"));
+            }
+        }
+        (Some("array"), Value::Array(items)) => items.iter().for_each(|item| fits(item, &schema["items"], at)),
+        (Some("string"), Value::String(_)) | (Some("boolean"), Value::Bool(_)) => {}
+        (Some("number" | "integer"), Value::Number(number)) => {
+            let number = number.as_f64().unwrap();
+            assert!(schema["minimum"].as_f64().is_none_or(|least| number >= least), "{at}: {number}");
+            assert!(schema["exclusiveMinimum"].as_f64().is_none_or(|limit| number > limit), "{at}: {number}");
+        }
+        (kind, value) => panic!("{at} is {value}, the schema says {kind:?}"),
+    }
+}
+
+#[test]
+fn the_profiles_that_ship_fit_the_schema_of_profiles() {
+    let dir = tempfile::tempdir().unwrap();
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema", "profile"])).unwrap();
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/profiles");
+    let mut count = 0;
+    for file in std::fs::read_dir(folder).unwrap().flatten() {
+        let profile: Value = toml::from_str(&std::fs::read_to_string(file.path()).unwrap()).unwrap();
+        fits(&profile, &schema, &file.file_name().to_string_lossy());
+        // And one that lacks a key does not.
+        let mut less = profile.clone();
+        less["cchdm"].as_object_mut().unwrap().remove("delay_s");
+        assert!(std::panic::catch_unwind(|| fits(&less, &schema, "")).is_err());
+        count += 1;
+    }
+    assert!(count >= 4);
+}
+
 fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
     for (name, property) in schema["properties"].as_object().into_iter().flatten() {
         let name = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
@@ -280,12 +323,12 @@ fn a_dry_run_counts_the_lanes_of_the_run_and_writes_nothing() {
     let before = files();
     let compare = ["-q", "compare", "--dry-run", "--categories", "lvd", "--parameterization", "i", "--samples", "1000"];
     let compare = lanes(&good(dir, &small, &compare));
-    assert_eq!(compare % 40, 0);
+    assert_eq!(compare % (10 * ModelId::ALL.len() as u64), 0);
     let sample = |args: &[&str]| lanes(&good(dir, &small, &[&["-q", "sample", "d.json", "--dry-run"], args].concat()));
     assert_eq!(sample(&["--samples", "1000000000", "--models", "FSM,RSS"]), 20_000_000_000);
     assert_eq!(sample(&["--estimator", "subset", "--thw", "0.6", "--models", "FSM"]), 24_000);
     let map = ["-q", "map", "cut-in", "--preset", "jrc", "--dry-run"];
-    assert_eq!(lanes(&good(dir, &small, &map)), 119_880);
+    assert_eq!(lanes(&good(dir, &small, &map)), 29_970 * ModelId::ALL.len() as u64);
     assert_eq!(files(), before, "nothing was written");
     good(dir, &small, &["-q", "study", "--out", "run"]);
     assert_eq!(json(&dir.join("run/run.json"))["lanes"], study);

@@ -108,7 +108,7 @@ impl CaseFlags {
         let mut models = Vec::new();
         for name in text.split(',').map(str::trim) {
             let model = ModelId::parse(name).ok_or_else(|| {
-                let problem = format!("there is no model `{name}`");
+                let problem = format!("there is no driver model `{name}`");
                 Error::usage(Place::item("model"), problem, format!("use one of {}, or all", ModelId::names()))
             })?;
             if !models.contains(&model) {

@@ -7,8 +7,8 @@ use crate::criterion::Criterion;
 use crate::sampling::{CategoryComparison, RateRecord};
 
 fn row(name: String, rate: &RateRecord) -> ForestRow {
-    // On a logarithmic axis a rate of 0 has no place; it is said in words.
-    ForestRow { name, estimate: (rate.failures > 0).then_some(rate.rate), lower: rate.low, upper: rate.high }
+    // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
+    ForestRow { name, estimate: rate.rate.is_finite().then_some(rate.rate), lower: rate.low, upper: rate.high }
 }
 
 /// One criterion of one category: a group per driver model, a row per density, the recorded scenarios as reference.

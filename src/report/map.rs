@@ -201,7 +201,7 @@ impl MapReport {
             grid.fixed().iter().map(|(p, value)| format!("{}: {value} {}.", p.label, p.unit)).collect();
         let mut notes = fixed;
         if grid.has_native_gap() {
-            notes.push("Initial gap: each model's own distance at the ego's speed (column initial_gap_m).".to_owned());
+            notes.push("Initial gap: each model's own distance at the ego's speed, a headway of 2 s where it has none (column initial_gap_m).".to_owned());
         }
         if grid.style() == CaseStyle::JrcComparison {
             notes.push("Cases with the lateral run-up of the JRC's comparison sweep.".to_owned());

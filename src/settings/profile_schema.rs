@@ -17,25 +17,32 @@ pub fn profile_schema() -> Result<Value> {
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a profile cannot be written: {e}"));
     let values =
         profiles.iter().map(serde_json::to_value).collect::<std::result::Result<Vec<_>, _>>().map_err(unwritten)?;
-    let mut schema = of(&values.iter().collect::<Vec<_>>(), "", &bounds);
+    let files = Profile::files().map(toml::from_str::<Value>).collect::<std::result::Result<Vec<_>, _>>();
+    let files = files.map_err(|e| Error::Internal(format!("a profile that ships is no TOML: {e}")))?;
+    let mut schema = of(&values.iter().collect::<Vec<_>>(), &files.iter().collect::<Vec<_>>(), "", &bounds);
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     schema["title"] = json!("lanesweep profile");
     Ok(schema)
 }
 
-fn of(values: &[&Value], name: &str, bounds: &[(String, Bound)]) -> Value {
+/// `values` are a key's values in the profiles that ship; `files` the same as their files have them: a key that they leave
+/// out (of a model with defaults) is not required.
+fn of(values: &[&Value], files: &[&Value], name: &str, bounds: &[(String, Bound)]) -> Value {
     match values {
         [Value::Object(first), ..] => {
             let property = |key: &String| {
                 let inner: Vec<&Value> =
                     values.iter().filter_map(|value| value.get(key)).filter(|value| !value.is_null()).collect();
                 let name = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
-                (key.clone(), of(&inner, &name, bounds))
+                let written: Vec<&Value> = files.iter().filter_map(|file| file.get(key)).collect();
+                (key.clone(), of(&inner, &written, &name, bounds))
             };
+            let is_written = |key: &&String| !files.is_empty() && files.iter().all(|file| file.get(key).is_some());
             let properties: Map<String, Value> = first.keys().map(property).collect();
-            let required: Vec<&String> = first.keys().collect();
+            let required: Vec<&String> = first.keys().filter(is_written).collect();
             json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
         }
+        [Value::Array(_), ..] => json!({ "type": "array", "items": { "type": "string" } }),
         [first, ..] => {
             let mut schema = json!({ "type": match first {
                 Value::Bool(_) => "boolean",
