@@ -53,6 +53,12 @@ impl Interval {
 }
 
 /// Wilson's score interval ("Probable inference", JASA 22, 1927). `failures` and `runs` may be effective numbers.
+///
+/// ```
+/// // Nothing failed in 1,000 runs: that bounds the probability, it does not make it 0.
+/// let interval = lanesweep::estimate::wilson(0.0, 1000.0, 0.95);
+/// assert!(interval.low == 0.0 && (0.003..0.004).contains(&interval.high));
+/// ```
 pub fn wilson(failures: f64, runs: f64, level: f64) -> Interval {
     if runs <= 0.0 {
         return Interval::nothing(level);

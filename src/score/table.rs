@@ -20,6 +20,15 @@ pub fn precision(c: &Confusion) -> Option<f64> {
 }
 
 /// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
+///
+/// ```
+/// use lanesweep::{score::f1, sweep::Confusion};
+///
+/// // S and S' fail together 8 times, S alone twice, S' alone never.
+/// let counts = Confusion { both: 8, only_s: 2, only_s_prime: 0, neither: 90 };
+/// assert_eq!(f1(&counts), Some(16.0 / 18.0));
+/// assert_eq!(f1(&Confusion { both: 0, only_s: 0, only_s_prime: 0, neither: 100 }), None);
+/// ```
 pub fn f1(c: &Confusion) -> Option<f64> {
     ratio(2 * c.both, 2 * c.both + c.only_s + c.only_s_prime)
 }
