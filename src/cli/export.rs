@@ -48,7 +48,7 @@ impl Export {
 #[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Examples:\n  lanesweep export xosc --from lanesweep-out --worst 5 --model FSM --ego external --out \
-                  worst\n  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_81_74_836/S/1.2s/RSS \
+                  worst\n  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS \
                   --out played\n  lanesweep export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw \
                   1.2 --lateral-speed 1.0 --out played"
 )]
