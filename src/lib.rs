@@ -80,6 +80,7 @@ pub mod density;
 pub mod driver;
 pub mod error;
 pub mod estimate;
+pub mod flag;
 pub mod gpu;
 pub mod grid;
 mod input_file;

@@ -8,6 +8,8 @@ use std::cell::Cell;
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Neg, Sub};
 
+use crate::flag::Flag;
+
 /// A scalar of the lane arithmetic. Models, criteria and the frame are written once over this trait.
 pub trait Real:
     Copy
@@ -39,6 +41,29 @@ pub trait Real:
     /// Whole steps below a number in [0, 2²⁴): exact.
     fn floor_to_step(self) -> u32;
 
+    /// The sign bit as it stands; set for -0 too.
+    fn sign(self) -> Flag;
+
+    /// x < 0.
+    #[inline(always)]
+    fn is_negative(self) -> Flag {
+        // -0 + 0 is 0.
+        (self + Self::ZERO).sign()
+    }
+
+    /// x > 0.
+    #[inline(always)]
+    fn is_positive(self) -> Flag {
+        (Self::ZERO - self).sign()
+    }
+
+    /// Less than another number. Both are finite, and this one is not -0: sums and magnitudes never are, and the
+    /// host makes no series or start value that is. Then a difference has a sign exactly where this is less.
+    #[inline(always)]
+    fn is_below(self, other: Self) -> Flag {
+        (self - other).sign()
+    }
+
     /// Magnitude.
     #[inline(always)]
     fn abs(self) -> Self {
@@ -59,7 +84,7 @@ pub trait Real:
 }
 
 macro_rules! real_float {
-    ($float:ty) => {
+    ($float:ty, $bits_above_32:literal) => {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -86,14 +111,18 @@ macro_rules! real_float {
                 self as u32
             }
             #[inline(always)]
+            fn sign(self) -> Flag {
+                Flag::from_bits((self.to_bits() >> $bits_above_32) as u32)
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 <$float>::abs(self)
             }
         }
     };
 }
-real_float!(f32);
-real_float!(f64);
+real_float!(f32, 0);
+real_float!(f64, 32);
 
 /// Operations of the counting type, by kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -214,11 +243,37 @@ impl Real for Counting {
     fn floor_to_step(self) -> u32 {
         self.0 as u32
     }
+    fn sign(self) -> Flag {
+        self.0.sign()
+    }
+    fn is_negative(self) -> Flag {
+        Flag::of(self < Self::ZERO)
+    }
+    fn is_positive(self) -> Flag {
+        Flag::of(self > Self::ZERO)
+    }
+    fn is_below(self, other: Self) -> Flag {
+        Flag::of(self < other)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn comparisons_that_end_in_a_flag_are_those_of_the_standard() {
+        let tiny = f32::from_bits(1);
+        let numbers = [-1e6, -2.5, -tiny, -0.0, 0.0, tiny, 1e-20, 0.3, 2.5, f32::from_bits(0x4020_0001), 1e6];
+        for a in numbers {
+            assert_eq!(a.is_negative().holds(), a < 0.0, "{a}");
+            assert_eq!(a.is_positive().holds(), a > 0.0, "{a}");
+            for b in numbers.into_iter().filter(|_| a.to_bits() != (-0.0_f32).to_bits()) {
+                assert_eq!(a.is_below(b).holds(), a < b, "{a} {b}");
+                assert_eq!(f64::from(a).is_below(f64::from(b)).holds(), a < b, "{a} {b}");
+            }
+        }
+    }
 
     #[test]
     fn the_counting_type_sees_every_operation() {

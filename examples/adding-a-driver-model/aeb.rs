@@ -75,10 +75,10 @@ impl<R: Real> DriverModel<R> for Aeb<R> {
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
-        let in_path = view.lateral_gap <= R::ZERO && dv > R::ZERO;
-        let soon = view.gap <= self.trigger_ttc * dv;
-        let intervening = view.a_ego < R::ZERO;
-        Hazard { is_unsafe: !view.is_behind() && in_path && (soon || intervening), demand: self.max_deceleration }
+        let in_path = !view.lateral_gap.is_positive() & dv.is_positive();
+        let soon = !(self.trigger_ttc * dv).is_below(view.gap);
+        let intervening = view.a_ego.is_negative();
+        Hazard { is_unsafe: !view.is_behind() & in_path & (soon | intervening), demand: self.max_deceleration }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {

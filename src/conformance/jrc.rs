@@ -175,7 +175,7 @@ fn last_target_minima(
             // The frozen vehicle's offset holds the step it moved before it froze; before that it moved.
             view.gap -= lane.others[0].motion.speed(tables, freeze - 1) * profile.frame.dt_s;
         }
-        if view.lateral_gap < 0.0 && !view.is_behind() {
+        if view.lateral_gap < 0.0 && !view.is_behind().holds() {
             min_gap = min_gap.min(view.gap);
             if view.closing() > 0.0 {
                 min_ttc = min_ttc.min(view.gap.max(0.0) / view.closing());

@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::flag::Flag;
 use crate::scalar::Real;
 
 /// Form of the number.
@@ -63,34 +64,34 @@ pub struct BrakeThreatMaximum<R> {
     /// Denominator of the quotient; 0 where no braking helps.
     pub denominator: R,
     /// The predicate was true at some step.
-    pub failed: bool,
+    pub failed: Flag,
 }
 
 impl<R: Real> BrakeThreatMaximum<R> {
     /// Nothing seen yet: 0.
     #[inline(always)]
     pub fn new() -> Self {
-        BrakeThreatMaximum { numerator: R::ZERO, denominator: R::ONE, failed: false }
+        BrakeThreatMaximum { numerator: R::ZERO, denominator: R::ONE, failed: Flag::FALSE }
     }
 
     /// As a device gives it back: numerator and denominator.
-    pub fn from_quotient(numerator: R, denominator: R, failed: bool) -> Self {
+    pub fn from_quotient(numerator: R, denominator: R, failed: Flag) -> Self {
         BrakeThreatMaximum { numerator, denominator, failed }
     }
 
     /// A collision that counts: infinite.
     #[inline(always)]
     pub fn fail(self) -> Self {
-        BrakeThreatMaximum { numerator: R::ONE, denominator: R::ZERO, failed: true }
+        BrakeThreatMaximum { numerator: R::ONE, denominator: R::ZERO, failed: Flag::TRUE }
     }
 
     #[inline(always)]
-    fn raise(self, counts: bool, numerator: R, denominator: R, fails: bool) -> Self {
-        let higher = counts && numerator * self.denominator > self.numerator * denominator;
+    fn raise(self, counts: Flag, numerator: R, denominator: R, fails: Flag) -> Self {
+        let higher = counts & (self.numerator * denominator).is_below(numerator * self.denominator);
         BrakeThreatMaximum {
-            numerator: if higher { numerator } else { self.numerator },
-            denominator: if higher { denominator } else { self.denominator },
-            failed: self.failed || (counts && fails),
+            numerator: higher.choose(numerator, self.numerator),
+            denominator: higher.choose(denominator, self.denominator),
+            failed: self.failed | (counts & fails),
         }
     }
 }
@@ -149,20 +150,20 @@ impl<R: Real> BrakeThreat<R> {
 
     /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s.
     #[inline(always)]
-    pub fn update(&self, maximum: BrakeThreatMaximum<R>, seen: bool, gap: R, closing: R) -> BrakeThreatMaximum<R> {
-        let counts = seen && closing > R::ZERO;
-        let touches = gap <= R::ZERO;
+    pub fn update(&self, maximum: BrakeThreatMaximum<R>, seen: Flag, gap: R, closing: R) -> BrakeThreatMaximum<R> {
+        let counts = seen & closing.is_positive();
+        let touches = !gap.is_positive();
         match self.form {
             BtnForm::EquivalentDelay => {
                 let room = gap - closing * self.ramp_delay;
-                let hopeless = touches || room <= R::ZERO;
+                let hopeless = touches | !room.is_positive();
                 let numerator = closing * closing;
                 let denominator = self.two_a_max * room;
-                let fails = hopeless || numerator > self.two_a_limit * room;
+                let fails = hopeless | (self.two_a_limit * room).is_below(numerator);
                 maximum.raise(
                     counts,
-                    if hopeless { R::ONE } else { numerator },
-                    if hopeless { R::ZERO } else { denominator },
+                    hopeless.choose(R::ONE, numerator),
+                    hopeless.choose(R::ZERO, denominator),
                     fails,
                 )
             }
@@ -176,24 +177,25 @@ impl<R: Real> BrakeThreat<R> {
                     self.short_ramp * closing * closing * closing
                 };
                 let limit = self.threshold * gap;
-                let fails = touches || squared > limit * limit;
+                let fails = touches | (limit * limit).is_below(squared);
                 maximum.raise(
                     counts,
-                    if touches { R::ONE } else { squared },
-                    if touches { R::ZERO } else { gap * gap },
+                    touches.choose(R::ONE, squared),
+                    touches.choose(R::ZERO, gap * gap),
                     fails,
                 )
             }
             BtnForm::Exact => {
                 // What the largest deceleration so far still avoids needs no new solution.
                 let known = maximum.denominator == R::ZERO || !self.needs_more(maximum.numerator, gap, closing);
-                let fails = touches || self.needs_more(self.a_limit, gap, closing);
-                let hopeless = touches || gap * gap < self.short_ramp * closing * closing * closing;
-                let required = if counts && !known && !hopeless { self.solve(gap, closing) } else { R::ZERO };
+                let fails = touches | Flag::of(self.needs_more(self.a_limit, gap, closing));
+                let hopeless = touches | (gap * gap).is_below(self.short_ramp * closing * closing * closing);
+                let solves = (counts & !hopeless).holds() && !known;
+                let required = if solves { self.solve(gap, closing) } else { R::ZERO };
                 maximum.raise(
-                    counts && (hopeless || !known),
-                    if hopeless { R::ONE } else { required },
-                    if hopeless { R::ZERO } else { R::ONE },
+                    counts & (hopeless | Flag::of(!known)),
+                    hopeless.choose(R::ONE, required),
+                    hopeless.choose(R::ZERO, R::ONE),
                     fails,
                 )
             }
@@ -217,7 +219,7 @@ impl<R: Real> BrakeThreat<R> {
 
     /// The number of one instant: gap, m, closing speed, m/s. For traces and tests.
     pub fn at(&self, gap: R, closing: R) -> f64 {
-        self.value(&self.update(BrakeThreatMaximum::new(), true, gap, closing))
+        self.value(&self.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, closing))
     }
 
     /// v ≥ a²/(2j): the ramp ends before the closing speed is gone.
@@ -309,8 +311,8 @@ mod tests {
             let threat = threat(form);
             for v in [0.5, 2.0, 7.0, 19.0, 33.0] {
                 for gap in [0.3, 1.0, 4.0, 11.0, 60.0, 150.0] {
-                    let judged = threat.update(BrakeThreatMaximum::new(), true, gap, v);
-                    assert_eq!(judged.failed, threat.value(&judged) > 0.8, "{form:?} v {v} gap {gap}");
+                    let judged = threat.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, v);
+                    assert_eq!(judged.failed.holds(), threat.value(&judged) > 0.8, "{form:?} v {v} gap {gap}");
                 }
             }
         }

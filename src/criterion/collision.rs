@@ -1,5 +1,6 @@
 //! Collision: the boxes overlap along and across the road. Side contacts count.
 
+use crate::flag::Flag;
 use crate::scalar::Real;
 
 /// How two vehicles touch.
@@ -20,13 +21,21 @@ impl Contact {
     }
 }
 
-/// Contact at one step, strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
+/// Do the boxes overlap at one step? Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
+#[inline(always)]
+pub fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
+    let along = gap.is_negative() & (gap + half_lengths + half_lengths).is_positive();
+    lateral_gap.is_negative() & along
+}
+
+/// Contact at one step.
 #[inline(always)]
 pub fn contact<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Contact {
-    let overlap_along = gap < R::ZERO && gap + half_lengths + half_lengths > R::ZERO;
-    if lateral_gap < R::ZERO && overlap_along {
-        if gap + half_lengths < R::ZERO { Contact::BySide } else { Contact::Frontal }
-    } else {
+    if !overlaps(gap, half_lengths, lateral_gap).holds() {
         Contact::None
+    } else if (gap + half_lengths).is_negative().holds() {
+        Contact::BySide
+    } else {
+        Contact::Frontal
     }
 }

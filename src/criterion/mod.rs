@@ -11,12 +11,13 @@ mod collision;
 mod ttc;
 
 pub use btn::{BrakeThreat, BrakeThreatMaximum, BtnContact, BtnForm};
-pub use collision::{Contact, contact};
+pub use collision::{Contact, contact, overlaps};
 pub use ttc::{TimeToCollision, TtcMinimum};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::flag::Flag;
 use crate::scalar::Real;
 
 /// The registry of criteria, in the order of every table.
@@ -131,11 +132,11 @@ impl<R: Real> Criteria<R> {
 
     /// Do TTC and BTN look at a vehicle here? In front by its centre, and near enough across the road.
     #[inline(always)]
-    pub fn sees(&self, gap: R, half_lengths: R, lateral_gap: R, lateral_position: R, ego_width: R) -> bool {
+    pub fn sees(&self, gap: R, half_lengths: R, lateral_gap: R, lateral_position: R, ego_width: R) -> Flag {
         let near = match self.gate {
-            LateralGate::EgoWidth => lateral_position.abs() <= ego_width,
-            LateralGate::Overlap => lateral_gap < R::ZERO,
+            LateralGate::EgoWidth => !ego_width.is_below(lateral_position.abs()),
+            LateralGate::Overlap => lateral_gap.is_negative(),
         };
-        gap + half_lengths >= R::ZERO && near
+        !(gap + half_lengths).is_negative() & near
     }
 }

@@ -1,5 +1,6 @@
 //! Time to collision: gap over closing speed, 0 at contact.
 
+use crate::flag::Flag;
 use crate::scalar::Real;
 
 /// The threshold.
@@ -17,14 +18,14 @@ pub struct TtcMinimum<R> {
     /// Closing speed of the quotient, m/s; 0 where nothing was seen.
     pub closing: R,
     /// The predicate was true at some step.
-    pub failed: bool,
+    pub failed: Flag,
 }
 
 impl<R: Real> TtcMinimum<R> {
     /// Nothing seen yet: infinite.
     #[inline(always)]
     pub fn new() -> Self {
-        TtcMinimum { gap: R::ONE, closing: R::ZERO, failed: false }
+        TtcMinimum { gap: R::ONE, closing: R::ZERO, failed: Flag::FALSE }
     }
 
     /// The value, s, ≥ 0; infinite where the ego never closed in.
@@ -43,14 +44,14 @@ impl<R: Real> Default for TtcMinimum<R> {
 impl<R: Real> TimeToCollision<R> {
     /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0.
     #[inline(always)]
-    pub fn update(&self, minimum: TtcMinimum<R>, seen: bool, gap: R, closing: R) -> TtcMinimum<R> {
+    pub fn update(&self, minimum: TtcMinimum<R>, seen: Flag, gap: R, closing: R) -> TtcMinimum<R> {
         let gap = gap.larger(R::ZERO);
-        let counts = seen && closing > R::ZERO;
-        let smaller = counts && gap * minimum.closing < minimum.gap * closing;
+        let counts = seen & closing.is_positive();
+        let smaller = counts & (gap * minimum.closing).is_below(minimum.gap * closing);
         TtcMinimum {
-            gap: if smaller { gap } else { minimum.gap },
-            closing: if smaller { closing } else { minimum.closing },
-            failed: minimum.failed || (counts && gap < self.threshold * closing),
+            gap: smaller.choose(gap, minimum.gap),
+            closing: smaller.choose(closing, minimum.closing),
+            failed: minimum.failed | (counts & gap.is_below(self.threshold * closing)),
         }
     }
 }

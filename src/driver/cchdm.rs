@@ -7,6 +7,7 @@ use super::{
     AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps,
     latched_braking,
 };
+use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -115,9 +116,10 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
-        let near = view.lateral_gap <= self.lateral_gate;
-        let soon = dv != R::ZERO && view.gap.abs() <= self.ttc * dv.abs();
-        let is_unsafe = !view.is_behind() && (self.always_unsafe || (near && soon));
+        let near = !self.lateral_gate.is_below(view.lateral_gap);
+        let moves = dv.is_negative() | dv.is_positive();
+        let soon = moves & !(self.ttc * dv.abs()).is_below(view.gap.abs());
+        let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
         Hazard { is_unsafe, demand: self.max_deceleration }
     }
 

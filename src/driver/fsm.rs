@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -102,13 +103,9 @@ impl DriverProfile for FsmProfile {
 fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
     // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
     let between = (distance - safe).exact_div(dangerous - safe);
-    if distance >= safe {
-        R::ZERO
-    } else if distance <= dangerous {
-        R::ONE
-    } else {
-        between
-    }
+    let is_safe = !distance.is_below(safe);
+    let is_dangerous = !dangerous.is_below(distance);
+    is_safe.choose(R::ZERO, is_dangerous.choose(R::ONE, between))
 }
 
 impl<R: Real> Fsm<R> {
@@ -133,27 +130,24 @@ impl<R: Real> Fsm<R> {
         let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
         let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
         let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
-        if v_ego <= v_other {
-            R::ZERO
-        } else if v_new < v_other {
-            // g < dv²/(2|a|), multiplied out.
-            let twice = gap + gap;
-            if twice * a_step.abs() < dv * dv { R::ONE } else { R::ZERO }
-        } else {
-            fuzzy(gap, d_safe, d_unsafe)
-        }
+        // g < dv²/(2|a|), multiplied out.
+        let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
+        let slower_then = is_short.choose(R::ONE, R::ZERO);
+        let faster_then = fuzzy(gap, d_safe, d_unsafe);
+        let closes = v_other.is_below(v_ego);
+        closes.choose(v_new.is_below(v_other).choose(slower_then, faster_then), R::ZERO)
     }
 
     /// Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or
     /// while it needs longer to come in than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
     #[inline(always)]
-    fn gate_is_open(&self, view: &View<R>) -> bool {
+    fn gate_is_open(&self, view: &View<R>) -> Flag {
         let dv = view.closing();
         let w = view.lateral_towards;
         let passing = view.gap + view.half_lengths + view.half_lengths;
-        let slow = view.lateral_gap * dv > w * (passing + self.gate_margin * dv);
-        let closed = w <= R::ZERO || dv < R::ZERO || (dv > R::ZERO && slow);
-        view.lateral_gap <= R::ZERO || !closed
+        let slow = (w * (passing + self.gate_margin * dv)).is_below(view.lateral_gap * dv);
+        let closed = !w.is_positive() | dv.is_negative() | (dv.is_positive() & slow);
+        !view.lateral_gap.is_positive() | !closed
     }
 }
 
@@ -169,9 +163,9 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);
         let cfs = self.cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
-        let surrogate = pfs > R::ZERO || cfs > R::ZERO;
-        let demand = if cfs > R::ZERO { cfs * self.b_span + self.b_comf } else { pfs * self.b_comf };
-        Hazard { is_unsafe: !view.is_behind() && surrogate && self.gate_is_open(view), demand }
+        let surrogate = pfs.is_positive() | cfs.is_positive();
+        let demand = cfs.is_positive().choose(cfs * self.b_span + self.b_comf, pfs * self.b_comf);
+        Hazard { is_unsafe: !view.is_behind() & surrogate & self.gate_is_open(view), demand }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {

@@ -17,6 +17,7 @@ mod profile;
 pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
 pub use profile::{Bound, DriverProfile};
 
+use crate::flag::Flag;
 use crate::scalar::Real;
 
 /// Makes the modules, their public names and [`ModelId`] from the registry.
@@ -106,8 +107,8 @@ impl<R: Real> View<R> {
 
     /// x_e > x_o: the other vehicle's centre is behind the ego's.
     #[inline(always)]
-    pub fn is_behind(&self) -> bool {
-        self.gap + self.half_lengths < R::ZERO
+    pub fn is_behind(&self) -> Flag {
+        (self.gap + self.half_lengths).is_negative()
     }
 }
 
@@ -115,7 +116,7 @@ impl<R: Real> View<R> {
 #[derive(Debug, Clone, Copy)]
 pub struct Hazard<R> {
     /// The situation is unsafe: the driver reacts.
-    pub is_unsafe: bool,
+    pub is_unsafe: Flag,
     /// Deceleration that the driver asks for, m/s²; models without a demand ask for their largest.
     pub demand: R,
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking,
 };
+use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -91,9 +92,10 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
-        let near = view.lateral_gap <= self.lateral_gate;
-        let soon = dv != R::ZERO && view.gap.abs() <= dv.abs() * self.ttc_threshold(dv);
-        let is_unsafe = !view.is_behind() && (self.always_unsafe || (near && soon));
+        let near = !self.lateral_gate.is_below(view.lateral_gap);
+        let moves = dv.is_negative() | dv.is_positive();
+        let soon = moves & !(dv.abs() * self.ttc_threshold(dv)).is_below(view.gap.abs());
+        let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
         Hazard { is_unsafe, demand: self.deceleration }
     }
 

@@ -119,9 +119,9 @@ impl<R: Real> DriverModel<R> for Rss<R> {
     /// Unsafe iff g < d_lon and h < d_lat.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
-        let close = view.gap < self.longitudinal_distance(view.v_ego, view.v_other);
-        let beside = view.lateral_gap < self.lateral_distance(view.lateral_towards);
-        Hazard { is_unsafe: !view.is_behind() && close && beside, demand: self.max_deceleration }
+        let close = view.gap.is_below(self.longitudinal_distance(view.v_ego, view.v_other));
+        let beside = view.lateral_gap.is_below(self.lateral_distance(view.lateral_towards));
+        Hazard { is_unsafe: !view.is_behind() & close & beside, demand: self.max_deceleration }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {

@@ -7,6 +7,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::flag::Flag;
 use crate::criterion::{BrakeThreatMaximum, Contact, Criteria};
 use crate::driver::MODELS;
 use crate::scenario::Motion;
@@ -118,7 +119,7 @@ impl OutcomeRecord {
         let btn = BrakeThreatMaximum::from_quotient(
             self.btn_numerator,
             self.btn_denominator,
-            verdicts.failed(crate::criterion::Criterion::Btn),
+            Flag::of(verdicts.failed(crate::criterion::Criterion::Btn)),
         );
         Some(Outcome {
             verdicts,

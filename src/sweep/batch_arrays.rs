@@ -2,17 +2,22 @@
 
 use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::driver::DriverState;
-use crate::scenario::{Motion, Tables};
+use crate::flag::Flag;
 
 use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record, Whereabouts};
+use super::rules::Rules;
+use super::series::VehicleTracks;
+use super::window::Window;
 
 /// Lanes of a batch: one AVX-512 register of binary32.
 pub(super) const LANES: usize = 16;
-/// Steps whose motions are decoded ahead.
-pub(super) const BURST: usize = 32;
+/// Steps of a burst: a square of lanes and rows is turned in registers.
+pub(super) const ROWS: usize = 16;
 
-type Floats = [f32; LANES];
-type Words = [u32; LANES];
+/// One number per lane.
+pub(super) type Floats = [f32; LANES];
+/// One word per lane.
+pub(super) type Words = [u32; LANES];
 
 /// [`LaneConstants`] as arrays.
 #[derive(Debug, Clone, Copy)]
@@ -21,24 +26,24 @@ pub(super) struct ConstantsOfLanes {
     half_lengths: [Floats; 2],
     half_widths: [Floats; 2],
     present_from: [Words; 2],
-    pub(super) present_until: [Words; 2],
+    present_until: [Words; 2],
     attend_from: [Words; 2],
     judged: [Words; 2],
     ego_width: Floats,
-    pub(super) horizon: Words,
+    horizon: Words,
 }
 
 impl ConstantsOfLanes {
-    /// No vehicle is ever present, and nothing is ever over.
+    /// No vehicle is ever present.
     pub(super) const IDLE: Self = ConstantsOfLanes {
         half_lengths: [[0.0; LANES]; 2],
         half_widths: [[0.0; LANES]; 2],
         present_from: [[0; LANES]; 2],
         present_until: [[0; LANES]; 2],
-        attend_from: [[u32::MAX; LANES]; 2],
+        attend_from: [[0; LANES]; 2],
         judged: [[0; LANES]; 2],
         ego_width: [0.0; LANES],
-        horizon: [u32::MAX; LANES],
+        horizon: [0; LANES],
     };
 
     #[inline(always)]
@@ -50,11 +55,12 @@ impl ConstantsOfLanes {
             present_from: self.present_from[vehicle][k],
             present_until: self.present_until[vehicle][k],
             attend_from: self.attend_from[vehicle][k],
-            judged: self.judged[vehicle][k],
+            judged: Flag::from_bits(self.judged[vehicle][k]),
         };
         LaneConstants { others: [other(0), other(1)], ego_width: self.ego_width[k], horizon: self.horizon[k] }
     }
 
+    #[inline(always)]
     pub(super) fn set(&mut self, k: usize, lane: &LaneConstants<f32>) {
         for (vehicle, other) in lane.others.iter().enumerate() {
             self.half_lengths[vehicle][k] = other.half_lengths;
@@ -62,7 +68,7 @@ impl ConstantsOfLanes {
             self.present_from[vehicle][k] = other.present_from;
             self.present_until[vehicle][k] = other.present_until;
             self.attend_from[vehicle][k] = other.attend_from;
-            self.judged[vehicle][k] = other.judged;
+            self.judged[vehicle][k] = other.judged.to_bits();
         }
         self.ego_width[k] = lane.ego_width;
         self.horizon[k] = lane.horizon;
@@ -87,8 +93,7 @@ pub(super) struct StateOfLanes {
     btn_denominator: Floats,
     btn_failed: Words,
     min_gap: Floats,
-    /// 1 where the last step was the lane's last.
-    pub(super) ended: Words,
+    pub(super) over: Words,
 }
 
 impl StateOfLanes {
@@ -107,7 +112,7 @@ impl StateOfLanes {
         btn_denominator: [0.0; LANES],
         btn_failed: [0; LANES],
         min_gap: [0.0; LANES],
-        ended: [0; LANES],
+        over: [u32::MAX; LANES],
     };
 
     #[inline(always)]
@@ -120,35 +125,55 @@ impl StateOfLanes {
             driver: DriverState { deceleration: self.deceleration[k], delay_steps: self.delay_steps[k] },
             reaction_step: self.reaction_step[k],
             record: Record {
-                ttc: TtcMinimum { gap: self.ttc_gap[k], closing: self.ttc_closing[k], failed: self.ttc_failed[k] != 0 },
+                ttc: TtcMinimum { gap: self.ttc_gap[k], closing: self.ttc_closing[k], failed: Flag::from_bits(self.ttc_failed[k]) },
                 btn: BrakeThreatMaximum {
                     numerator: self.btn_numerator[k],
                     denominator: self.btn_denominator[k],
-                    failed: self.btn_failed[k] != 0,
+                    failed: Flag::from_bits(self.btn_failed[k]),
                 },
                 min_gap: self.min_gap[k],
             },
+            over: Flag::from_bits(self.over[k]),
+        }
+    }
+
+    /// All of a lane.
+    #[inline(always)]
+    pub(super) fn set(&mut self, k: usize, lane: &LaneState<f32>) {
+        self.set_verdicts(k, lane);
+        self.gaps[1][k] = lane.gaps[1];
+        self.reaction_step[k] = lane.reaction_step;
+        self.ttc_gap[k] = lane.record.ttc.gap;
+        self.ttc_closing[k] = lane.record.ttc.closing;
+        self.btn_numerator[k] = lane.record.btn.numerator;
+        self.btn_denominator[k] = lane.record.btn.denominator;
+        self.min_gap[k] = lane.record.min_gap;
+    }
+
+    /// What moves in a step under these rules.
+    #[inline(always)]
+    pub(super) fn set_moved(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
+        if !rules.is_verdict_only {
+            self.set(k, lane);
+        } else if rules.is_pair {
+            self.set_verdicts(k, lane);
+            self.gaps[1][k] = lane.gaps[1];
+        } else {
+            self.set_verdicts(k, lane);
         }
     }
 
     #[inline(always)]
-    pub(super) fn set(&mut self, k: usize, lane: &LaneState<f32>, ended: bool) {
+    fn set_verdicts(&mut self, k: usize, lane: &LaneState<f32>) {
         self.index[k] = lane.index;
         self.v_ego[k] = lane.v_ego;
         self.v_before[k] = lane.v_before;
         self.gaps[0][k] = lane.gaps[0];
-        self.gaps[1][k] = lane.gaps[1];
         self.deceleration[k] = lane.driver.deceleration;
         self.delay_steps[k] = lane.driver.delay_steps;
-        self.reaction_step[k] = lane.reaction_step;
-        self.ttc_gap[k] = lane.record.ttc.gap;
-        self.ttc_closing[k] = lane.record.ttc.closing;
-        self.ttc_failed[k] = u32::from(lane.record.ttc.failed);
-        self.btn_numerator[k] = lane.record.btn.numerator;
-        self.btn_denominator[k] = lane.record.btn.denominator;
-        self.btn_failed[k] = u32::from(lane.record.btn.failed);
-        self.min_gap[k] = lane.record.min_gap;
-        self.ended[k] = u32::from(ended);
+        self.ttc_failed[k] = lane.record.ttc.failed.to_bits();
+        self.btn_failed[k] = lane.record.btn.failed.to_bits();
+        self.over[k] = lane.over.to_bits();
     }
 }
 
@@ -156,43 +181,38 @@ impl StateOfLanes {
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct PlacesOfLanes {
-    speed: [[Floats; BURST]; 2],
-    position: [[Floats; BURST]; 2],
-    towards: [[Floats; BURST]; 2],
+    speed: [Window; 2],
+    position: [Window; 2],
+    towards: [Window; 2],
 }
 
 impl PlacesOfLanes {
-    pub(super) const IDLE: Self = PlacesOfLanes {
-        speed: [[[0.0; LANES]; BURST]; 2],
-        position: [[[0.0; LANES]; BURST]; 2],
-        towards: [[[0.0; LANES]; BURST]; 2],
-    };
+    pub(super) const IDLE: Self =
+        PlacesOfLanes { speed: [Window::IDLE; 2], position: [Window::IDLE; 2], towards: [Window::IDLE; 2] };
 
     #[inline(always)]
     pub(super) fn at(&self, row: usize, k: usize) -> [Whereabouts<f32>; 2] {
         let place = |vehicle: usize| Whereabouts {
-            speed: self.speed[vehicle][row][k],
-            position: self.position[vehicle][row][k],
-            towards: self.towards[vehicle][row][k],
+            speed: self.speed[vehicle].rows[row][k],
+            position: self.position[vehicle].rows[row][k],
+            towards: self.towards[vehicle].rows[row][k],
         };
         [place(0), place(1)]
     }
 
-    /// Decodes a motion from a step on, into the rows from `row` on.
-    pub(super) fn fill(
-        &mut self,
-        vehicle: usize,
-        k: usize,
-        row: usize,
-        motion: &Motion<f32>,
-        tables: &Tables<f32>,
-        step: u32,
-    ) {
-        for ahead in row..BURST {
-            let place = Whereabouts::of(motion, tables, step + (ahead - row) as u32);
-            self.speed[vehicle][ahead][k] = place.speed;
-            self.position[vehicle][ahead][k] = place.position;
-            self.towards[vehicle][ahead][k] = place.towards;
+    /// Gives a slot the series of its next lane.
+    #[inline(always)]
+    pub(super) fn set(&mut self, k: usize, tracks: &[VehicleTracks; 2], entries: &[f32], vehicles: usize) {
+        for (vehicle, tracks) in tracks.iter().enumerate().take(vehicles) {
+            self.speed[vehicle].set(k, tracks.speed, entries);
+            self.position[vehicle].set(k, tracks.position, entries);
+            self.towards[vehicle].set(k, tracks.towards, entries);
         }
+    }
+
+    /// The windows of a vehicle.
+    #[inline(always)]
+    pub(super) fn windows(&mut self, vehicle: usize) -> [&mut Window; 3] {
+        [&mut self.speed[vehicle], &mut self.position[vehicle], &mut self.towards[vehicle]]
     }
 }

@@ -15,7 +15,13 @@ use crate::Result;
 use crate::scalar::Real;
 
 /// Lanes per model from which on a task keeps its batches full nearly all the time.
-const FULL_TASK: u64 = 2048;
+const FULL_TASK: u64 = 8192;
+/// Lanes per model below which tasks are not cut for the sake of more of them.
+const SMALL_TASK: u64 = 2048;
+/// Tasks that every thread should have, so that none is left waiting for long.
+const TASKS_PER_THREAD: u64 = 4;
+/// Cases of a task at most: their motions are unrolled, some kilobytes each.
+const TASK_CASES: u64 = 2048;
 
 /// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
 #[derive(Debug)]
@@ -70,11 +76,10 @@ impl Backend for CpuBackend<f32> {
         if instructions == Instructions::Scalar {
             return Ok(Box::new(lane_by_lane(plan, runner)));
         }
-        let least_lanes = FULL_TASK * plan.models.len() as u64;
         let run = move |block: usize, units, values: bool, each: &mut dyn FnMut(usize, Outcome<f32>)| {
             runner.run_units(instructions, block, units, values, each);
         };
-        Ok(Box::new(CpuSession { plan, run, least_lanes, outcome: PhantomData }))
+        Ok(Box::new(CpuSession { plan, run, in_batches: true, outcome: PhantomData }))
     }
 }
 
@@ -99,7 +104,7 @@ fn lane_by_lane<'p, R: Real>(
             runner.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
         }
     };
-    CpuSession { plan, run, least_lanes: 1, outcome: PhantomData }
+    CpuSession { plan, run, in_batches: false, outcome: PhantomData }
 }
 
 /// Runs the lanes of some units of a block and gives each with its position, counted from the first unit on.
@@ -111,18 +116,23 @@ impl<R, F: Fn(usize, Range<u64>, bool, &mut dyn FnMut(usize, Outcome<R>)) + Sync
 struct CpuSession<'p, F, R> {
     plan: &'p LanePlan,
     run: F,
-    /// Lanes that a task should have.
-    least_lanes: u64,
+    /// Tasks want many lanes.
+    in_batches: bool,
     outcome: PhantomData<fn(R)>,
 }
 
 impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
-    /// Units per task: enough lanes, but some tasks for every thread where there are more.
+    /// Units per task: enough lanes to fill batches, but some tasks for every thread where there are more.
     fn task_units(&self, block: usize, units: u64) -> u64 {
-        let per_unit = self.plan.lanes_per_unit(&self.plan.blocks[block]).max(1);
-        let least = self.least_lanes.div_ceil(per_unit);
-        let fair = units.div_ceil(rayon::current_num_threads() as u64);
-        least.min(fair).max(1)
+        if !self.in_batches {
+            return 1;
+        }
+        let block = &self.plan.blocks[block];
+        let per_unit_and_model = (block.variants.len() * self.plan.headways.len()).max(1) as u64;
+        let threads = rayon::current_num_threads() as u64;
+        let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_CASES / block.variants.len().max(1) as u64).max(1);
+        let least = SMALL_TASK.div_ceil(per_unit_and_model).min(most);
+        units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)
     }
 
     /// Units of a task, counted within the block.

@@ -6,12 +6,14 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::batch::{Rules, Stream, Waiting, run_stream};
+use super::batch::Fleet;
 use super::frame::{Frame, Simulation, Start};
 use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
+use super::rules::{Rules, Stream};
 use super::simd::burst_for;
+use super::stream::{Waiting, run_stream};
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
@@ -70,12 +72,12 @@ macro_rules! declare_constants {
 
         impl Constants<f32> {
             /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. Gives `false`, and takes no
-            /// lane, where lanes run one by one instead.
+            /// lane, where lanes run one by one instead. `entries` are the series that the lanes point into.
             pub(super) fn run_stream<'c>(
                 &self,
                 id: ModelId,
                 stream: Stream,
-                tables: &Tables<f32>,
+                entries: &[f32],
                 next: impl FnMut() -> Option<Waiting<'c>>,
                 each: impl FnMut(usize, Outcome<f32>),
             ) -> bool {
@@ -87,8 +89,8 @@ macro_rules! declare_constants {
                         let model = &self.$file;
                         let Some(burst) = burst_for(stream.instructions, rules) else { return false };
                         let simulation = Simulation { frame, criteria, model, model_index };
-                        let steps = |batch: &mut _, row, until| burst.run(&simulation, batch, row, until);
-                        run_stream(&simulation, tables, steps, next, each);
+                        let steps = |fleet: &mut Fleet, entries: &[f32]| burst.run(&simulation, fleet, entries);
+                        run_stream(&simulation, stream.is_pair, entries, steps, next, each);
                     })+
                 }
                 true

@@ -63,7 +63,7 @@ pub fn run_lane<R: Real, M: DriverModel<R>>(
         let moved = advance(simulation, is_pair, &lane, &state, &places);
         observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
         state = moved.state;
-        if moved.ended || state.index >= simulation.frame.step_cap {
+        if state.over.holds() || state.index >= simulation.frame.step_cap {
             return conclude(simulation, is_pair, &lane, &state, &places);
         }
     }

@@ -4,10 +4,12 @@
 //! Order inside a step: the gap moves to i, the state at i gives the criteria and the contact, then the check,
 //! then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32 keeps millimetres.
 //!
-//! No loop, no early return and no effect: so a compiler can run the step for many lanes at once.
+//! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
+//! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
 
-use crate::criterion::{BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact};
+use crate::criterion::{BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact, overlaps};
 use crate::driver::{DriverModel, DriverState, Hazard, View};
+use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::{Motion, Tables};
 
@@ -28,8 +30,8 @@ pub struct OtherConstants<R> {
     pub present_until: u32,
     /// First step at which the lane's driver may react to it.
     pub attend_from: u32,
-    /// 1 where the criteria judge it.
-    pub judged: u32,
+    /// The criteria judge it.
+    pub judged: Flag,
 }
 
 /// What a lane's steps need to know, constant within the lane.
@@ -47,19 +49,20 @@ impl<R: Real> LaneConstants<R> {
     /// Of a case under a model.
     #[inline(always)]
     pub fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
+        let known = |step: u32| step.min(Flag::LATEST_STEP);
         let of = |other: &LaneOther<R>| OtherConstants {
             half_lengths: other.half_lengths,
             half_widths: other.half_widths,
-            present_from: other.present_from,
-            present_until: if other.used != 0 { other.present_until } else { 0 },
-            attend_from: other.attend_from[simulation.model_index],
-            judged: other.judged,
+            present_from: known(other.present_from),
+            present_until: if other.used != 0 { known(other.present_until) } else { 0 },
+            attend_from: known(other.attend_from[simulation.model_index]),
+            judged: Flag::of(other.judged != 0),
         };
         LaneConstants {
             others: [of(&case.others[0]), of(&case.others[1])],
             ego_width: case.ego_width,
             // No step has this index: the step cap is below it.
-            horizon: if simulation.frame.end_when_settled { case.horizon } else { u32::MAX },
+            horizon: known(if simulation.frame.end_when_settled { case.horizon } else { Flag::LATEST_STEP }),
         }
     }
 }
@@ -92,9 +95,9 @@ pub struct Seen<R> {
     /// Lateral position, m.
     pub lateral: R,
     /// Present for the ego at this step.
-    pub present: bool,
+    pub present: Flag,
     /// TTC and BTN look at it.
-    pub judged: bool,
+    pub judged: Flag,
 }
 
 /// What the steps of a lane have gathered so far.
@@ -125,6 +128,8 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
+    /// The last step has been made, even if the time cap is far: [`conclude`] says why. Steps change nothing more.
+    pub over: Flag,
 }
 
 impl<R: Real> LaneState<R> {
@@ -143,6 +148,7 @@ impl<R: Real> LaneState<R> {
             driver: simulation.model.initial(),
             reaction_step: NO_STEP,
             record: Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: R::INFINITY },
+            over: Flag::FALSE,
         }
     }
 }
@@ -156,12 +162,11 @@ pub struct Moved<R> {
     pub seen: [Seen<R>; 2],
     /// The result of the check that counts.
     pub hazard: Hazard<R>,
-    /// It was the lane's last step, even if the time cap is far: [`conclude`] says why.
-    pub ended: bool,
 }
 
 /// One step; `places` are the other vehicles at `state.index`. `is_pair` says whether the second one is used. The
-/// lane is over where this says so, or where the next index reaches the step cap.
+/// lane is over where its state says so, or where the next index reaches the step cap; one that is over stays as it
+/// is.
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
@@ -172,51 +177,55 @@ pub fn advance<R: Real, M: DriverModel<R>>(
 ) -> Moved<R> {
     let &Simulation { frame, criteria, model, .. } = simulation;
     let &LaneState { index, v_ego, .. } = state;
+    let runs = !state.over;
     let ego = Ego { v: v_ego, a: (v_ego - state.v_before) * frame.inverse_dt, width: lane.ego_width };
+    // Step 0 is the start itself, unless index 0 is one step after it.
+    let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
     let mut gaps = state.gaps;
-    gaps[0] = moved_gap(frame, state, gaps[0], &places[0]);
-    let first = see(criteria, &ego, &lane.others[0], &places[0], gaps[0], index);
+    gaps[0] = moves.choose(moved_gap(frame, &ego, gaps[0], &places[0]), gaps[0]);
+    let first = see(criteria, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
     let mut record = judge(criteria, &state.record, &first);
     let mut hazard = check(model, &first, &lane.others[0], index);
-    let mut touched = touches(&first, &lane.others[0]) != Contact::None;
+    let mut touched = touches(&first, &lane.others[0]);
     let mut settled = is_settled(&first);
     let mut aborted = aborts(frame, &first);
     let mut second = first;
     if is_pair {
-        gaps[1] = moved_gap(frame, state, gaps[1], &places[1]);
-        second = see(criteria, &ego, &lane.others[1], &places[1], gaps[1], index);
+        gaps[1] = moves.choose(moved_gap(frame, &ego, gaps[1], &places[1]), gaps[1]);
+        second = see(criteria, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
         record = judge(criteria, &record, &second);
         let other_hazard = check(model, &second, &lane.others[1], index);
         // The nearest unsafe vehicle drives the reaction.
-        let nearer = other_hazard.is_unsafe && (!hazard.is_unsafe || gaps[1] < gaps[0]);
+        let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
         hazard = Hazard {
-            is_unsafe: hazard.is_unsafe || other_hazard.is_unsafe,
-            demand: if nearer { other_hazard.demand } else { hazard.demand },
+            is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
+            demand: nearer.choose(other_hazard.demand, hazard.demand),
         };
-        touched = touched || touches(&second, &lane.others[1]) != Contact::None;
-        settled = settled && is_settled(&second);
-        aborted = aborted || aborts(frame, &second);
+        touched = touched | touches(&second, &lane.others[1]);
+        settled = settled & is_settled(&second);
+        aborted = aborted | aborts(frame, &second);
     }
-    let over = index >= lane.horizon;
-    let at_rest = v_ego <= R::ZERO;
-    let ended = touched || aborted || (over && (at_rest || settled));
+    let at_rest = !v_ego.is_positive();
+    let past_horizon = Flag::reached(index, lane.horizon);
+    let over = state.over | touched | aborted | (past_horizon & (at_rest | settled));
 
     // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
     let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
-    let is_first = hazard.is_unsafe && state.reaction_step == NO_STEP;
+    let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
     let state = LaneState {
-        index: index + 1,
-        v_ego: if hazard.is_unsafe { v_reacting } else { v_ego },
-        v_before: v_ego,
+        index: runs.choose(index + 1, index),
+        v_ego: hazard.is_unsafe.choose(v_reacting, v_ego),
+        v_before: runs.choose(v_ego, state.v_before),
         gaps,
         driver: DriverState {
-            deceleration: if hazard.is_unsafe { reacting.deceleration } else { state.driver.deceleration },
-            delay_steps: if hazard.is_unsafe { reacting.delay_steps } else { state.driver.delay_steps },
+            deceleration: hazard.is_unsafe.choose(reacting.deceleration, state.driver.deceleration),
+            delay_steps: hazard.is_unsafe.choose(reacting.delay_steps, state.driver.delay_steps),
         },
-        reaction_step: if is_first { index } else { state.reaction_step },
+        reaction_step: is_first.choose(index, state.reaction_step),
         record,
+        over,
     };
-    Moved { state, seen: [first, second], hazard, ended }
+    Moved { state, seen: [first, second], hazard }
 }
 
 /// The outcome of a lane whose last step has just been made, at these places.
@@ -231,16 +240,17 @@ pub fn conclude<R: Real, M>(
     let &Simulation { frame, criteria, .. } = simulation;
     let index = state.index - 1;
     let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
-    let first = see(criteria, &ego, &lane.others[0], &places[0], state.gaps[0], index);
-    let second = if is_pair { see(criteria, &ego, &lane.others[1], &places[1], state.gaps[1], index) } else { first };
-    let first_touch = touches(&first, &lane.others[0]);
+    let seen = |k: usize| see(criteria, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
+    let first = seen(0);
+    let second = if is_pair { seen(1) } else { first };
+    let first_touch = touch(&first, &lane.others[0]);
     let by_second = is_pair && first_touch == Contact::None;
-    let contact = if by_second { touches(&second, &lane.others[1]) } else { first_touch };
+    let contact = if by_second { touch(&second, &lane.others[1]) } else { first_touch };
     let closing = if by_second { second.view.closing() } else { first.view.closing() };
     let collided = contact != Contact::None;
-    let aborted = aborts(frame, &first) || (is_pair && aborts(frame, &second));
+    let aborted = (aborts(frame, &first) | aborts(frame, &second)).holds();
     let over = index >= lane.horizon;
-    let settled = is_settled(&first) && is_settled(&second);
+    let settled = (is_settled(&first) & is_settled(&second)).holds();
     let end = if collided {
         EndReason::Contact
     } else if aborted {
@@ -259,8 +269,8 @@ pub fn conclude<R: Real, M>(
     Outcome {
         verdicts: Verdicts(
             bit(Criterion::Collision, collided)
-                | bit(Criterion::Ttc, record.ttc.failed)
-                | bit(Criterion::Btn, btn.failed)
+                | bit(Criterion::Ttc, record.ttc.failed.holds())
+                | bit(Criterion::Btn, btn.failed.holds())
                 | capped,
         ),
         contact,
@@ -284,13 +294,13 @@ struct Ego<R> {
     width: R,
 }
 
-/// The gap at the step to come. Step 0 is the start itself, unless index 0 is one step after it.
+/// The gap a step later.
 #[inline(always)]
-fn moved_gap<R: Real>(frame: &Frame<R>, state: &LaneState<R>, gap: R, place: &Whereabouts<R>) -> R {
-    let moves = frame.start_shift || state.index > 0;
-    if moves { gap + (place.speed - state.v_ego) * frame.dt } else { gap }
+fn moved_gap<R: Real>(frame: &Frame<R>, ego: &Ego<R>, gap: R, place: &Whereabouts<R>) -> R {
+    gap + (place.speed - ego.v) * frame.dt
 }
 
+/// `runs`: the lane is not over; else nothing is there to be seen.
 #[inline(always)]
 fn see<R: Real>(
     criteria: &Criteria<R>,
@@ -299,6 +309,7 @@ fn see<R: Real>(
     place: &Whereabouts<R>,
     gap: R,
     index: u32,
+    runs: Flag,
 ) -> Seen<R> {
     let view = View {
         v_ego: ego.v,
@@ -309,11 +320,9 @@ fn see<R: Real>(
         lateral_towards: place.towards,
         half_lengths: other.half_lengths,
     };
-    let present = index >= other.present_from && index < other.present_until;
-    let judged = present
-        && other.judged != 0
-        && criteria.sees(gap, other.half_lengths, view.lateral_gap, place.position, ego.width);
-    Seen { view, lateral: place.position, present, judged }
+    let present = runs & Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until);
+    let is_seen = criteria.sees(gap, other.half_lengths, view.lateral_gap, place.position, ego.width);
+    Seen { view, lateral: place.position, present, judged: present & other.judged & is_seen }
 }
 
 #[inline(always)]
@@ -322,7 +331,7 @@ fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) ->
     let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing);
     let btn = criteria.btn.update(record.btn, seen.judged, gap, closing);
     if criteria.keeps_values {
-        let min_gap = if seen.judged { gap.smaller(record.min_gap) } else { record.min_gap };
+        let min_gap = seen.judged.choose(gap.smaller(record.min_gap), record.min_gap);
         Record { ttc, btn, min_gap }
     } else {
         // A compiler leaves the rest of the updates out.
@@ -335,29 +344,35 @@ fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) ->
 #[inline(always)]
 fn check<R: Real, M: DriverModel<R>>(model: &M, seen: &Seen<R>, other: &OtherConstants<R>, index: u32) -> Hazard<R> {
     let hazard = model.check(&seen.view);
-    let attentive = seen.present && index >= other.attend_from;
-    Hazard { is_unsafe: hazard.is_unsafe && attentive, demand: hazard.demand }
+    let attentive = seen.present & Flag::reached(index, other.attend_from);
+    Hazard { is_unsafe: hazard.is_unsafe & attentive, demand: hazard.demand }
 }
 
 #[inline(always)]
-fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
-    if seen.present && other.judged != 0 {
-        contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
-    } else {
-        Contact::None
-    }
+fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
+    seen.present & other.judged & overlaps(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
+}
+
+#[inline(always)]
+fn touch<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
+    let is_judged = (seen.present & other.judged).holds();
+    if is_judged { contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap) } else { Contact::None }
 }
 
 /// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
 #[inline(always)]
-fn is_settled<R: Real>(seen: &Seen<R>) -> bool {
-    let in_lane = seen.judged || (seen.present && seen.view.lateral_gap < R::ZERO);
-    seen.view.is_behind() || !in_lane || seen.view.closing() <= R::ZERO
+fn is_settled<R: Real>(seen: &Seen<R>) -> Flag {
+    let in_lane = seen.judged | (seen.present & seen.view.lateral_gap.is_negative());
+    seen.view.is_behind() | !in_lane | !seen.view.closing().is_positive()
 }
 
 #[inline(always)]
-fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> bool {
-    let overlap = seen.present && seen.view.lateral_gap < R::ZERO && !seen.view.is_behind();
-    let far = seen.view.gap.abs() > frame.abort_above_ttc * seen.view.closing().abs();
-    frame.abort_above_ttc > R::ZERO && overlap && far
+fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> Flag {
+    if frame.abort_above_ttc > R::ZERO {
+        let overlap = seen.present & seen.view.lateral_gap.is_negative() & !seen.view.is_behind();
+        let limit = frame.abort_above_ttc * seen.view.closing().abs();
+        overlap & limit.is_below(seen.view.gap.abs())
+    } else {
+        Flag::FALSE
+    }
 }

@@ -22,12 +22,16 @@ mod partial;
 mod plan;
 mod plan_file;
 mod recheck;
+mod rules;
 mod run;
 mod runner;
+mod series;
 mod simd;
+mod stream;
 mod study;
 mod trace;
 mod units;
+mod window;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
 pub use cpu::CpuBackend;

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::batch::{Stream, Waiting};
 use super::drivers::Constants;
 use super::frame::Start;
 use super::instructions::Instructions;
@@ -11,6 +10,9 @@ use super::lane::Silent;
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::plan::{LaneKey, LanePlan};
+use super::rules::Stream;
+use super::series::Series;
+use super::stream::Waiting;
 use crate::driver::ModelId;
 use crate::scalar::Real;
 use crate::scenario::Tables;
@@ -106,17 +108,20 @@ impl LaneRunner<'_, f32> {
             }
         };
         let stream = Stream { instructions, is_pair: cases.iter().any(|case| case.pair != 0), values };
+        let step_cap = self.plan.profile.step_cap();
+        let mut series = Series::default();
+        let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let waiting = |lane: usize| {
-                let case = cases.get(lane / self.starts.len())?;
-                let start = self.starts[lane % self.starts.len()];
-                Some(Waiting { case, start, at: lane * models + at_model })
+                let (at_case, at_start) = (lane / self.starts.len(), lane % self.starts.len());
+                let (case, tracks) = (cases.get(at_case)?, &tracks[at_case]);
+                Some(Waiting { case, tracks, start: self.starts[at_start], at: lane * models + at_model })
             };
             let mut lanes = 0..;
             let next = || waiting(lanes.next()?);
             let constants = &self.constants[block];
-            if !constants.run_stream(model, stream, tables, next, &mut each) {
-                for Waiting { case, start, at } in (0..).map_while(waiting) {
+            if !constants.run_stream(model, stream, series.entries(), next, &mut each) {
+                for Waiting { case, start, at, .. } in (0..).map_while(waiting) {
                     each(at, self.run_case(block, case, tables, start, model));
                 }
             }

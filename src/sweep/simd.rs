@@ -4,25 +4,29 @@
 
 #![allow(unsafe_code)] // calls of functions compiled for an instruction set, after the machine was asked for it
 
-use super::batch::{Batch, Rules, burst};
+use super::batch::{Fleet, Slots, burst};
+#[cfg(target_arch = "x86_64")]
+use super::batch_arrays::{LANES, ROWS, Words};
 use super::frame::Simulation;
 use super::instructions::Instructions;
+use super::rules::Rules;
+use super::window::Window;
 use crate::driver::DriverModel;
 
 /// [`burst`] compiled for an instruction set and a set of rules.
 ///
 /// Only [`burst_for`] makes one, and only for instructions that the machine has.
 pub(super) struct Burst<M> {
-    run: unsafe fn(&Simulation<f32, M>, &mut Batch, usize, usize) -> usize,
+    run: unsafe fn(&Simulation<f32, M>, &mut Fleet, &[f32]) -> Slots,
 }
 
 impl<M> Burst<M> {
     /// Runs it.
     #[inline]
-    pub(super) fn run(&self, simulation: &Simulation<f32, M>, batch: &mut Batch, row: usize, until: usize) -> usize {
+    pub(super) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet, entries: &[f32]) -> Slots {
         // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
         // asked the machine for them.
-        unsafe { (self.run)(simulation, batch, row, until) }
+        unsafe { (self.run)(simulation, fleet, entries) }
     }
 }
 
@@ -75,30 +79,69 @@ pub(super) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: 
 #[target_feature(enable = "avx2")]
 fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    batch: &mut Batch,
-    row: usize,
-    until: usize,
-) -> usize {
-    burst::<M, RULES>(simulation, batch, row, until)
+    fleet: &mut Fleet,
+    entries: &[f32],
+) -> Slots {
+    burst::<M, RULES>(simulation, fleet, entries, Window::turn)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    batch: &mut Batch,
-    row: usize,
-    until: usize,
-) -> usize {
-    burst::<M, RULES>(simulation, batch, row, until)
+    fleet: &mut Fleet,
+    entries: &[f32],
+) -> Slots {
+    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| turn_avx512(window, steps, entries))
 }
 
 #[cfg(target_arch = "aarch64")]
 fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    batch: &mut Batch,
-    row: usize,
-    until: usize,
-) -> usize {
-    burst::<M, RULES>(simulation, batch, row, until)
+    fleet: &mut Fleet,
+    entries: &[f32],
+) -> Slots {
+    burst::<M, RULES>(simulation, fleet, entries, Window::turn)
+}
+
+/// [`Window::turn`] in registers: a square of 16 lanes and 16 steps is transposed by 64 shuffles.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+#[inline]
+fn turn_avx512(window: &mut Window, steps: &Words, entries: &[f32]) {
+    use std::arch::x86_64::*;
+    const { assert!(LANES == 16 && ROWS == 16) };
+    let places = window.places(steps);
+    let furthest = places.iter().fold(0, |a: u32, &b| a.max(b)) as usize;
+    assert!(furthest + ROWS <= entries.len(), "a lane reads beyond the series");
+    // SAFETY: each place has ROWS entries after it, as has just been asserted.
+    let mut r: [__m512; 16] = places.map(|from| unsafe { _mm512_loadu_ps(entries.as_ptr().add(from as usize)) });
+    // Squares of 4 by 4, within the quarters of the registers.
+    for lanes in r.chunks_exact_mut(4) {
+        let low_01 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[0], lanes[1]));
+        let high_01 = _mm512_castps_pd(_mm512_unpackhi_ps(lanes[0], lanes[1]));
+        let low_23 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[2], lanes[3]));
+        let high_23 = _mm512_castps_pd(_mm512_unpackhi_ps(lanes[2], lanes[3]));
+        lanes[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(low_01, low_23));
+        lanes[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(low_01, low_23));
+        lanes[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(high_01, high_23));
+        lanes[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(high_01, high_23));
+    }
+    // Register 4q + j has, in quarter p, step 4p + j of lanes 4q to 4q + 3: the quarters change places.
+    for j in 0..4 {
+        let (a, b, c, d) = (r[j], r[4 + j], r[8 + j], r[12 + j]);
+        let (low_ab, high_ab) = (_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b));
+        let (low_cd, high_cd) = (_mm512_shuffle_f32x4::<0x44>(c, d), _mm512_shuffle_f32x4::<0xee>(c, d));
+        let rows = [
+            _mm512_shuffle_f32x4::<0x88>(low_ab, low_cd),
+            _mm512_shuffle_f32x4::<0xdd>(low_ab, low_cd),
+            _mm512_shuffle_f32x4::<0x88>(high_ab, high_cd),
+            _mm512_shuffle_f32x4::<0xdd>(high_ab, high_cd),
+        ];
+        for (p, row) in rows.into_iter().enumerate() {
+            // SAFETY: a row has 16 numbers.
+            unsafe { _mm512_storeu_ps(window.rows[4 * p + j].as_mut_ptr(), row) };
+        }
+    }
+    window.moves = window.goes_on(steps);
 }

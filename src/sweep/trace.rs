@@ -139,8 +139,8 @@ impl Trace {
                 x_ego_m,
                 v_ego_mps,
                 a_ego_mps2: step.seen[0].view.a_ego.to_f64(),
-                is_unsafe: hazard.is_unsafe,
-                demand_mps2: hazard.is_unsafe.then(|| hazard.demand.to_f64()),
+                is_unsafe: hazard.is_unsafe.holds(),
+                demand_mps2: hazard.is_unsafe.holds().then(|| hazard.demand.to_f64()),
                 others: step.seen.map(|seen| vehicle(&measures, &seen, x_ego_m)),
             });
         };
@@ -205,8 +205,8 @@ fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> 
         btn: measures.criteria.btn.at(gap_m, closing),
         pfs: measures.fsm.pfs(view.v_ego, view.v_other, gap_m),
         cfs: measures.fsm.cfs(view.v_ego, view.v_other, gap_m, view.a_ego),
-        is_present: seen.present,
-        is_judged: seen.judged,
+        is_present: seen.present.holds(),
+        is_judged: seen.judged.holds(),
     }
 }
 

@@ -5,6 +5,7 @@ use super::decision::{HEADWAYS, Threshold};
 use super::draw::{Draw, Purpose};
 use super::series::{Across, Series, TINY, rounded};
 use super::solve::{hit, next_other, turn};
+use crate::flag::Flag;
 use crate::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::driver::{DriverModel, MODELS, View};
 use crate::profile::Profile;
@@ -138,11 +139,11 @@ impl Scenes {
         // The smallest gap that matters: centres side by side.
         let nearest = -s.half_lengths;
         let signed = |draw: &mut Draw, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
-        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), true, gap, dv);
+        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv);
         let fsm = &constants.fsm;
         s.gap = match on {
             Threshold::Ttc => criteria.ttc.threshold * dv,
-            Threshold::Btn => turn(0.01, FAR, |gap| judged(gap).failed)?.1,
+            Threshold::Btn => turn(0.01, FAR, |gap| judged(gap).failed.holds())?.1,
             Threshold::BtnRoom => turn(0.01, FAR, |gap| criteria.btn.value(&judged(gap)).is_infinite())?.0,
             Threshold::Reg157Ttc | Threshold::CchdmTtc => {
                 if draw.chance(0.25) {
@@ -168,7 +169,7 @@ impl Scenes {
                 if s.half_widths < 0.3 {
                     return None;
                 }
-                let open = |gap: f32| fsm.check(&self.view(&Scene { gap, ..s })).is_unsafe;
+                let open = |gap: f32| fsm.check(&self.view(&Scene { gap, ..s })).is_unsafe.holds();
                 turn(nearest, about + 0.5 * (reach - about), open)?.1
             }
             Threshold::Behind => -(s.half_lengths + s.half_lengths),

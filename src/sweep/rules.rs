@@ -1,0 +1,77 @@
+//! What all lanes of a stream share and a loop need not ask: each set of rules has a loop of its own.
+
+use crate::criterion::{BtnForm, Criteria, LateralGate};
+
+use super::frame::Frame;
+use super::instructions::Instructions;
+
+/// What is known of a stream of lanes before it runs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stream {
+    /// Instructions that it is to run on.
+    pub instructions: Instructions,
+    /// Some case has a second vehicle.
+    pub is_pair: bool,
+    /// Continuous values are wanted, not verdicts alone.
+    pub values: bool,
+}
+
+/// What all lanes of a batch share and a loop need not ask: each set has its own loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rules {
+    /// Some case has a second vehicle.
+    pub is_pair: bool,
+    is_ratio: bool,
+    sees_overlap: bool,
+    aborts: bool,
+    /// Only verdicts are wanted: smallest and largest values are not gathered.
+    pub is_verdict_only: bool,
+}
+
+impl Rules {
+    /// Number of sets.
+    pub(super) const SETS: u32 = 20;
+
+    /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
+    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, stream: Stream) -> Option<Rules> {
+        let Stream { is_pair, values, .. } = stream;
+        let is_ratio = match criteria.btn.form() {
+            BtnForm::EquivalentDelay => false,
+            BtnForm::DistanceRatio => true,
+            BtnForm::Exact => return None,
+        };
+        let sees_overlap = criteria.gate == LateralGate::Overlap;
+        let aborts = frame.abort_above_ttc > 0.0;
+        // Seldom used rules have no loop of their own for verdicts alone.
+        Some(Rules { is_pair, is_ratio, sees_overlap, aborts, is_verdict_only: !values && !is_ratio && !aborts })
+    }
+
+    /// As a number below [`Rules::SETS`].
+    pub(super) const fn bits(self) -> u32 {
+        let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
+        self.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
+    }
+
+    /// From that number.
+    pub(super) const fn from_bits(bits: u32) -> Rules {
+        let seldom = bits >> 2;
+        Rules {
+            is_pair: bits & 1 != 0,
+            sees_overlap: bits & 2 != 0,
+            is_ratio: seldom & 1 != 0,
+            aborts: seldom & 2 != 0,
+            is_verdict_only: seldom & 4 != 0,
+        }
+    }
+
+    /// The constants with everything that these rules decide written as constants.
+    #[inline(always)]
+    pub(super) fn applied(self, frame: &Frame<f32>, criteria: &Criteria<f32>) -> (Frame<f32>, Criteria<f32>) {
+        let form = if self.is_ratio { BtnForm::DistanceRatio } else { BtnForm::EquivalentDelay };
+        let gate = if self.sees_overlap { LateralGate::Overlap } else { LateralGate::EgoWidth };
+        let abort_above_ttc = if self.aborts { frame.abort_above_ttc } else { 0.0 };
+        let frame = Frame { abort_above_ttc, ..*frame };
+        let keeps_values = !self.is_verdict_only;
+        (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })
+    }
+}
