@@ -82,7 +82,7 @@ fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     fleet: &mut Fleet,
     entries: &[f32],
 ) -> Slots {
-    burst::<M, RULES>(simulation, fleet, entries, Window::turn)
+    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| window.turn(steps, entries))
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -101,7 +101,7 @@ fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     fleet: &mut Fleet,
     entries: &[f32],
 ) -> Slots {
-    burst::<M, RULES>(simulation, fleet, entries, Window::turn)
+    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| window.turn(steps, entries))
 }
 
 /// [`Window::turn`] in registers: a square of 16 lanes and 16 steps is transposed by 64 shuffles.
@@ -112,10 +112,17 @@ fn turn_avx512(window: &mut Window, steps: &Words, entries: &[f32]) {
     use std::arch::x86_64::*;
     const { assert!(LANES == 16 && ROWS == 16) };
     let places = window.places(steps);
-    let furthest = places.iter().fold(0, |a: u32, &b| a.max(b)) as usize;
-    assert!(furthest + ROWS <= entries.len(), "a lane reads beyond the series");
-    // SAFETY: each place has ROWS entries after it, as has just been asserted.
-    let mut r: [__m512; 16] = places.map(|from| unsafe { _mm512_loadu_ps(entries.as_ptr().add(from as usize)) });
+    let mut furthest = 0;
+    for &from in &places {
+        furthest = furthest.max(from);
+    }
+    assert!(furthest as usize + ROWS <= entries.len(), "a lane reads beyond the series");
+    // No closure and no adapter here: those of the standard library are not compiled for these instructions.
+    let mut r = [_mm512_setzero_ps(); 16];
+    for (register, &from) in r.iter_mut().zip(&places) {
+        // SAFETY: each place has ROWS entries after it, as has just been asserted.
+        *register = unsafe { _mm512_loadu_ps(entries.as_ptr().add(from as usize)) };
+    }
     // Squares of 4 by 4, within the quarters of the registers.
     for lanes in r.chunks_exact_mut(4) {
         let low_01 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[0], lanes[1]));
