@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench simd` prints one CSV row per part and repetition to stdout (kept under `benches/runs` with
 //! the machine's facts) and a summary to stderr. Synthetic data of the paper's size, ten headways, the verdicts of
-//! all lanes, one thread. The roof is what independent additions, multiplications, or both in turn reach on values
+//! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512` does no more than what is named. The
+//! operations are those that verdicts need: what only smallest and largest values need is not counted. The roof is what independent additions, multiplications, or both in turn reach on values
 //! in registers; the best of them counts.
 
 #![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
@@ -21,7 +22,7 @@ use lanesweep::sweep::{
     CpuBackend, Headway, Instructions, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
 };
 
-const REPETITIONS: usize = 7;
+const REPETITIONS: usize = 30;
 
 fn main() {
     // `cargo test --benches` calls without `--bench`: nothing to time then.
@@ -32,16 +33,21 @@ fn main() {
     let scenarios = paper_size_scenarios();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| speeds(&scenarios));
+    if std::env::args().skip(1).any(|arg| !arg.starts_with("--")) {
+        return;
+    }
     threads(&scenarios);
     memory(&scenarios);
 }
 
 /// Every category and model on every instruction set.
 fn speeds(scenarios: &[Scenario]) {
-    let sets = Instructions::available();
+    let sets: Vec<_> = Instructions::available().into_iter().filter(|set| is_wanted(set.name(), &instructions())).collect();
     let roofs: Vec<f64> = sets.iter().map(|&set| measured_roof(set)).collect();
-    for category in Category::ALL {
-        for model in ModelId::ALL {
+    let categories: Vec<_> = Category::ALL.iter().map(|c| c.key()).collect();
+    let models: Vec<_> = ModelId::ALL.iter().map(|m| m.name()).collect();
+    for category in Category::ALL.into_iter().filter(|c| is_wanted(c.key(), &categories)) {
+        for model in ModelId::ALL.into_iter().filter(|m| is_wanted(m.name(), &models)) {
             let plan = plan(scenarios, vec![category], vec![model], Headway::paper());
             let operations = operations(&plan, category, model);
             let steps = lane_steps(&plan, &CpuBackend::lane_arithmetic());
@@ -62,6 +68,16 @@ fn speeds(scenarios: &[Scenario]) {
             eprintln!();
         }
     }
+}
+
+fn instructions() -> Vec<&'static str> {
+    Instructions::ALL.iter().map(|set| set.name()).collect()
+}
+
+/// Is this one of the names on the command line, or is none of its kind named there?
+fn is_wanted(name: &str, kind: &[&str]) -> bool {
+    let mut named = std::env::args().skip(1).filter(|arg| kind.contains(&arg.as_str())).peekable();
+    named.peek().is_none() || named.any(|arg| arg == name)
 }
 
 /// The whole study on one and on two threads.
@@ -113,7 +129,7 @@ fn time<T>(work: impl FnOnce() -> T) -> f64 {
 
 /// Operations of a lane-step, over lanes spread through the plan.
 fn operations(plan: &LanePlan, category: Category, model: ModelId) -> f64 {
-    let runner = LaneRunner::<Counting>::new(plan);
+    let runner = LaneRunner::<Counting>::new(plan).verdicts_only();
     let stride = (plan.lane_count() / 400).max(1);
     let (steps, count) = Counting::measure(|| {
         let lanes = (0..plan.lane_count()).step_by(stride as usize);

@@ -41,28 +41,16 @@ pub trait Real:
     /// Whole steps below a number in [0, 2²⁴): exact.
     fn floor_to_step(self) -> u32;
 
-    /// The sign bit as it stands; set for -0 too.
-    fn sign(self) -> Flag;
+    /// x < 0, for numbers that are not -0: no sum, difference or magnitude is, and the host makes no series or start
+    /// value that is.
+    fn is_negative(self) -> Flag;
 
-    /// x < 0.
-    #[inline(always)]
-    fn is_negative(self) -> Flag {
-        // -0 + 0 is 0.
-        (self + Self::ZERO).sign()
-    }
+    /// x > 0, for numbers that are not -0.
+    fn is_positive(self) -> Flag;
 
-    /// x > 0.
-    #[inline(always)]
-    fn is_positive(self) -> Flag {
-        (Self::ZERO - self).sign()
-    }
-
-    /// Less than another number. Both are finite, and this one is not -0: sums and magnitudes never are, and the
-    /// host makes no series or start value that is. Then a difference has a sign exactly where this is less.
-    #[inline(always)]
-    fn is_below(self, other: Self) -> Flag {
-        (self - other).sign()
-    }
+    /// Less than another number. Both are finite, and this one is not -0: then a difference has a sign exactly where
+    /// this is less.
+    fn is_below(self, other: Self) -> Flag;
 
     /// Magnitude.
     #[inline(always)]
@@ -84,7 +72,7 @@ pub trait Real:
 }
 
 macro_rules! real_float {
-    ($float:ty, $bits_above_32:literal) => {
+    ($float:ty, $negative:expr, $positive:expr, $below:expr) => {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -111,8 +99,16 @@ macro_rules! real_float {
                 self as u32
             }
             #[inline(always)]
-            fn sign(self) -> Flag {
-                Flag::from_bits((self.to_bits() >> $bits_above_32) as u32)
+            fn is_negative(self) -> Flag {
+                $negative(self)
+            }
+            #[inline(always)]
+            fn is_positive(self) -> Flag {
+                $positive(self)
+            }
+            #[inline(always)]
+            fn is_below(self, other: Self) -> Flag {
+                $below(self, other)
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -121,8 +117,14 @@ macro_rules! real_float {
         }
     };
 }
-real_float!(f32, 0);
-real_float!(f64, 32);
+real_float!(
+    f32,
+    |x: f32| Flag::from_bits(x.to_bits()),
+    // The bits of numbers are in the order of the numbers: negated as whole numbers, those above 0 get a sign.
+    |x: f32| Flag::from_bits(0_u32.wrapping_sub(x.to_bits())),
+    |a: f32, b: f32| Flag::from_bits((a - b).to_bits())
+);
+real_float!(f64, |x| Flag::of(x < 0.0), |x| Flag::of(x > 0.0), |a, b| Flag::of(a < b));
 
 /// Operations of the counting type, by kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -243,9 +245,6 @@ impl Real for Counting {
     fn floor_to_step(self) -> u32 {
         self.0 as u32
     }
-    fn sign(self) -> Flag {
-        self.0.sign()
-    }
     fn is_negative(self) -> Flag {
         Flag::of(self < Self::ZERO)
     }
@@ -264,11 +263,11 @@ mod tests {
     #[test]
     fn comparisons_that_end_in_a_flag_are_those_of_the_standard() {
         let tiny = f32::from_bits(1);
-        let numbers = [-1e6, -2.5, -tiny, -0.0, 0.0, tiny, 1e-20, 0.3, 2.5, f32::from_bits(0x4020_0001), 1e6];
+        let numbers = [-1e6, -2.5, -tiny, 0.0, tiny, 1e-20, 0.3, 2.5, f32::from_bits(0x4020_0001), 1e6, f32::INFINITY];
         for a in numbers {
             assert_eq!(a.is_negative().holds(), a < 0.0, "{a}");
             assert_eq!(a.is_positive().holds(), a > 0.0, "{a}");
-            for b in numbers.into_iter().filter(|_| a.to_bits() != (-0.0_f32).to_bits()) {
+            for b in numbers.into_iter().chain([-0.0]).filter(|b| a.is_finite() || b.is_finite()) {
                 assert_eq!(a.is_below(b).holds(), a < b, "{a} {b}");
                 assert_eq!(f64::from(a).is_below(f64::from(b)).holds(), a < b, "{a} {b}");
             }

@@ -86,12 +86,17 @@ impl<R: Real> BrakeThreatMaximum<R> {
     }
 
     #[inline(always)]
-    fn raise(self, counts: Flag, numerator: R, denominator: R, fails: Flag) -> Self {
+    fn judged(self, counts: Flag, fails: Flag) -> Self {
+        BrakeThreatMaximum { failed: self.failed | (counts & fails), ..self }
+    }
+
+    #[inline(always)]
+    fn raise(self, counts: Flag, numerator: R, denominator: R) -> Self {
         let higher = counts & (self.numerator * denominator).is_below(numerator * self.denominator);
         BrakeThreatMaximum {
             numerator: higher.choose(numerator, self.numerator),
             denominator: higher.choose(denominator, self.denominator),
-            failed: self.failed | (counts & fails),
+            ..self
         }
     }
 }
@@ -148,24 +153,30 @@ impl<R: Real> BrakeThreat<R> {
         ]
     }
 
-    /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s.
+    /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s. Without
+    /// `keeps_value` the largest value stays as it is.
     #[inline(always)]
-    pub fn update(&self, maximum: BrakeThreatMaximum<R>, seen: Flag, gap: R, closing: R) -> BrakeThreatMaximum<R> {
+    pub fn update(
+        &self,
+        maximum: BrakeThreatMaximum<R>,
+        seen: Flag,
+        gap: R,
+        closing: R,
+        keeps_value: bool,
+    ) -> BrakeThreatMaximum<R> {
         let counts = seen & closing.is_positive();
         let touches = !gap.is_positive();
         match self.form {
             BtnForm::EquivalentDelay => {
                 let room = gap - closing * self.ramp_delay;
                 let hopeless = touches | !room.is_positive();
-                let numerator = closing * closing;
+                let squared = closing * closing;
+                let maximum = maximum.judged(counts, hopeless | (self.two_a_limit * room).is_below(squared));
+                if !keeps_value {
+                    return maximum;
+                }
                 let denominator = self.two_a_max * room;
-                let fails = hopeless | (self.two_a_limit * room).is_below(numerator);
-                maximum.raise(
-                    counts,
-                    hopeless.choose(R::ONE, numerator),
-                    hopeless.choose(R::ZERO, denominator),
-                    fails,
-                )
+                maximum.raise(counts, hopeless.choose(R::ONE, squared), hopeless.choose(R::ZERO, denominator))
             }
             BtnForm::DistanceRatio => {
                 // The quotient of squares: no root in the lane.
@@ -177,27 +188,25 @@ impl<R: Real> BrakeThreat<R> {
                     self.short_ramp * closing * closing * closing
                 };
                 let limit = self.threshold * gap;
-                let fails = touches | (limit * limit).is_below(squared);
-                maximum.raise(
-                    counts,
-                    touches.choose(R::ONE, squared),
-                    touches.choose(R::ZERO, gap * gap),
-                    fails,
-                )
+                let maximum = maximum.judged(counts, touches | (limit * limit).is_below(squared));
+                if !keeps_value {
+                    return maximum;
+                }
+                maximum.raise(counts, touches.choose(R::ONE, squared), touches.choose(R::ZERO, gap * gap))
             }
             BtnForm::Exact => {
+                let fails = touches | Flag::of(self.needs_more(self.a_limit, gap, closing));
+                let maximum = maximum.judged(counts, fails);
+                if !keeps_value {
+                    return maximum;
+                }
                 // What the largest deceleration so far still avoids needs no new solution.
                 let known = maximum.denominator == R::ZERO || !self.needs_more(maximum.numerator, gap, closing);
-                let fails = touches | Flag::of(self.needs_more(self.a_limit, gap, closing));
                 let hopeless = touches | (gap * gap).is_below(self.short_ramp * closing * closing * closing);
                 let solves = (counts & !hopeless).holds() && !known;
                 let required = if solves { self.solve(gap, closing) } else { R::ZERO };
-                maximum.raise(
-                    counts & (hopeless | Flag::of(!known)),
-                    hopeless.choose(R::ONE, required),
-                    hopeless.choose(R::ZERO, R::ONE),
-                    fails,
-                )
+                let counts = counts & (hopeless | Flag::of(!known));
+                maximum.raise(counts, hopeless.choose(R::ONE, required), hopeless.choose(R::ZERO, R::ONE))
             }
         }
     }
@@ -219,7 +228,7 @@ impl<R: Real> BrakeThreat<R> {
 
     /// The number of one instant: gap, m, closing speed, m/s. For traces and tests.
     pub fn at(&self, gap: R, closing: R) -> f64 {
-        self.value(&self.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, closing))
+        self.value(&self.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, closing, true))
     }
 
     /// v ≥ a²/(2j): the ramp ends before the closing speed is gone.
@@ -311,7 +320,7 @@ mod tests {
             let threat = threat(form);
             for v in [0.5, 2.0, 7.0, 19.0, 33.0] {
                 for gap in [0.3, 1.0, 4.0, 11.0, 60.0, 150.0] {
-                    let judged = threat.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, v);
+                    let judged = threat.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, v, true);
                     assert_eq!(judged.failed.holds(), threat.value(&judged) > 0.8, "{form:?} v {v} gap {gap}");
                 }
             }

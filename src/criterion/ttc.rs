@@ -42,16 +42,21 @@ impl<R: Real> Default for TtcMinimum<R> {
 }
 
 impl<R: Real> TimeToCollision<R> {
-    /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0.
+    /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0. Without
+    /// `keeps_value` the smallest value stays as it is.
     #[inline(always)]
-    pub fn update(&self, minimum: TtcMinimum<R>, seen: Flag, gap: R, closing: R) -> TtcMinimum<R> {
+    pub fn update(&self, minimum: TtcMinimum<R>, seen: Flag, gap: R, closing: R, keeps_value: bool) -> TtcMinimum<R> {
         let gap = gap.larger(R::ZERO);
         let counts = seen & closing.is_positive();
+        let failed = minimum.failed | (counts & gap.is_below(self.threshold * closing));
+        if !keeps_value {
+            return TtcMinimum { failed, ..minimum };
+        }
         let smaller = counts & (gap * minimum.closing).is_below(minimum.gap * closing);
         TtcMinimum {
             gap: smaller.choose(gap, minimum.gap),
             closing: smaller.choose(closing, minimum.closing),
-            failed: minimum.failed | (counts & gap.is_below(self.threshold * closing)),
+            failed,
         }
     }
 }

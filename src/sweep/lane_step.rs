@@ -328,17 +328,11 @@ fn see<R: Real>(
 #[inline(always)]
 fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
     let (gap, closing) = (seen.view.gap, seen.view.closing());
-    let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing);
-    let btn = criteria.btn.update(record.btn, seen.judged, gap, closing);
-    if criteria.keeps_values {
-        let min_gap = seen.judged.choose(gap.smaller(record.min_gap), record.min_gap);
-        Record { ttc, btn, min_gap }
-    } else {
-        // A compiler leaves the rest of the updates out.
-        let ttc = TtcMinimum { failed: ttc.failed, ..record.ttc };
-        let btn = BrakeThreatMaximum { failed: btn.failed, ..record.btn };
-        Record { ttc, btn, min_gap: record.min_gap }
-    }
+    let keeps_values = criteria.keeps_values;
+    let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing, keeps_values);
+    let btn = criteria.btn.update(record.btn, seen.judged, gap, closing, keeps_values);
+    let smaller = if keeps_values { gap.smaller(record.min_gap) } else { record.min_gap };
+    Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
 }
 
 #[inline(always)]

@@ -37,6 +37,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
+    /// The same, but lanes gather no smallest and largest values: only verdicts and steps of their outcomes mean
+    /// something.
+    pub fn verdicts_only(mut self) -> Self {
+        self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
+        self
+    }
+
     /// One lane.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
