@@ -22,7 +22,7 @@ use lanesweep::sweep::{
     CpuBackend, Headway, Instructions, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
 };
 
-const REPETITIONS: usize = 30;
+const REPETITIONS: usize = 15;
 
 fn main() {
     // `cargo test --benches` calls without `--bench`: nothing to time then.
@@ -42,7 +42,8 @@ fn main() {
 
 /// Every category and model on every instruction set.
 fn speeds(scenarios: &[Scenario]) {
-    let sets: Vec<_> = Instructions::available().into_iter().filter(|set| is_wanted(set.name(), &instructions())).collect();
+    let sets: Vec<_> =
+        Instructions::available().into_iter().filter(|set| is_wanted(set.name(), &instructions())).collect();
     let roofs: Vec<f64> = sets.iter().map(|&set| measured_roof(set)).collect();
     let categories: Vec<_> = Category::ALL.iter().map(|c| c.key()).collect();
     let models: Vec<_> = ModelId::ALL.iter().map(|m| m.name()).collect();

@@ -53,10 +53,6 @@ impl<R: Real> TimeToCollision<R> {
             return TtcMinimum { failed, ..minimum };
         }
         let smaller = counts & (gap * minimum.closing).is_below(minimum.gap * closing);
-        TtcMinimum {
-            gap: smaller.choose(gap, minimum.gap),
-            closing: smaller.choose(closing, minimum.closing),
-            failed,
-        }
+        TtcMinimum { gap: smaller.choose(gap, minimum.gap), closing: smaller.choose(closing, minimum.closing), failed }
     }
 }

@@ -7,9 +7,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::flag::Flag;
 use crate::criterion::{BrakeThreatMaximum, Contact, Criteria};
 use crate::driver::MODELS;
+use crate::flag::Flag;
 use crate::scenario::Motion;
 use crate::sweep::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
 

@@ -125,7 +125,11 @@ impl StateOfLanes {
             driver: DriverState { deceleration: self.deceleration[k], delay_steps: self.delay_steps[k] },
             reaction_step: self.reaction_step[k],
             record: Record {
-                ttc: TtcMinimum { gap: self.ttc_gap[k], closing: self.ttc_closing[k], failed: Flag::from_bits(self.ttc_failed[k]) },
+                ttc: TtcMinimum {
+                    gap: self.ttc_gap[k],
+                    closing: self.ttc_closing[k],
+                    failed: Flag::from_bits(self.ttc_failed[k]),
+                },
                 btn: BrakeThreatMaximum {
                     numerator: self.btn_numerator[k],
                     denominator: self.btn_denominator[k],

@@ -19,8 +19,7 @@ pub(super) struct Window {
 
 impl Window {
     /// All lanes see 0.
-    pub const IDLE: Self =
-        Window { rows: [[0.0; LANES]; ROWS], first: [0; LANES], last: [0; LANES], moves: false };
+    pub const IDLE: Self = Window { rows: [[0.0; LANES]; ROWS], first: [0; LANES], last: [0; LANES], moves: false };
 
     /// Gives a slot the series of its next lane.
     #[inline(always)]
@@ -36,8 +35,8 @@ impl Window {
     #[inline(always)]
     pub fn places(&self, steps: &Words) -> Words {
         let mut places = self.first;
-        for k in 0..LANES {
-            places[k] += steps[k].min(self.last[k]);
+        for ((place, &step), &last) in places.iter_mut().zip(steps).zip(&self.last) {
+            *place += step.min(last);
         }
         places
     }
@@ -46,8 +45,8 @@ impl Window {
     #[inline(always)]
     pub fn goes_on(&self, steps: &Words) -> bool {
         let mut on = 0;
-        for k in 0..LANES {
-            on |= u32::from(steps[k] < self.last[k]);
+        for (&step, &last) in steps.iter().zip(&self.last) {
+            on |= u32::from(step < last);
         }
         on != 0
     }
