@@ -3,6 +3,9 @@
 //!
 //! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
 //! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
+//!
+//! Numbers of a lane are finite and never -0: inputs lose its sign when they are rounded, and no sum, difference or
+//! magnitude of such numbers is -0. So comparisons are sign bits ([`Flag`]).
 
 use std::cell::Cell;
 use std::fmt::Debug;
@@ -30,7 +33,7 @@ pub trait Real:
     /// +∞: "did not happen" of a minimum, "cannot be avoided" of a Brake Threat Number.
     const INFINITY: Self;
 
-    /// The host's one rounding of an input.
+    /// The host's one rounding of an input; -0 becomes 0.
     fn from_f64(value: f64) -> Self;
     /// Exact widening for reports.
     fn to_f64(self) -> f64;
@@ -41,16 +44,32 @@ pub trait Real:
     /// Whole steps below a number in [0, 2²⁴): exact.
     fn floor_to_step(self) -> u32;
 
-    /// x < 0, for numbers that are not -0: no sum, difference or magnitude is, and the host makes no series or start
-    /// value that is.
+    /// x < 0.
     fn is_negative(self) -> Flag;
 
-    /// x > 0, for numbers that are not -0.
+    /// x > 0.
     fn is_positive(self) -> Flag;
 
-    /// Less than another number. Both are finite, and this one is not -0: then a difference has a sign exactly where
-    /// this is less.
+    /// Less than another number.
     fn is_below(self, other: Self) -> Flag;
+
+    /// Greater than another number.
+    #[inline(always)]
+    fn is_above(self, other: Self) -> Flag {
+        other.is_below(self)
+    }
+
+    /// Not less than another number.
+    #[inline(always)]
+    fn is_at_least(self, other: Self) -> Flag {
+        !self.is_below(other)
+    }
+
+    /// Not greater than another number.
+    #[inline(always)]
+    fn is_at_most(self, other: Self) -> Flag {
+        !other.is_below(self)
+    }
 
     /// Magnitude.
     #[inline(always)]
@@ -80,7 +99,8 @@ macro_rules! real_float {
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
-                value as $float
+                // -0 + 0 is 0.
+                value as $float + 0.0
             }
             #[inline(always)]
             fn to_f64(self) -> f64 {
@@ -122,6 +142,7 @@ real_float!(
     |x: f32| Flag::from_bits(x.to_bits()),
     // The bits of numbers are in the order of the numbers: negated as whole numbers, those above 0 get a sign.
     |x: f32| Flag::from_bits(0_u32.wrapping_sub(x.to_bits())),
+    // A difference has a sign exactly where the first is less.
     |a: f32, b: f32| Flag::from_bits((a - b).to_bits())
 );
 real_float!(f64, |x| Flag::of(x < 0.0), |x| Flag::of(x > 0.0), |a, b| Flag::of(a < b));
@@ -261,14 +282,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn inputs_are_never_minus_zero() {
+        for input in [-0.0, -1e-60, 0.0] {
+            assert_eq!(f32::from_f64(input).to_bits(), 0, "{input}");
+        }
+        assert_eq!(f64::from_f64(-0.0).to_bits(), 0);
+    }
+
+    #[test]
     fn comparisons_that_end_in_a_flag_are_those_of_the_standard() {
         let tiny = f32::from_bits(1);
         let numbers = [-1e6, -2.5, -tiny, 0.0, tiny, 1e-20, 0.3, 2.5, f32::from_bits(0x4020_0001), 1e6, f32::INFINITY];
         for a in numbers {
             assert_eq!(a.is_negative().holds(), a < 0.0, "{a}");
             assert_eq!(a.is_positive().holds(), a > 0.0, "{a}");
-            for b in numbers.into_iter().chain([-0.0]).filter(|b| a.is_finite() || b.is_finite()) {
+            for b in numbers.into_iter().filter(|b| a.is_finite() || b.is_finite()) {
                 assert_eq!(a.is_below(b).holds(), a < b, "{a} {b}");
+                assert_eq!(a.is_above(b).holds(), a > b, "{a} {b}");
+                assert_eq!(a.is_at_least(b).holds(), a >= b, "{a} {b}");
+                assert_eq!(a.is_at_most(b).holds(), a <= b, "{a} {b}");
                 assert_eq!(f64::from(a).is_below(f64::from(b)).holds(), a < b, "{a} {b}");
             }
         }

@@ -76,7 +76,7 @@ impl<R: Real> DriverModel<R> for Aeb<R> {
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
         let in_path = !view.lateral_gap.is_positive() & dv.is_positive();
-        let soon = !(self.trigger_ttc * dv).is_below(view.gap);
+        let soon = view.gap.is_at_most(self.trigger_ttc * dv);
         let intervening = view.a_ego.is_negative();
         Hazard { is_unsafe: !view.is_behind() & in_path & (soon | intervening), demand: self.max_deceleration }
     }

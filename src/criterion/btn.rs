@@ -92,7 +92,7 @@ impl<R: Real> BrakeThreatMaximum<R> {
 
     #[inline(always)]
     fn raise(self, counts: Flag, numerator: R, denominator: R) -> Self {
-        let higher = counts & (self.numerator * denominator).is_below(numerator * self.denominator);
+        let higher = counts & (numerator * self.denominator).is_above(self.numerator * denominator);
         BrakeThreatMaximum {
             numerator: higher.choose(numerator, self.numerator),
             denominator: higher.choose(denominator, self.denominator),
@@ -171,7 +171,7 @@ impl<R: Real> BrakeThreat<R> {
                 let room = gap - closing * self.ramp_delay;
                 let hopeless = touches | !room.is_positive();
                 let squared = closing * closing;
-                let maximum = maximum.judged(counts, hopeless | (self.two_a_limit * room).is_below(squared));
+                let maximum = maximum.judged(counts, hopeless | squared.is_above(self.two_a_limit * room));
                 if !keeps_value {
                     return maximum;
                 }
@@ -188,7 +188,7 @@ impl<R: Real> BrakeThreat<R> {
                     self.short_ramp * closing * closing * closing
                 };
                 let limit = self.threshold * gap;
-                let maximum = maximum.judged(counts, touches | (limit * limit).is_below(squared));
+                let maximum = maximum.judged(counts, touches | squared.is_above(limit * limit));
                 if !keeps_value {
                     return maximum;
                 }

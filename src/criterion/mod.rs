@@ -134,7 +134,7 @@ impl<R: Real> Criteria<R> {
     #[inline(always)]
     pub fn sees(&self, gap: R, half_lengths: R, lateral_gap: R, lateral_position: R, ego_width: R) -> Flag {
         let near = match self.gate {
-            LateralGate::EgoWidth => !ego_width.is_below(lateral_position.abs()),
+            LateralGate::EgoWidth => lateral_position.abs().is_at_most(ego_width),
             LateralGate::Overlap => lateral_gap.is_negative(),
         };
         !(gap + half_lengths).is_negative() & near

@@ -103,8 +103,8 @@ impl DriverProfile for FsmProfile {
 fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
     // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
     let between = (distance - safe).exact_div(dangerous - safe);
-    let is_safe = !distance.is_below(safe);
-    let is_dangerous = !dangerous.is_below(distance);
+    let is_safe = distance.is_at_least(safe);
+    let is_dangerous = distance.is_at_most(dangerous);
     is_safe.choose(R::ZERO, is_dangerous.choose(R::ONE, between))
 }
 
@@ -134,7 +134,7 @@ impl<R: Real> Fsm<R> {
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
         let slower_then = is_short.choose(R::ONE, R::ZERO);
         let faster_then = fuzzy(gap, d_safe, d_unsafe);
-        let closes = v_other.is_below(v_ego);
+        let closes = v_ego.is_above(v_other);
         closes.choose(v_new.is_below(v_other).choose(slower_then, faster_then), R::ZERO)
     }
 
@@ -145,7 +145,7 @@ impl<R: Real> Fsm<R> {
         let dv = view.closing();
         let w = view.lateral_towards;
         let passing = view.gap + view.half_lengths + view.half_lengths;
-        let slow = (w * (passing + self.gate_margin * dv)).is_below(view.lateral_gap * dv);
+        let slow = (view.lateral_gap * dv).is_above(w * (passing + self.gate_margin * dv));
         let closed = !w.is_positive() | dv.is_negative() | (dv.is_positive() & slow);
         !view.lateral_gap.is_positive() | !closed
     }

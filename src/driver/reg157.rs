@@ -92,9 +92,9 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
-        let near = !self.lateral_gate.is_below(view.lateral_gap);
+        let near = view.lateral_gap.is_at_most(self.lateral_gate);
         let moves = dv.is_negative() | dv.is_positive();
-        let soon = moves & !(dv.abs() * self.ttc_threshold(dv)).is_below(view.gap.abs());
+        let soon = moves & view.gap.abs().is_at_most(dv.abs() * self.ttc_threshold(dv));
         let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
         Hazard { is_unsafe, demand: self.deceleration }
     }

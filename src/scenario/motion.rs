@@ -187,7 +187,7 @@ impl Motion<f64> {
         let mut motion = Motion::resting();
         match speed {
             Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
-                motion.speed_initial = initial_mps.max(0.0) + 0.0;
+                motion.speed_initial = initial_mps.max(0.0);
                 motion.speed_per_step = acceleration_mps2 * dt_s;
                 motion.speed_until = last_step_before(*until_s, dt_s);
                 motion.speed_end = (initial_mps + acceleration_mps2 * until_s).max(0.0);
@@ -196,8 +196,7 @@ impl Motion<f64> {
                 motion.kind |= SPEED_SAMPLED;
                 motion.speed_offset = tables.speed.len() as u32;
                 motion.speed_len = series.len() as u32;
-                // No -0, on which lanes' comparisons count.
-                tables.speed.extend(series.iter().map(|&v| v + 0.0));
+                tables.speed.extend_from_slice(series);
             }
         }
         match lateral {

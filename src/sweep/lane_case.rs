@@ -70,7 +70,7 @@ impl LaneCase<f64> {
         }
         LaneCase {
             others,
-            ego_speed: case.ego_speed_mps + 0.0,
+            ego_speed: case.ego_speed_mps,
             ego_width: case.ego_width_m,
             horizon: (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32,
             pair: u32::from(case.ahead.is_some()),

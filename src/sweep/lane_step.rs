@@ -365,7 +365,7 @@ fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> Flag {
     if frame.abort_above_ttc > R::ZERO {
         let overlap = seen.present & seen.view.lateral_gap.is_negative() & !seen.view.is_behind();
         let limit = frame.abort_above_ttc * seen.view.closing().abs();
-        overlap & limit.is_below(seen.view.gap.abs())
+        overlap & seen.view.gap.abs().is_above(limit)
     } else {
         Flag::FALSE
     }
