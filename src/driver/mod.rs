@@ -132,6 +132,9 @@ pub struct DriverState<R> {
 
 /// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
 pub trait DriverModel<R: Real>: Copy + Send + Sync {
+    /// Its check looks at [`View::lateral_towards`]; where it does not, batches of lanes save themselves the trouble.
+    const SEES_LATERAL_SPEED: bool = true;
+
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?

@@ -83,6 +83,8 @@ impl<R: Real> Reg157<R> {
 }
 
 impl<R: Real> DriverModel<R> for Reg157<R> {
+    const SEES_LATERAL_SPEED: bool = false;
+
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }

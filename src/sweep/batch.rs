@@ -116,8 +116,10 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         batch.from = batch.state.index;
         furthest = furthest.max(batch.furthest());
         for vehicle in 0..1 + usize::from(rules.is_pair) {
-            for window in batch.places.windows(vehicle) {
-                if window.moves {
+            for (quantity, window) in batch.places.windows(vehicle).into_iter().enumerate() {
+                // The last one is the lateral speed.
+                let is_seen = quantity < 2 || M::SEES_LATERAL_SPEED;
+                if is_seen && window.moves {
                     turn(window, &batch.from, entries);
                 }
             }
@@ -140,7 +142,11 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
             batch.state = batch.after;
         }
     }
-    fleet.each_ref().map(|batch| batch.finished(frame.step_cap))
+    let mut finished = [0; BATCHES];
+    for (finished, batch) in finished.iter_mut().zip(fleet) {
+        *finished = batch.finished(frame.step_cap);
+    }
+    finished
 }
 
 /// One step of a batch.

@@ -214,7 +214,7 @@ impl PlacesOfLanes {
         }
     }
 
-    /// The windows of a vehicle.
+    /// The windows of a vehicle: speed, lateral position, lateral speed.
     #[inline(always)]
     pub(super) fn windows(&mut self, vehicle: usize) -> [&mut Window; 3] {
         [&mut self.speed[vehicle], &mut self.position[vehicle], &mut self.towards[vehicle]]
