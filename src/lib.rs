@@ -87,6 +87,7 @@ mod input_file;
 pub mod interrupt;
 mod lock;
 pub mod mining;
+mod near_name;
 pub mod openscenario;
 pub mod parameterization;
 pub mod parts;

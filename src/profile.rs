@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
 use crate::driver::{self, Bound, DriverProfile};
+use crate::near_name::nearest;
 use crate::{Error, Place, Result, input_file, toml_file};
 
 /// Which vehicles the ego's driver heeds in a cut-out.
@@ -124,14 +125,12 @@ impl Profile {
         }
         let path = Path::new(name_or_path);
         if !path.exists() && !name_or_path.ends_with(".toml") {
-            let nearest = Profile::names()
-                .max_by(|a, b| strsim::jaro(a, name_or_path).total_cmp(&strsim::jaro(b, name_or_path)))
-                .unwrap_or("paper");
+            let near = nearest(name_or_path, Profile::names(), 0.0).unwrap_or("paper");
             return Err(Error::usage(
                 Place::item("--profile"),
                 format!("there is no profile `{name_or_path}`"),
                 format!(
-                    "did you mean `{nearest}`? Profiles: {}; or give the path of a TOML file",
+                    "did you mean `{near}`? Profiles: {}; or give the path of a TOML file",
                     Profile::names().collect::<Vec<_>>().join(", ")
                 ),
             ));

@@ -4,8 +4,9 @@
 //! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
 //! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
 //!
-//! Numbers of a lane are finite and never -0: inputs lose its sign when they are rounded, and no sum, difference or
-//! magnitude of such numbers is -0. So comparisons are sign bits ([`Flag`]).
+//! Comparisons are sign bits ([`Flag`]), for numbers that are finite and not -0. Inputs lose that sign when they are
+//! rounded, and no sum, difference or magnitude of such numbers is -0; a product or a negated number may be, and is
+//! compared only where another condition excludes it.
 
 use std::cell::Cell;
 use std::fmt::Debug;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
+use crate::near_name::nearest;
 use crate::{Error, Place, Result, input_file};
 
 /// The settings in a text; `place` is what errors name, `help` tells where the keys are described.
@@ -50,9 +51,7 @@ fn in_words(message: &str) -> String {
 fn meant(message: &str) -> Option<&str> {
     let mut names = message.strip_prefix("unknown field `")?.split('`').step_by(2);
     let unknown = names.next()?;
-    let near = names.map(|name| (strsim::damerau_levenshtein(unknown, name), name));
-    let (distance, name) = near.min_by_key(|(distance, _)| *distance)?;
-    (distance <= 2 + unknown.len() / 6).then_some(name)
+    nearest(unknown, names, 0.75)
 }
 
 /// The settings in a regular file.

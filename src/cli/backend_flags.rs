@@ -1,9 +1,12 @@
 //! Which backend computes the lanes: `--backend` and `--device`, from what was typed to what is open.
 
+use std::time::Instant;
+
 use clap::Args;
 
 use crate::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose, visible_here};
 use crate::report::run_record::DeviceRecord;
+use crate::report::sampling::HostRecord;
 use crate::sweep::{Backend, CpuBackend};
 use crate::verify::self_check;
 use crate::{Error, Place, Result};
@@ -108,6 +111,17 @@ impl Opened {
     /// What stands in for a device.
     pub fn fallback(&self) -> Option<&dyn Backend> {
         self.gpu.as_ref().map(|_| &self.cpu as &dyn Backend)
+    }
+
+    /// What computed a run that began at this instant, for its record.
+    pub fn host(&self, rechecked_lanes: u64, started: Instant) -> HostRecord {
+        HostRecord {
+            backend: self.backend().describe(),
+            device: self.device(),
+            rechecked_lanes,
+            seconds: started.elapsed().as_secs_f64(),
+            threads: rayon::current_num_threads(),
+        }
     }
 
     /// The device, for the record of the run.

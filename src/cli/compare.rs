@@ -24,7 +24,6 @@ use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
 use crate::report::files::{check_folder, make_folder, write_atomically};
 use crate::report::html::PageFigure;
-use crate::report::sampling::HostRecord;
 use crate::sampling::{
     CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
     ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
@@ -230,13 +229,7 @@ impl Compare {
             study_plan_sha256: plan.hash().to_owned(),
             left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
             categories: compared,
-            host: HostRecord {
-                backend: opened.backend().describe(),
-                device: opened.device(),
-                rechecked_lanes: swept.rechecked_lanes,
-                seconds: started.elapsed().as_secs_f64(),
-                threads: rayon::current_num_threads(),
-            },
+            host: opened.host(swept.rechecked_lanes, started),
         };
         self.write(&file)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })

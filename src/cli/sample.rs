@@ -27,7 +27,7 @@ use crate::openscenario::Rename;
 use crate::parts::kind_of;
 use crate::profile::Profile;
 use crate::report::files::make_folder;
-use crate::report::sampling::{EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling::{EstimateFile, RunFacts};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
 use crate::settings::SampleSettings;
 pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
@@ -307,16 +307,6 @@ impl Run<'_> {
         }
     }
 
-    fn host(&self, rechecked_lanes: u64) -> HostRecord {
-        HostRecord {
-            backend: self.opened.backend().describe(),
-            device: self.opened.device(),
-            rechecked_lanes,
-            seconds: self.started.elapsed().as_secs_f64(),
-            threads: rayon::current_num_threads(),
-        }
-    }
-
     /// The parts of `estimate.json` that all estimators share.
     pub(super) fn file(&self, samples: u64, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
         let facts = RunFacts {
@@ -332,7 +322,7 @@ impl Run<'_> {
             seed: self.flags.seed(),
             given: self.flags.given.clone(),
         };
-        EstimateFile::new(&self.density, facts, estimates, self.host(0))
+        EstimateFile::new(&self.density, facts, estimates, self.opened.host(0, self.started))
     }
 
     /// Crude Monte Carlo as these flags ask for it.

@@ -104,13 +104,7 @@ pub(super) fn run(
             record
         })
         .transpose()?;
-    let host = HostRecord {
-        backend: opened.backend().describe(),
-        device: opened.device(),
-        rechecked_lanes: crude.summary.rechecked_lanes,
-        seconds: started.elapsed().as_secs_f64(),
-        threads: rayon::current_num_threads(),
-    };
+    let host = opened.host(crude.summary.rechecked_lanes, started);
     write_run(planned, crude, record, host, out, flags.format)?;
     work.forget()?;
     Ok(Exit::Ok)
@@ -144,13 +138,8 @@ fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule, for
 pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let (planned, run_sha256) = PlannedSample::read(plan)?;
     let parts = read_parts::<SampleTally>(dir, plan, "sample", &run_sha256, planned.plan.unit_count())?;
-    let host = HostRecord {
-        backend: format!("{} parts merged", parts.len()),
-        device: None,
-        rechecked_lanes: parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum(),
-        seconds: 0.0,
-        threads: rayon::current_num_threads(),
-    };
+    let rechecked = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
+    let host = HostRecord::of_parts(parts.len(), rechecked);
     let segments: Vec<SampleTally> = parts.into_iter().flat_map(|part| part.segments).collect();
     let options = planned.options(StopRule::samples(planned.facts.samples));
     let crude = crude_of_segments(&planned.plan, segments, &planned.counting(), &options)?;

@@ -18,7 +18,7 @@ use crate::grid::Parameter;
 use crate::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::profile::Profile;
 use crate::report::files::{make_folder, write_atomically};
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
 use crate::scenario::Category;
@@ -142,13 +142,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         seed,
         given: Vec::new(),
     };
-    let host = HostRecord {
-        backend: opened.backend().describe(),
-        device: opened.device(),
-        rechecked_lanes: crude.summary.rechecked_lanes,
-        seconds: started.elapsed().as_secs_f64(),
-        threads: rayon::current_num_threads(),
-    };
+    let host = opened.host(crude.summary.rechecked_lanes, started);
     let record = record(&kept, &samples, path);
     let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
     file.plan_sha256 = Some(plan.hash().to_owned());

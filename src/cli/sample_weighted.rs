@@ -68,13 +68,7 @@ pub(super) fn run(
         desk.finish(work, [0, 0])?;
         return Ok(Exit::Ok);
     }
-    let host = HostRecord {
-        backend: opened.backend().describe(),
-        device: opened.device(),
-        rechecked_lanes: 0,
-        seconds: started.elapsed().as_secs_f64(),
-        threads: rayon::current_num_threads(),
-    };
+    let host = opened.host(0, started);
     let tally = work.ledger.counts(0..samples)?;
     write_run(planned, tally, host, out, flags.format)?;
     work.forget()?;
@@ -159,13 +153,7 @@ fn sample(
 pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let (planned, run_sha256) = PlannedWeighted::read(plan)?;
     let parts = read_parts::<WeightedTally>(dir, plan, "sample", &run_sha256, planned.facts.samples)?;
-    let host = HostRecord {
-        backend: format!("{} parts merged", parts.len()),
-        device: None,
-        rechecked_lanes: 0,
-        seconds: 0.0,
-        threads: rayon::current_num_threads(),
-    };
+    let host = HostRecord::of_parts(parts.len(), 0);
     let mut segments = parts.into_iter().flat_map(|part| part.segments);
     let first = segments.next();
     let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;

@@ -16,6 +16,7 @@
 //! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
 use super::quantity::{LONGEST_DURATION_S, Parameter, Quantity};
+use crate::near_name::nearest;
 use crate::parameterization::{
     CutInParameters, CutOutParameters, Kind, LEAST_DURATION_S, LateralStart, LvdParameters, ParameterizationId,
     ParameterizationOptions, ReducedScenario, Reduction, Sizes,
@@ -181,10 +182,11 @@ impl ParameterSpace {
             return Ok(index);
         }
         let names: Vec<&str> = self.parameters.iter().map(|p| p.name.as_str()).collect();
-        let near = names.iter().max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
+        let near =
+            nearest(name, names.iter().copied(), 0.0).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
         Err(Error::usage(
             Place::item(format!("{} {}", self.id.category.label(), self.id.key)),
-            format!("there is no parameter `{name}`; did you mean `{}`?", near.unwrap_or(&"")),
+            format!("there is no parameter `{name}`{near}"),
             format!("use one of {}", names.join(", ")),
         ))
     }

@@ -1,5 +1,6 @@
 //! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
 
+use crate::near_name::nearest;
 use crate::profile::Profile;
 use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase};
 use crate::{Error, Place, Result};
@@ -130,11 +131,10 @@ impl Parameter {
         if let Some(found) = of_category().find(|p| p.key == key) {
             return Ok(found);
         }
-        let nearness = |p: &Parameter| strsim::jaro_winkler(p.key, key);
-        let nearest = of_category().max_by(|a, b| nearness(a).total_cmp(&nearness(b)));
+        let near = nearest(key, of_category().map(|p| p.key), 0.0);
         let keys: Vec<&str> = of_category().map(|p| p.key).collect();
-        let help = match nearest {
-            Some(nearest) => format!("did you mean `{}`? There are {}", nearest.key, keys.join(", ")),
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`? There are {}", keys.join(", ")),
             None => format!("there are {}", keys.join(", ")),
         };
         Err(Error::usage(Place::item(flag), format!("a {} has no parameter `{key}`", category.label()), help))

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::distribution::{Distribution, LARGEST_POISSON, Range};
 use super::xml_tree::{Node, parse_tree, read_tree};
 use crate::grid::{GridAxis, MOST_VALUES};
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, near_name};
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -441,7 +441,6 @@ impl<'a> At<'a> {
 
 /// `; did you mean …?` where a name is near one of a list.
 fn nearest(name: &str, list: &[&str]) -> String {
-    let near = |known: &&&str| strsim::jaro_winkler(known, name);
-    let best = list.iter().max_by(|a, b| near(a).total_cmp(&near(b)));
-    best.filter(|b| near(b) > 0.8).map_or(String::new(), |best| format!("; did you mean `{best}`?"))
+    near_name::nearest(name, list.iter().copied(), 0.8)
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }

@@ -110,6 +110,14 @@ pub struct HostRecord {
     pub threads: usize,
 }
 
+impl HostRecord {
+    /// Of the parts of a run that were merged.
+    pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Self {
+        let threads = rayon::current_num_threads();
+        HostRecord { backend: format!("{parts} parts merged"), device: None, rechecked_lanes, seconds: 0.0, threads }
+    }
+}
+
 /// What a run was asked for.
 #[derive(Debug, Clone)]
 pub struct RunFacts {

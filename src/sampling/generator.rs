@@ -4,6 +4,7 @@ use crate::density::{Mixture, ParameterSpace, Quantity as Parameter};
 use crate::parameterization::{AfterDuration, Kind, Sizes};
 use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::random::{AliasTable, Sobol, Stream};
+use crate::scalar::Real;
 use crate::scenario::Category;
 use crate::sweep::attention_rules;
 use crate::sweep::generated::{
@@ -51,7 +52,7 @@ pub fn generator_of(
         factors: Vec::new(),
     };
     for component in 0..n {
-        points.means.extend(mixture.mean(component).iter().map(|&v| v as f32));
+        points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
         let factor: Vec<f32> = mixture.factor(component).iter().map(|&v| v as f32).collect();
         // Kernels share one factor.
         let known = points.factors.len() / (d * d);
@@ -82,7 +83,7 @@ pub fn generator_of_points(
         source: PointSource::Given,
         dimensions: d,
         weights: None,
-        means: points.iter().flatten().map(|&v| v as f32).collect(),
+        means: points.iter().flatten().map(|&v| rounded(v)).collect(),
         factor_of: vec![0; points.len()],
         factors: vec![0.0; d * d],
     };
@@ -239,10 +240,15 @@ fn columns(space: &ParameterSpace) -> ReducedColumns {
     }
 }
 
+/// The host's one rounding; -0 becomes 0, as no number of a lane is -0.
+fn rounded(value: f64) -> f32 {
+    f32::from_f64(value)
+}
+
 /// Mean and directions divided by the weights, so that a lane only multiplies and adds.
 fn basis(space: &ParameterSpace) -> Vec<f32> {
     let (Some(reduction), Kind::Svd(d)) = (space.reduction(), space.id().kind) else { return Vec::new() };
     let basis = &reduction.basis;
-    let divided = |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| (v / w) as f32).collect::<Vec<_>>();
+    let divided = |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| rounded(v / w)).collect::<Vec<_>>();
     std::iter::once(&basis.mean).chain(&basis.directions[..d]).flat_map(divided).collect()
 }

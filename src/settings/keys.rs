@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::schema::settings_schema;
+use crate::near_name;
 
 /// One key with what it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,8 +88,7 @@ impl Key {
 
 /// The name nearest to a wrong one, where one is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let scored = names.map(|name| (strsim::jaro_winkler(wrong, name), name));
-    scored.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(score, _)| *score > 0.7).map(|(_, name)| name)
+    near_name::nearest(wrong, names, 0.7)
 }
 
 fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {

@@ -11,8 +11,10 @@ use super::instructions::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
 use super::runner::LaneRunner;
+use super::series::most_entries;
 use crate::Result;
 use crate::scalar::Real;
+use crate::scenario::Category;
 
 /// Lanes per model from which on a task keeps its batches full nearly all the time.
 const FULL_TASK: u64 = 8192;
@@ -20,8 +22,8 @@ const FULL_TASK: u64 = 8192;
 const SMALL_TASK: u64 = 2048;
 /// Tasks that every thread should have, so that none is left waiting for long.
 const TASKS_PER_THREAD: u64 = 4;
-/// Cases of a task at most: their motions are unrolled, some kilobytes each.
-const TASK_CASES: u64 = 2048;
+/// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
+const TASK_ENTRIES: u64 = 1 << 24;
 
 /// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
 #[derive(Debug)]
@@ -128,9 +130,12 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
             return 1;
         }
         let block = &self.plan.blocks[block];
-        let per_unit_and_model = (block.variants.len() * self.plan.headways.len()).max(1) as u64;
+        let variants = block.variants.len().max(1) as u64;
+        let per_unit_and_model = variants * self.plan.headways.len().max(1) as u64;
         let threads = rayon::current_num_threads() as u64;
-        let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_CASES / block.variants.len().max(1) as u64).max(1);
+        let vehicles = if block.category == Category::CutOut { 2 } else { 1 };
+        let entries = variants * vehicles * most_entries(self.plan.profile.step_cap());
+        let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_ENTRIES / entries).max(1);
         let least = SMALL_TASK.div_ceil(per_unit_and_model).min(most);
         units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)
     }

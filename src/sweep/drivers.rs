@@ -8,6 +8,7 @@ use crate::scenario::{Category, Tables};
 
 use super::batch::Fleet;
 use super::frame::{Frame, Simulation, Start};
+use super::instructions::Instructions;
 use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
@@ -71,8 +72,14 @@ macro_rules! declare_constants {
         }
 
         impl Constants<f32> {
-            /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. Gives `false`, and takes no
-            /// lane, where lanes run one by one instead. `entries` are the series that the lanes point into.
+            /// Do lanes of such a stream run in batches, or one by one?
+            pub(super) fn run_in_batches(&self, stream: Stream) -> bool {
+                let has_burst = stream.instructions != Instructions::Scalar && stream.instructions.is_available();
+                has_burst && Rules::of(&self.frames[0], &self.criteria, stream).is_some()
+            }
+
+            /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. Only where they
+            /// [run in batches](Constants::run_in_batches). `entries` are the series that the lanes point into.
             pub(super) fn run_stream<'c>(
                 &self,
                 id: ModelId,
@@ -80,20 +87,20 @@ macro_rules! declare_constants {
                 entries: &[f32],
                 next: impl FnMut() -> Option<Waiting<'c>>,
                 each: impl FnMut(usize, Outcome<f32>),
-            ) -> bool {
+            ) {
+                const RUNS: &str = "these lanes do not run in batches";
                 let (criteria, model_index) = (&self.criteria, id.index());
                 let frame = &self.frames[model_index];
-                let Some(rules) = Rules::of(frame, criteria, stream) else { return false };
+                let rules = Rules::of(frame, criteria, stream).expect(RUNS);
                 match id {
                     $(ModelId::$model => {
                         let model = &self.$file;
-                        let Some(burst) = burst_for(stream.instructions, rules) else { return false };
+                        let burst = burst_for(stream.instructions, rules).expect(RUNS);
                         let simulation = Simulation { frame, criteria, model, model_index };
                         let steps = |fleet: &mut Fleet, entries: &[f32]| burst.run(&simulation, fleet, entries);
                         run_stream(&simulation, stream.is_pair, entries, steps, next, each);
                     })+
                 }
-                true
             }
         }
     };

@@ -186,7 +186,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let first = see(criteria, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
     let mut record = judge(criteria, &state.record, &first);
     let mut hazard = check(model, &first, &lane.others[0], index);
-    let mut touched = touches(&first, &lane.others[0]);
+    let mut touched = is_touched(&first, &lane.others[0]);
     let mut settled = is_settled(&first);
     let mut aborted = aborts(frame, &first);
     let mut second = first;
@@ -201,7 +201,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
             is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
             demand: nearer.choose(other_hazard.demand, hazard.demand),
         };
-        touched = touched | touches(&second, &lane.others[1]);
+        touched = touched | is_touched(&second, &lane.others[1]);
         settled = settled & is_settled(&second);
         aborted = aborted | aborts(frame, &second);
     }
@@ -243,9 +243,9 @@ pub fn conclude<R: Real, M>(
     let seen = |k: usize| see(criteria, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
     let first = seen(0);
     let second = if is_pair { seen(1) } else { first };
-    let first_touch = touch(&first, &lane.others[0]);
+    let first_touch = touches(&first, &lane.others[0]);
     let by_second = is_pair && first_touch == Contact::None;
-    let contact = if by_second { touch(&second, &lane.others[1]) } else { first_touch };
+    let contact = if by_second { touches(&second, &lane.others[1]) } else { first_touch };
     let closing = if by_second { second.view.closing() } else { first.view.closing() };
     let collided = contact != Contact::None;
     let aborted = (aborts(frame, &first) | aborts(frame, &second)).holds();
@@ -343,12 +343,12 @@ fn check<R: Real, M: DriverModel<R>>(model: &M, seen: &Seen<R>, other: &OtherCon
 }
 
 #[inline(always)]
-fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
+fn is_touched<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
     seen.present & other.judged & overlaps(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
 }
 
 #[inline(always)]
-fn touch<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
+fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
     let is_judged = (seen.present & other.judged).holds();
     if is_judged { contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap) } else { Contact::None }
 }

@@ -115,23 +115,24 @@ impl LaneRunner<'_, f32> {
             }
         };
         let stream = Stream { instructions, is_pair: cases.iter().any(|case| case.pair != 0), values };
+        let constants = &self.constants[block];
+        let in_batches = constants.run_in_batches(stream);
         let step_cap = self.plan.profile.step_cap();
         let mut series = Series::default();
-        let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
+        let unrolled = if in_batches { &cases[..] } else { &[] };
+        let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
-            let waiting = |lane: usize| {
+            let lane = |lane: usize| {
                 let (at_case, at_start) = (lane / self.starts.len(), lane % self.starts.len());
-                let (case, tracks) = (cases.get(at_case)?, &tracks[at_case]);
-                Some(Waiting { case, tracks, start: self.starts[at_start], at: lane * models + at_model })
+                Some((at_case, cases.get(at_case)?, self.starts[at_start], lane * models + at_model))
             };
-            let mut lanes = 0..;
-            let next = || waiting(lanes.next()?);
-            let constants = &self.constants[block];
-            if !constants.run_stream(model, stream, series.entries(), next, &mut each) {
-                for Waiting { case, start, at, .. } in (0..).map_while(waiting) {
-                    each(at, self.run_case(block, case, tables, start, model));
-                }
+            let mut lanes = (0..).map_while(lane);
+            if !in_batches {
+                lanes.for_each(|(_, case, start, at)| each(at, self.run_case(block, case, tables, start, model)));
+                continue;
             }
+            let next = || lanes.next().map(|(k, case, start, at)| Waiting { case, tracks: &tracks[k], start, at });
+            constants.run_stream(model, stream, series.entries(), next, &mut each);
         }
     }
 }

@@ -34,6 +34,11 @@ pub(super) struct VehicleTracks {
     pub towards: Track,
 }
 
+/// Entries that a vehicle's motion takes at most.
+pub(super) fn most_entries(step_cap: u32) -> u64 {
+    3 * (u64::from(step_cap) + 1 + ROWS as u64)
+}
+
 impl Series {
     /// All entries.
     pub fn entries(&self) -> &[f32] {
@@ -93,7 +98,9 @@ impl Series {
         let held = self.entries[first..].iter().rev().take_while(|v| v.to_bits() == end.to_bits()).count();
         let last = self.entries.len() - held;
         self.entries.resize(last + ROWS, end);
-        Track { first: first as u32, last: (last - first) as u32 }
+        // A task's share of memory is far below this.
+        let place = |at: usize| u32::try_from(at).expect("a task's series have less than 2^32 entries");
+        Track { first: place(first), last: place(last - first) }
     }
 }
 
@@ -137,6 +144,6 @@ mod tests {
         let motion = Motion::encode(&speed, &Lateral::Centred, 0.1, &mut Tables::default()).cast();
         let mut series = Series::default();
         series.vehicle(&motion, &Tables::default(), 100);
-        assert!(series.entries.len() < 3 * (100 + ROWS + 1));
+        assert!(series.entries.len() as u64 <= most_entries(100));
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Every set computes the same words. None has a fused multiply-add switched on: lanes round after every operation.
 
-#![allow(unsafe_code)] // calls of functions compiled for an instruction set, after the machine was asked for it
+// Calls of functions compiled for an instruction set, after the machine was asked for it; loads and stores in them.
+#![allow(unsafe_code)]
 
 use super::batch::{Fleet, Slots, burst};
 #[cfg(target_arch = "x86_64")]

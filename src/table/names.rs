@@ -1,5 +1,7 @@
 //! Which field a column of a user's table is: by its name, with or without its unit at the end.
 
+use crate::near_name;
+
 /// A field that a table can have.
 #[derive(Debug, Clone)]
 pub(crate) struct Named {
@@ -76,9 +78,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
 
 /// The name that is most like one that is not known, if one is.
 pub(crate) fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let folded = column.trim().replace('.', "_").to_ascii_lowercase();
-    let likeness = |name: &str| strsim::jaro_winkler(&folded, &name.to_ascii_lowercase());
-    names.map(|name| (likeness(name), name)).filter(|(l, _)| *l > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|m| m.1)
+    near_name::nearest(column, names, 0.8)
 }
 
 #[cfg(test)]

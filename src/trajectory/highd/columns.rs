@@ -12,6 +12,7 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 use sha2::{Digest, Sha256};
 
 use super::number;
+use crate::near_name::nearest;
 use crate::{Error, Place, Result, input_file};
 
 /// What identifies a file's content in a run's record.
@@ -143,13 +144,7 @@ impl Table {
 
     /// A header name that looks like a spelling of `name` (`lane_id` for `laneId`).
     pub fn similar_name(&self, name: &str) -> Option<&str> {
-        let plain = |text: &str| text.to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
-        let likeness = |header: &str| strsim::jaro_winkler(&plain(header), &plain(name));
-        self.strange_names()
-            .map(|header| (likeness(header), header))
-            .filter(|&(likeness, _)| likeness > 0.75)
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, header)| header)
+        nearest(name, self.strange_names(), 0.75)
     }
 
     /// The bytes of a field.
