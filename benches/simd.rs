@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench simd` prints one CSV row per part and repetition to stdout (kept under `benches/runs` with
 //! the machine's facts) and a summary to stderr. Synthetic data of the paper's size, ten headways, the verdicts of
-//! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512` does no more than what is named. The
+//! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512`, or `-- threads`, does
+//! no more than what is named. The
 //! operations are those that verdicts need: what only smallest and largest values need is not counted. The roof is what independent additions, multiplications, or both in turn reach on values
 //! in registers; the best of them counts.
 
@@ -32,11 +33,16 @@ fn main() {
     println!("part,category,model,instructions,repetition,amount,unit,seconds");
     let scenarios = paper_size_scenarios();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    one.install(|| speeds(&scenarios));
-    if std::env::args().skip(1).any(|arg| !arg.starts_with("--")) {
+    let named: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect();
+    if named != ["threads"] {
+        one.install(|| speeds(&scenarios));
+    }
+    if named.is_empty() || named == ["threads"] {
+        threads(&scenarios);
+    }
+    if !named.is_empty() {
         return;
     }
-    threads(&scenarios);
     memory(&scenarios);
 }
 
@@ -86,17 +92,42 @@ fn threads(scenarios: &[Scenario]) {
     let plan = plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
     let backend = CpuBackend::lane_arithmetic();
     let steps = lane_steps(&plan, &backend);
-    for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let best = (0..REPETITIONS).map(|repetition| {
+    let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
+    let mut best = [f64::INFINITY; 2];
+    let mut least_cpu = [f64::INFINITY; 2];
+    // In turn, so that both see the same machine.
+    for repetition in 0..REPETITIONS {
+        for (k, pool) in pools.iter().enumerate() {
+            let before = cpu_seconds();
             let seconds = pool.install(|| time(|| run(&plan, &backend)));
-            println!("study on {threads} threads,,,{},{repetition},{steps},lane-steps,{seconds}", Instructions::best());
-            seconds
-        });
-        let best = best.fold(f64::INFINITY, f64::min);
-        let lanes = plan.lane_count();
-        eprintln!("{threads} threads: {lanes} lanes in {best:.3} s, {:.1} M lane-steps/s", steps as f64 / best / 1e6);
+            let (threads, set) = (pool.current_num_threads(), Instructions::best());
+            println!("study on {threads} threads,,,{set},{repetition},{steps},lane-steps,{seconds}");
+            best[k] = best[k].min(seconds);
+            if let (Some(before), Some(after)) = (before, cpu_seconds()) {
+                let cpu = after - before;
+                println!("study on {threads} threads: CPU time,,,{set},{repetition},{steps},lane-steps,{cpu}");
+                least_cpu[k] = least_cpu[k].min(cpu);
+            }
+        }
     }
+    let lanes = plan.lane_count();
+    for (pool, best) in pools.iter().zip(best) {
+        let (threads, rate) = (pool.current_num_threads(), steps as f64 / best / 1e6);
+        eprintln!("{threads} threads: {lanes} lanes in {best:.3} s, {rate:.1} M lane-steps/s");
+    }
+    if least_cpu[0].is_finite() {
+        eprintln!("CPU time of a lane-step on two threads over that on one: {:.3}", least_cpu[1] / least_cpu[0]);
+    }
+}
+
+/// Linux: CPU time of all threads of the process so far, s.
+fn cpu_seconds() -> Option<f64> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?.flatten();
+    let nanoseconds = |thread: std::fs::DirEntry| {
+        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse::<f64>().ok()
+    };
+    Some(threads.filter_map(nanoseconds).sum::<f64>() * 1e-9)
 }
 
 /// Memory while 10^5, 10^6 and 10^7 lanes run: more headways of the same cases.

@@ -21,7 +21,7 @@ const FULL_TASK: u64 = 8192;
 /// Lanes per model below which tasks are not cut for the sake of more of them.
 const SMALL_TASK: u64 = 2048;
 /// Tasks that every thread should have, so that none is left waiting for long.
-const TASKS_PER_THREAD: u64 = 4;
+const TASKS_PER_THREAD: u64 = 8;
 /// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
 const TASK_ENTRIES: u64 = 1 << 24;
 

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Mutex;
 
 use super::drivers::Constants;
 use super::frame::Start;
@@ -24,6 +25,8 @@ pub struct LaneRunner<'p, R> {
     /// One per block.
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
+    /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
+    spare: Mutex<Vec<Series>>,
 }
 
 impl<'p, R: Real> LaneRunner<'p, R> {
@@ -34,6 +37,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             tables: if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() },
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
+            spare: Mutex::default(),
         }
     }
 
@@ -118,7 +122,8 @@ impl LaneRunner<'_, f32> {
         let constants = &self.constants[block];
         let in_batches = constants.run_in_batches(stream);
         let step_cap = self.plan.profile.step_cap();
-        let mut series = Series::default();
+        let mut series = self.spare.lock().ok().and_then(|mut spare| spare.pop()).unwrap_or_default();
+        series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
@@ -133,6 +138,9 @@ impl LaneRunner<'_, f32> {
             }
             let next = || lanes.next().map(|(k, case, start, at)| Waiting { case, tracks: &tracks[k], start, at });
             constants.run_stream(model, stream, series.entries(), next, &mut each);
+        }
+        if let Ok(mut spare) = self.spare.lock() {
+            spare.push(series);
         }
     }
 }

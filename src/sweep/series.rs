@@ -40,6 +40,11 @@ pub(super) fn most_entries(step_cap: u32) -> u64 {
 }
 
 impl Series {
+    /// Empty, with its memory.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
     /// All entries.
     pub fn entries(&self) -> &[f32] {
         &self.entries
