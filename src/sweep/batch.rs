@@ -116,9 +116,8 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         batch.from = batch.state.index;
         furthest = furthest.max(batch.furthest());
         for vehicle in 0..1 + usize::from(rules.is_pair) {
-            for (quantity, window) in batch.places.windows(vehicle).into_iter().enumerate() {
-                // The last one is the lateral speed.
-                let is_seen = quantity < 2 || M::SEES_LATERAL_SPEED;
+            let is_seen = [true, true, M::SEES_LATERAL_SPEED];
+            for (window, is_seen) in batch.places.windows(vehicle).into_iter().zip(is_seen) {
                 if is_seen && window.moves {
                     turn(window, &batch.from, entries);
                 }

@@ -158,12 +158,11 @@ impl StateOfLanes {
     #[inline(always)]
     pub(super) fn set_moved(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
         if !rules.is_verdict_only {
-            self.set(k, lane);
-        } else if rules.is_pair {
-            self.set_verdicts(k, lane);
+            return self.set(k, lane);
+        }
+        self.set_verdicts(k, lane);
+        if rules.is_pair {
             self.gaps[1][k] = lane.gaps[1];
-        } else {
-            self.set_verdicts(k, lane);
         }
     }
 

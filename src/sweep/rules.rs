@@ -16,7 +16,7 @@ pub(super) struct Stream {
     pub values: bool,
 }
 
-/// What all lanes of a batch share and a loop need not ask: each set has its own loop.
+/// A set of rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Rules {
     /// Some case has a second vehicle.
