@@ -161,7 +161,7 @@ fn time<T>(work: impl FnOnce() -> T) -> f64 {
 
 /// Operations of a lane-step, over lanes spread through the plan.
 fn operations(plan: &LanePlan, category: Category, model: ModelId) -> f64 {
-    let runner = LaneRunner::<Counting>::new(plan).verdicts_only();
+    let runner = LaneRunner::<Counting>::new(plan).verdicts_as_in_batches();
     let stride = (plan.lane_count() / 400).max(1);
     let (steps, count) = Counting::measure(|| {
         let lanes = (0..plan.lane_count()).step_by(stride as usize);

@@ -54,6 +54,12 @@ impl Flag {
     pub fn choose<T>(self, where_it_holds: T, otherwise: T) -> T {
         if self.holds() { where_it_holds } else { otherwise }
     }
+
+    /// 1 where it holds, else 0.
+    #[inline(always)]
+    pub fn one(self) -> u32 {
+        self.0 as u32 >> 31
+    }
 }
 
 impl PartialEq for Flag {
@@ -95,6 +101,7 @@ mod tests {
         for a in [false, true] {
             assert_eq!((!Flag::of(a)).holds(), !a);
             assert_eq!(Flag::of(a).choose(1, 2), if a { 1 } else { 2 });
+            assert_eq!(Flag::of(a).one(), u32::from(a));
             for b in [false, true] {
                 assert_eq!((Flag::of(a) & Flag::of(b)).holds(), a && b);
                 assert_eq!((Flag::of(a) | Flag::of(b)).holds(), a || b);

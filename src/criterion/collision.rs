@@ -24,8 +24,13 @@ impl Contact {
 /// Do the boxes overlap at one step? Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
 #[inline(always)]
 pub fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
-    let along = gap.is_negative() & (gap + half_lengths + half_lengths).is_positive();
-    lateral_gap.is_negative() & along
+    lateral_gap.is_negative() & overlaps_along(gap, half_lengths)
+}
+
+/// The part of [`overlaps`] along the road.
+#[inline(always)]
+pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
+    gap.is_negative() & (gap + half_lengths + half_lengths).is_positive()
 }
 
 /// Contact at one step.

@@ -106,6 +106,7 @@ impl DriverProfile for CchdmProfile {
 
 impl<R: Real> DriverModel<R> for Cchdm<R> {
     const SEES_LATERAL_SPEED: bool = false;
+    const SEES_OWN_ACCELERATION: bool = false;
 
     /// The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
     #[inline(always)]

@@ -135,6 +135,10 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     /// Its check looks at [`View::lateral_towards`]; where it does not, batches of lanes save themselves the trouble.
     const SEES_LATERAL_SPEED: bool = true;
 
+    /// [`View::a_ego`] matters to the check; where it does not, lanes for verdicts alone need not keep the speed of
+    /// the step before.
+    const SEES_OWN_ACCELERATION: bool = true;
+
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
@@ -149,17 +153,17 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
 /// follows `braking`, and the speed stops at 0.
 #[inline(always)]
 fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_ego: R, dt: R) -> (DriverState<R>, R) {
-    let waiting = state.delay_steps > 0;
-    let applied = if waiting { coasting } else { braking };
-    let deceleration = if waiting { state.deceleration } else { braking };
-    let delay_steps = if waiting { state.delay_steps - 1 } else { 0 };
+    let waiting = Flag::reached(state.delay_steps, 1);
+    let applied = waiting.choose(coasting, braking);
+    let deceleration = waiting.choose(state.deceleration, braking);
+    let delay_steps = state.delay_steps - waiting.one();
     let v_next = (v_ego - applied * dt).larger(R::ZERO);
     (DriverState { deceleration, delay_steps }, v_next)
 }
 
 /// Whole steps of a delay. Resolved in f64: in f32, 0.6 s / 0.04 s would come out as 16 steps.
 fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
-    (delay_s / dt_s - 1e-9).ceil().max(0.0) as u32
+    ((delay_s / dt_s - 1e-9).ceil().max(0.0) as u32).min(Flag::LATEST_STEP)
 }
 
 #[cfg(test)]
@@ -172,6 +176,8 @@ mod tests {
         assert_eq!(delay_steps(0.35, 0.1), 4);
         assert_eq!(delay_steps(0.6, 0.04), 15);
         assert_eq!(delay_steps(0.0, 0.04), 0);
+        // Never, as a step that lanes can count down from.
+        assert_eq!(delay_steps(f64::MAX, 0.04), Flag::LATEST_STEP);
     }
 
     #[test]

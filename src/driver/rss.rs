@@ -111,6 +111,8 @@ impl<R: Real> Rss<R> {
 }
 
 impl<R: Real> DriverModel<R> for Rss<R> {
+    const SEES_OWN_ACCELERATION: bool = false;
+
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }

@@ -9,117 +9,140 @@
 use crate::driver::DriverModel;
 use crate::flag::Flag;
 
-use super::batch_arrays::{ConstantsOfLanes, LANES, PlacesOfLanes, ROWS, StateOfLanes, Words};
+use super::batch_arrays::{FixedArrays, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
 use super::rules::Rules;
-use super::series::VehicleTracks;
-use super::window::Window;
+use super::waiting::{Lanes, ROOM, Waiting};
+use super::window::{Window, standing};
 
 /// Batches of a burst.
 pub(super) const BATCHES: usize = 3;
 
-/// The batches in flight.
-pub(super) type Fleet = [Batch; BATCHES];
+/// Slots of a batch: one bit each.
+pub(super) type Slots = u16;
 
-/// Slots of the batches: one bit each.
-pub(super) type Slots = [u16; BATCHES];
+/// The batches in flight, and the series that their lanes read.
+pub(super) struct Fleet<'c> {
+    pub batches: [Batch; BATCHES],
+    entries: &'c [f32],
+    /// A quantity of a vehicle that is the same for all lanes at all steps needs no turn.
+    moving: [[bool; 3]; 2],
+}
 
 /// [`LANES`] lanes in flight.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Batch {
-    constants: ConstantsOfLanes,
-    state: StateOfLanes,
-    /// Where a step that reads `state` writes, and the other way round: a vector is never stored in parts.
-    after: StateOfLanes,
-    places: PlacesOfLanes,
+    lanes: LaneArrays<LANES>,
+    /// Where a step that reads the state writes, and the other way round: a vector is never stored in parts.
+    after: StateArrays<LANES>,
+    windows: [[Window; 3]; 2],
     /// Steps of the first row.
     from: Words,
+    /// Slots that no lane uses.
+    pub free: Slots,
+    /// Slots whose lane has made its last step in this burst.
+    pub finished: Slots,
+}
+
+impl<'c> Fleet<'c> {
+    /// At the beginning of a stream: all slots are free.
+    pub fn new(stream: &Lanes<'_>, entries: &'c [f32]) -> Self {
+        let quantity = |vehicle: usize, which: usize| {
+            let tracks = stream.tracks.iter().map(|tracks| tracks[vehicle].all()[which]);
+            standing(tracks, entries)
+        };
+        let stands = [0, 1].map(|vehicle| [0, 1, 2].map(|which| quantity(vehicle, which)));
+        let lanes = LaneArrays::idle();
+        let windows = stands.map(|vehicle| vehicle.map(|value| Window::standing(value.unwrap_or(0.0))));
+        let batch = Batch { lanes, after: lanes.state, windows, from: [0; LANES], free: !0, finished: 0 };
+        Fleet { batches: [batch; BATCHES], entries, moving: stands.map(|vehicle| vehicle.map(|value| value.is_none())) }
+    }
 }
 
 impl Batch {
-    /// No slot is used.
-    pub const IDLE: Self = Batch {
-        constants: ConstantsOfLanes::IDLE,
-        state: StateOfLanes::IDLE,
-        after: StateOfLanes::IDLE,
-        places: PlacesOfLanes::IDLE,
-        from: [0; LANES],
-    };
-
-    /// Puts a lane into a slot.
+    /// Which of the stream's lanes stands there.
     #[inline(always)]
-    pub fn admit(
-        &mut self,
-        k: usize,
-        constants: &LaneConstants<f32>,
-        state: &LaneState<f32>,
-        tracks: &[VehicleTracks; 2],
-        entries: &[f32],
-        vehicles: usize,
-    ) {
-        self.constants.set(k, constants);
-        self.state.set(k, state);
-        self.places.set(k, tracks, entries, vehicles);
-    }
-
-    /// Leaves a slot empty.
-    pub fn idle(&mut self, k: usize) {
-        self.state.over[k] = Flag::TRUE.to_bits();
+    pub fn lane(&self, k: usize) -> u32 {
+        self.lanes.fixed.ego.lane[k]
     }
 
     /// A lane after its last step, and the other vehicles at that step.
     #[inline(always)]
     pub fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [Whereabouts<f32>; 2]) {
-        let state = self.state.at(k);
+        let state = self.lanes.state.at(k);
         let row = (state.index - 1 - self.from[k]) as usize;
-        (self.constants.at(k), state, self.places.at(row, k))
+        (self.lanes.fixed.at(k), state, places(&self.windows, row, k))
     }
 
-    /// The furthest step of a lane that is not over.
+    /// What is left in a slot that stays free is at no step that holds the others up.
     #[inline(always)]
-    fn furthest(&self) -> u32 {
-        let mut furthest = 0;
-        for k in 0..LANES {
-            let runs = !Flag::from_bits(self.state.over[k]);
-            furthest = furthest.max(runs.choose(self.state.index[k], 0));
+    fn clear_free(&mut self) {
+        let mut left = self.free;
+        while left != 0 {
+            self.lanes.state.moving.index[left.trailing_zeros() as usize] = 0;
+            left &= left - 1;
         }
-        furthest
     }
 
-    /// Slots whose lane is over or has reached the step cap.
+    /// Used slots whose lane is over or has reached the step cap.
     #[inline(always)]
-    fn finished(&self, step_cap: u32) -> u16 {
+    fn find_finished(&mut self, step_cap: u32) {
+        let moving = &self.lanes.state.moving;
         let mut finished = 0;
         for k in 0..LANES {
-            let is_finished = Flag::from_bits(self.state.over[k]) | Flag::of(self.state.index[k] >= step_cap);
+            let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
         }
-        finished
+        self.finished = finished & !self.free;
+    }
+
+    /// Frees the slots whose lanes have finished.
+    pub fn free_finished(&mut self) {
+        self.free |= self.finished;
     }
 }
 
-/// The next steps of all lanes; `turn` is [`Window::turn`]. Gives the slots whose lanes have none left.
+/// The next steps of all lanes; those that wait take the free slots. An instruction set has its own way to `take`: it
+/// gives slots, in their order, the entries of every row from a place on. And to `turn`: that is [`Window::turn`].
 #[inline(always)]
 pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    fleet: &mut Fleet,
-    entries: &[f32],
-    turn: impl Fn(&mut Window, &Words, &[f32]),
-) -> Slots {
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+    take: impl Fn(&mut [[u32; LANES]], &[[u32; ROOM]], usize, Slots),
+    turn: impl Fn(&mut Window, &TrackArrays<LANES>, &Words, &[f32]),
+) {
     let rules = Rules::from_bits(RULES);
     let (frame, criteria) = rules.applied(simulation.frame, simulation.criteria);
     let model = *simulation.model;
-    let simulation = &Simulation { frame: &frame, criteria: &criteria, model: &model, ..*simulation };
+    let simulation =
+        &Simulation { frame: &frame, criteria: &criteria, model: &model, scene: rules.scene, ..*simulation };
+    let Fleet { batches, entries, moving } = fleet;
     let mut furthest = 0;
-    for batch in fleet.iter_mut() {
-        batch.from = batch.state.index;
-        furthest = furthest.max(batch.furthest());
-        for vehicle in 0..1 + usize::from(rules.is_pair) {
+    for batch in batches.iter_mut() {
+        let slots = lowest(batch.free, waiting.count());
+        if slots != 0 {
+            let from = waiting.take(slots.count_ones() as usize);
+            let values = !rules.is_verdict_only;
+            let waiting = waiting.lanes().parts(rules.scene.is_pair, values);
+            for (rows, waiting) in batch.lanes.parts_mut(rules.scene.is_pair, values).into_iter().zip(waiting) {
+                take(rows, waiting, from, slots);
+            }
+            batch.free &= !slots;
+        }
+        batch.clear_free();
+        batch.from = batch.lanes.state.moving.index;
+        for &index in &batch.from {
+            furthest = furthest.max(index);
+        }
+        for vehicle in 0..1 + usize::from(rules.scene.is_pair) {
             let is_seen = [true, true, M::SEES_LATERAL_SPEED];
-            for (window, is_seen) in batch.places.windows(vehicle).into_iter().zip(is_seen) {
-                if is_seen && window.moves {
-                    turn(window, &batch.from, entries);
+            for which in 0..3 {
+                let window = &mut batch.windows[vehicle][which];
+                window.moves |= slots != 0 && moving[vehicle][which];
+                if is_seen[which] && window.moves {
+                    turn(window, &batch.lanes.fixed.others[vehicle].tracks[which], &batch.from, entries);
                 }
             }
         }
@@ -127,25 +150,21 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     // No lane steps beyond the cap, so no step asks for it.
     let rows = (frame.step_cap.max(1).saturating_sub(furthest) as usize).min(ROWS);
     for row in 0..rows {
-        for batch in fleet.iter_mut() {
-            let Batch { constants, state, after, places, .. } = batch;
+        for batch in batches.iter_mut() {
+            let Batch { lanes, after, windows, .. } = batch;
             if row % 2 == 0 {
-                step(simulation, rules, constants, places, row, state, after);
+                step(simulation, rules, &lanes.fixed, windows, row, &lanes.state, after);
             } else {
-                step(simulation, rules, constants, places, row, after, state);
+                step(simulation, rules, &lanes.fixed, windows, row, after, &mut lanes.state);
             }
         }
     }
-    if rows % 2 == 1 {
-        for batch in fleet.iter_mut() {
-            batch.state = batch.after;
+    for batch in batches.iter_mut() {
+        if rows % 2 == 1 {
+            batch.lanes.state = batch.after;
         }
+        batch.find_finished(frame.step_cap);
     }
-    let mut finished = [0; BATCHES];
-    for (finished, batch) in finished.iter_mut().zip(fleet) {
-        *finished = batch.finished(frame.step_cap);
-    }
-    finished
 }
 
 /// One step of a batch.
@@ -153,14 +172,34 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
 fn step<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     rules: Rules,
-    constants: &ConstantsOfLanes,
-    places: &PlacesOfLanes,
+    fixed: &FixedArrays<LANES>,
+    windows: &[[Window; 3]; 2],
     row: usize,
-    before: &StateOfLanes,
-    after: &mut StateOfLanes,
+    before: &StateArrays<LANES>,
+    after: &mut StateArrays<LANES>,
 ) {
     for k in 0..LANES {
-        let moved = advance(simulation, rules.is_pair, &constants.at(k), &before.at(k), &places.at(row, k));
-        after.set_moved(k, &moved.state, rules);
+        let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
+        after.set(k, &moved.state, rules, M::SEES_OWN_ACCELERATION);
     }
+}
+
+/// The other vehicles as a lane sees them at a row.
+#[inline(always)]
+fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [Whereabouts<f32>; 2] {
+    let place = |vehicle: usize| {
+        let [speed, position, towards] = &windows[vehicle];
+        Whereabouts { speed: speed.rows[row][k], position: position.rows[row][k], towards: towards.rows[row][k] }
+    };
+    [place(0), place(1)]
+}
+
+/// The first so many of these slots.
+#[inline(always)]
+fn lowest(slots: Slots, count: usize) -> Slots {
+    let mut beyond = slots;
+    for _ in 0..count.min(LANES) {
+        beyond &= beyond.wrapping_sub(1);
+    }
+    slots & !beyond
 }

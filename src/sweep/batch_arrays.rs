@@ -1,221 +1,332 @@
-//! The arrays of a batch: what [`super::lane_step`] calls one lane, for [`LANES`] lanes side by side.
+//! Lanes side by side: what [`super::lane_step`] calls one lane, as arrays over `N` lanes.
+
+// Arrays of words seen as rows of words.
+#![allow(unsafe_code)]
+
+use bytemuck::{Pod, Zeroable};
 
 use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::driver::DriverState;
 use crate::flag::Flag;
 
-use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record, Whereabouts};
+use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use super::rules::Rules;
-use super::series::VehicleTracks;
-use super::window::Window;
+use super::series::{Track, VehicleTracks};
 
 /// Lanes of a batch: one AVX-512 register of binary32.
 pub(super) const LANES: usize = 16;
 /// Steps of a burst: a square of lanes and rows is turned in registers.
 pub(super) const ROWS: usize = 16;
 
+/// Parts of [`LaneArrays`].
+const PARTS: usize = 6;
+
 /// One number per lane.
 pub(super) type Floats = [f32; LANES];
 /// One word per lane.
 pub(super) type Words = [u32; LANES];
 
-/// [`LaneConstants`] as arrays.
+/// All of `N` lanes but the other vehicles' motions, which lie in series.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct ConstantsOfLanes {
-    half_lengths: [Floats; 2],
-    half_widths: [Floats; 2],
-    present_from: [Words; 2],
-    present_until: [Words; 2],
-    attend_from: [Words; 2],
-    judged: [Words; 2],
-    ego_width: Floats,
-    horizon: Words,
+pub(super) struct LaneArrays<const N: usize> {
+    pub fixed: FixedArrays<N>,
+    pub state: StateArrays<N>,
 }
 
-impl ConstantsOfLanes {
-    /// No vehicle is ever present.
-    pub(super) const IDLE: Self = ConstantsOfLanes {
-        half_lengths: [[0.0; LANES]; 2],
-        half_widths: [[0.0; LANES]; 2],
-        present_from: [[0; LANES]; 2],
-        present_until: [[0; LANES]; 2],
-        attend_from: [[0; LANES]; 2],
-        judged: [[0; LANES]; 2],
-        ego_width: [0.0; LANES],
-        horizon: [0; LANES],
-    };
+/// [`LaneConstants`] as arrays, and where the motions of the other vehicles lie.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct FixedArrays<const N: usize> {
+    pub ego: EgoArrays<N>,
+    pub others: [OtherArrays<N>; 2],
+}
 
-    #[inline(always)]
-    /// Of one lane.
-    pub(super) fn at(&self, k: usize) -> LaneConstants<f32> {
-        let other = |vehicle: usize| OtherConstants {
-            half_lengths: self.half_lengths[vehicle][k],
-            half_widths: self.half_widths[vehicle][k],
-            present_from: self.present_from[vehicle][k],
-            present_until: self.present_until[vehicle][k],
-            attend_from: self.attend_from[vehicle][k],
-            judged: Flag::from_bits(self.judged[vehicle][k]),
-        };
-        LaneConstants { others: [other(0), other(1)], ego_width: self.ego_width[k], horizon: self.horizon[k] }
-    }
+/// What is constant within the lanes and no other vehicle's.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct EgoArrays<const N: usize> {
+    /// Which of the stream's lanes it is.
+    pub lane: [u32; N],
+    width: [f32; N],
+    horizon: [u32; N],
+}
 
-    #[inline(always)]
-    pub(super) fn set(&mut self, k: usize, lane: &LaneConstants<f32>) {
-        for (vehicle, other) in lane.others.iter().enumerate() {
-            self.half_lengths[vehicle][k] = other.half_lengths;
-            self.half_widths[vehicle][k] = other.half_widths;
-            self.present_from[vehicle][k] = other.present_from;
-            self.present_until[vehicle][k] = other.present_until;
-            self.attend_from[vehicle][k] = other.attend_from;
-            self.judged[vehicle][k] = other.judged.to_bits();
-        }
-        self.ego_width[k] = lane.ego_width;
-        self.horizon[k] = lane.horizon;
-    }
+/// What is constant within the lanes for another vehicle.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct OtherArrays<const N: usize> {
+    half_lengths: [f32; N],
+    half_widths: [f32; N],
+    present_from: [u32; N],
+    present_until: [u32; N],
+    attend_from: [u32; N],
+    judged: [u32; N],
+    /// Its speed, lateral position and lateral speed.
+    pub tracks: [TrackArrays<N>; 3],
+}
+
+/// Where the series of one quantity lie.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct TrackArrays<const N: usize> {
+    /// First entries.
+    pub first: [u32; N],
+    /// Last ones, counted from the first.
+    pub last: [u32; N],
 }
 
 /// [`LaneState`] as arrays.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct StateOfLanes {
-    pub(super) index: Words,
-    v_ego: Floats,
-    v_before: Floats,
-    gaps: [Floats; 2],
-    deceleration: Floats,
-    delay_steps: Words,
-    reaction_step: Words,
-    ttc_gap: Floats,
-    ttc_closing: Floats,
-    ttc_failed: Words,
-    btn_numerator: Floats,
-    btn_denominator: Floats,
-    btn_failed: Words,
-    min_gap: Floats,
-    pub(super) over: Words,
+pub(super) struct StateArrays<const N: usize> {
+    pub moving: MovingArrays<N>,
+    pub ahead: AheadArrays<N>,
+    pub values: ValueArrays<N>,
 }
 
-impl StateOfLanes {
-    pub(super) const IDLE: Self = StateOfLanes {
-        index: [0; LANES],
-        v_ego: [0.0; LANES],
-        v_before: [0.0; LANES],
-        gaps: [[0.0; LANES]; 2],
-        deceleration: [0.0; LANES],
-        delay_steps: [0; LANES],
-        reaction_step: [0; LANES],
-        ttc_gap: [0.0; LANES],
-        ttc_closing: [0.0; LANES],
-        ttc_failed: [0; LANES],
-        btn_numerator: [0.0; LANES],
-        btn_denominator: [0.0; LANES],
-        btn_failed: [0; LANES],
-        min_gap: [0.0; LANES],
-        over: [u32::MAX; LANES],
-    };
+/// What every step moves.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct MovingArrays<const N: usize> {
+    pub index: [u32; N],
+    v_ego: [f32; N],
+    v_before: [f32; N],
+    gap: [f32; N],
+    deceleration: [f32; N],
+    delay_steps: [u32; N],
+    ttc_failed: [u32; N],
+    btn_failed: [u32; N],
+    pub over: [u32; N],
+}
 
+/// What a step moves where there is a second vehicle.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct AheadArrays<const N: usize> {
+    gap: [f32; N],
+}
+
+/// What a step moves where more than verdicts is wanted.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(super) struct ValueArrays<const N: usize> {
+    reaction_step: [u32; N],
+    ttc_gap: [f32; N],
+    ttc_closing: [f32; N],
+    btn_numerator: [f32; N],
+    btn_denominator: [f32; N],
+    min_gap: [f32; N],
+}
+
+/// Arrays of `N` words each, which can be handled without their names.
+pub(super) trait Rows<const N: usize>: Pod {
+    /// Each of them.
+    fn rows(&self) -> &[[u32; N]] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+
+    /// The same, to be changed.
+    fn rows_mut(&mut self) -> &mut [[u32; N]] {
+        bytemuck::cast_slice_mut(std::slice::from_mut(self))
+    }
+}
+
+macro_rules! made_of_rows {
+    ($($arrays:ident)+) => {
+        $(
+            // SAFETY: arrays of binary32 or 32-bit words, in the order of the source: 0 is one, and every word is.
+            unsafe impl<const N: usize> Zeroable for $arrays<N> {}
+            // SAFETY: the same; all have 4 bytes per entry and their alignment, so nothing lies between them.
+            unsafe impl<const N: usize> Pod for $arrays<N> {}
+            impl<const N: usize> Rows<N> for $arrays<N> {}
+        )+
+    };
+}
+made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays }
+
+impl<const N: usize> LaneArrays<N> {
+    /// No lane anywhere: all are over.
+    pub fn idle() -> Self {
+        let moving = MovingArrays { over: [Flag::TRUE.to_bits(); N], ..Zeroable::zeroed() };
+        let state = StateArrays { moving, ahead: Zeroable::zeroed(), values: Zeroable::zeroed() };
+        LaneArrays { fixed: FixedArrays { ego: Zeroable::zeroed(), others: Zeroable::zeroed() }, state }
+    }
+
+    /// All rows that such a stream needs, part by part.
     #[inline(always)]
-    pub(super) fn at(&self, k: usize) -> LaneState<f32> {
-        LaneState {
-            index: self.index[k],
-            v_ego: self.v_ego[k],
-            v_before: self.v_before[k],
-            gaps: [self.gaps[0][k], self.gaps[1][k]],
-            driver: DriverState { deceleration: self.deceleration[k], delay_steps: self.delay_steps[k] },
-            reaction_step: self.reaction_step[k],
-            record: Record {
-                ttc: TtcMinimum {
-                    gap: self.ttc_gap[k],
-                    closing: self.ttc_closing[k],
-                    failed: Flag::from_bits(self.ttc_failed[k]),
-                },
-                btn: BrakeThreatMaximum {
-                    numerator: self.btn_numerator[k],
-                    denominator: self.btn_denominator[k],
-                    failed: Flag::from_bits(self.btn_failed[k]),
-                },
-                min_gap: self.min_gap[k],
-            },
-            over: Flag::from_bits(self.over[k]),
+    pub fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
+        let FixedArrays { ego, others: [principal, second] } = &self.fixed;
+        let StateArrays { moving, ahead, values: gathered } = &self.state;
+        let (second, ahead): (&[_], &[_]) = if is_pair { (second.rows(), ahead.rows()) } else { (&[], &[]) };
+        let gathered: &[_] = if values { gathered.rows() } else { &[] };
+        [ego.rows(), principal.rows(), second, moving.rows(), ahead, gathered]
+    }
+
+    /// The same, to be changed.
+    #[inline(always)]
+    pub fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
+        let FixedArrays { ego, others: [principal, second] } = &mut self.fixed;
+        let StateArrays { moving, ahead, values: gathered } = &mut self.state;
+        let (second, ahead): (&mut [_], &mut [_]) =
+            if is_pair { (second.rows_mut(), ahead.rows_mut()) } else { (&mut [], &mut []) };
+        let gathered: &mut [_] = if values { gathered.rows_mut() } else { &mut [] };
+        [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered]
+    }
+
+    /// Puts one case into [`LANES`] lanes; `state` may differ between them in its gaps, which
+    /// [`LaneArrays::start`] gives.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        from: usize,
+        constants: &LaneConstants<f32>,
+        tracks: &[VehicleTracks],
+        state: &LaneState<f32>,
+        values: bool,
+    ) {
+        for ((other, constants), tracks) in self.fixed.others.iter_mut().zip(&constants.others).zip(tracks) {
+            fill(&mut other.half_lengths, from, constants.half_lengths);
+            fill(&mut other.half_widths, from, constants.half_widths);
+            fill(&mut other.present_from, from, constants.present_from);
+            fill(&mut other.present_until, from, constants.present_until);
+            fill(&mut other.attend_from, from, constants.attend_from);
+            fill(&mut other.judged, from, constants.judged.to_bits());
+            for (rows, Track { first, last }) in other.tracks.iter_mut().zip(tracks.all()) {
+                fill(&mut rows.first, from, first);
+                fill(&mut rows.last, from, last);
+            }
+        }
+        fill(&mut self.fixed.ego.width, from, constants.ego_width);
+        fill(&mut self.fixed.ego.horizon, from, constants.horizon);
+        let moving = &mut self.state.moving;
+        fill(&mut moving.index, from, state.index);
+        fill(&mut moving.v_ego, from, state.v_ego);
+        fill(&mut moving.v_before, from, state.v_before);
+        fill(&mut moving.deceleration, from, state.driver.deceleration);
+        fill(&mut moving.delay_steps, from, state.driver.delay_steps);
+        fill(&mut moving.ttc_failed, from, state.record.ttc.failed.to_bits());
+        fill(&mut moving.btn_failed, from, state.record.btn.failed.to_bits());
+        fill(&mut moving.over, from, state.over.to_bits());
+        if values {
+            let values = &mut self.state.values;
+            fill(&mut values.reaction_step, from, state.reaction_step);
+            fill(&mut values.ttc_gap, from, state.record.ttc.gap);
+            fill(&mut values.ttc_closing, from, state.record.ttc.closing);
+            fill(&mut values.btn_numerator, from, state.record.btn.numerator);
+            fill(&mut values.btn_denominator, from, state.record.btn.denominator);
+            fill(&mut values.min_gap, from, state.record.min_gap);
         }
     }
 
-    /// All of a lane.
+    /// Says which lane of the stream stands here, and how far the other vehicles are from it.
     #[inline(always)]
-    pub(super) fn set(&mut self, k: usize, lane: &LaneState<f32>) {
-        self.set_verdicts(k, lane);
-        self.gaps[1][k] = lane.gaps[1];
-        self.reaction_step[k] = lane.reaction_step;
-        self.ttc_gap[k] = lane.record.ttc.gap;
-        self.ttc_closing[k] = lane.record.ttc.closing;
-        self.btn_numerator[k] = lane.record.btn.numerator;
-        self.btn_denominator[k] = lane.record.btn.denominator;
-        self.min_gap[k] = lane.record.min_gap;
+    pub fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
+        self.fixed.ego.lane[k] = lane;
+        self.state.moving.gap[k] = gaps[0];
+        self.state.ahead.gap[k] = gaps[1];
+    }
+}
+
+impl<const N: usize> FixedArrays<N> {
+    /// The constants of a lane.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> LaneConstants<f32> {
+        let other = |vehicle: usize| {
+            let other = &self.others[vehicle];
+            OtherConstants {
+                half_lengths: other.half_lengths[k],
+                half_widths: other.half_widths[k],
+                present_from: other.present_from[k],
+                present_until: other.present_until[k],
+                attend_from: other.attend_from[k],
+                judged: Flag::from_bits(other.judged[k]),
+            }
+        };
+        LaneConstants { others: [other(0), other(1)], ego_width: self.ego.width[k], horizon: self.ego.horizon[k] }
+    }
+}
+
+/// Writes a value for [`LANES`] lanes.
+#[inline(always)]
+fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
+    row[from..from + LANES].fill(value);
+}
+
+impl<const N: usize> StateArrays<N> {
+    /// Of one lane.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> LaneState<f32> {
+        let StateArrays { moving, ahead, values } = self;
+        LaneState {
+            index: moving.index[k],
+            v_ego: moving.v_ego[k],
+            v_before: moving.v_before[k],
+            gaps: [moving.gap[k], ahead.gap[k]],
+            driver: DriverState { deceleration: moving.deceleration[k], delay_steps: moving.delay_steps[k] },
+            reaction_step: values.reaction_step[k],
+            record: Record {
+                ttc: TtcMinimum {
+                    gap: values.ttc_gap[k],
+                    closing: values.ttc_closing[k],
+                    failed: Flag::from_bits(moving.ttc_failed[k]),
+                },
+                btn: BrakeThreatMaximum {
+                    numerator: values.btn_numerator[k],
+                    denominator: values.btn_denominator[k],
+                    failed: Flag::from_bits(moving.btn_failed[k]),
+                },
+                min_gap: values.min_gap[k],
+            },
+            over: Flag::from_bits(moving.over[k]),
+        }
     }
 
     /// What moves in a step under these rules.
     #[inline(always)]
-    pub(super) fn set_moved(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
-        if !rules.is_verdict_only {
-            return self.set(k, lane);
+    pub fn set(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules, keeps_v_before: bool) {
+        let StateArrays { moving, ahead, values } = self;
+        moving.index[k] = lane.index;
+        moving.v_ego[k] = lane.v_ego;
+        if keeps_v_before || !rules.is_verdict_only {
+            moving.v_before[k] = lane.v_before;
         }
-        self.set_verdicts(k, lane);
-        if rules.is_pair {
-            self.gaps[1][k] = lane.gaps[1];
+        moving.gap[k] = lane.gaps[0];
+        moving.deceleration[k] = lane.driver.deceleration;
+        moving.delay_steps[k] = lane.driver.delay_steps;
+        moving.ttc_failed[k] = lane.record.ttc.failed.to_bits();
+        moving.btn_failed[k] = lane.record.btn.failed.to_bits();
+        moving.over[k] = lane.over.to_bits();
+        if rules.scene.is_pair {
+            ahead.gap[k] = lane.gaps[1];
         }
-    }
-
-    #[inline(always)]
-    fn set_verdicts(&mut self, k: usize, lane: &LaneState<f32>) {
-        self.index[k] = lane.index;
-        self.v_ego[k] = lane.v_ego;
-        self.v_before[k] = lane.v_before;
-        self.gaps[0][k] = lane.gaps[0];
-        self.deceleration[k] = lane.driver.deceleration;
-        self.delay_steps[k] = lane.driver.delay_steps;
-        self.ttc_failed[k] = lane.record.ttc.failed.to_bits();
-        self.btn_failed[k] = lane.record.btn.failed.to_bits();
-        self.over[k] = lane.over.to_bits();
+        if rules.is_verdict_only {
+            return;
+        }
+        values.reaction_step[k] = lane.reaction_step;
+        values.ttc_gap[k] = lane.record.ttc.gap;
+        values.ttc_closing[k] = lane.record.ttc.closing;
+        values.btn_numerator[k] = lane.record.btn.numerator;
+        values.btn_denominator[k] = lane.record.btn.denominator;
+        values.min_gap[k] = lane.record.min_gap;
     }
 }
 
-/// The other vehicles of all lanes over the steps of a burst.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub(super) struct PlacesOfLanes {
-    speed: [Window; 2],
-    position: [Window; 2],
-    towards: [Window; 2],
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl PlacesOfLanes {
-    pub(super) const IDLE: Self =
-        PlacesOfLanes { speed: [Window::IDLE; 2], position: [Window::IDLE; 2], towards: [Window::IDLE; 2] };
-
-    #[inline(always)]
-    pub(super) fn at(&self, row: usize, k: usize) -> [Whereabouts<f32>; 2] {
-        let place = |vehicle: usize| Whereabouts {
-            speed: self.speed[vehicle].rows[row][k],
-            position: self.position[vehicle].rows[row][k],
-            towards: self.towards[vehicle].rows[row][k],
-        };
-        [place(0), place(1)]
-    }
-
-    /// Gives a slot the series of its next lane.
-    #[inline(always)]
-    pub(super) fn set(&mut self, k: usize, tracks: &[VehicleTracks; 2], entries: &[f32], vehicles: usize) {
-        for (vehicle, tracks) in tracks.iter().enumerate().take(vehicles) {
-            self.speed[vehicle].set(k, tracks.speed, entries);
-            self.position[vehicle].set(k, tracks.position, entries);
-            self.towards[vehicle].set(k, tracks.towards, entries);
-        }
-    }
-
-    /// The windows of a vehicle: speed, lateral position, lateral speed.
-    #[inline(always)]
-    pub(super) fn windows(&mut self, vehicle: usize) -> [&mut Window; 3] {
-        [&mut self.speed[vehicle], &mut self.position[vehicle], &mut self.towards[vehicle]]
+    /// Rows are named in the order in which they lie, none is left out and none overlaps another.
+    #[test]
+    fn every_array_is_a_row() {
+        let mut ego = EgoArrays::<4>::zeroed();
+        ego.horizon[3] = 7;
+        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7]]);
+        let mut moving = MovingArrays::<4>::zeroed();
+        assert_eq!(moving.rows().len(), 9);
+        moving.rows_mut()[8][1] = 5;
+        assert_eq!(moving.over, [0, 5, 0, 0]);
+        assert_eq!(OtherArrays::<4>::zeroed().rows().len(), 12);
+        assert_eq!(ValueArrays::<4>::zeroed().rows().len(), 6);
     }
 }

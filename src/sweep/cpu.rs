@@ -78,10 +78,8 @@ impl Backend for CpuBackend<f32> {
         if instructions == Instructions::Scalar {
             return Ok(Box::new(lane_by_lane(plan, runner)));
         }
-        let run = move |block: usize, units, values: bool, each: &mut dyn FnMut(usize, Outcome<f32>)| {
-            runner.run_units(instructions, block, units, values, each);
-        };
-        Ok(Box::new(CpuSession { plan, run, in_batches: true, outcome: PhantomData }))
+        let run = InBatches { runner, instructions };
+        Ok(Box::new(CpuSession { plan, run, in_batches: true, arithmetic: PhantomData }))
     }
 }
 
@@ -96,31 +94,55 @@ impl Backend for CpuBackend<f64> {
 }
 
 /// A session that runs scalar lanes.
-fn lane_by_lane<'p, R: Real>(
-    plan: &'p LanePlan,
-    runner: LaneRunner<'p, R>,
-) -> CpuSession<'p, impl RunUnits<R> + 'p, R> {
-    let run = move |block: usize, units: Range<u64>, _values: bool, each: &mut dyn FnMut(usize, Outcome<R>)| {
-        let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
-        for (k, unit) in units.enumerate() {
-            runner.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
-        }
-    };
-    CpuSession { plan, run, in_batches: false, outcome: PhantomData }
+fn lane_by_lane<'p, R: Real>(plan: &'p LanePlan, runner: LaneRunner<'p, R>) -> CpuSession<'p, LaneRunner<'p, R>, R> {
+    CpuSession { plan, run: runner, in_batches: false, arithmetic: PhantomData }
 }
 
-/// Runs the lanes of some units of a block and gives each with its position, counted from the first unit on.
-/// Where values are not wanted, only an outcome's verdicts mean something.
-trait RunUnits<R>: Fn(usize, Range<u64>, bool, &mut dyn FnMut(usize, Outcome<R>)) + Sync {}
+/// Runs the lanes of some units of a block.
+trait RunUnits<R>: Sync {
+    /// Gives each outcome with its position, counted from the first unit on.
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
 
-impl<R, F: Fn(usize, Range<u64>, bool, &mut dyn FnMut(usize, Outcome<R>)) + Sync> RunUnits<R> for F {}
+    /// Verdicts alone.
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
+}
+
+/// Lanes in batches.
+struct InBatches<'p> {
+    runner: LaneRunner<'p, f32>,
+    instructions: Instructions,
+}
+
+impl RunUnits<f32> for InBatches<'_> {
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<f32>)) {
+        self.runner.run_units(self.instructions, block, units, each);
+    }
+
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+        self.runner.verdicts_of_units(self.instructions, block, units, verdicts);
+    }
+}
+
+/// Scalar lanes.
+impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)) {
+        let per_unit = self.plan().lanes_per_unit(&self.plan().blocks[block]) as usize;
+        for (k, unit) in units.enumerate() {
+            self.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
+        }
+    }
+
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+        self.outcomes(block, units, &mut |at, outcome| verdicts[at] = outcome.verdicts);
+    }
+}
 
 struct CpuSession<'p, F, R> {
     plan: &'p LanePlan,
     run: F,
     /// Tasks want many lanes.
     in_batches: bool,
-    outcome: PhantomData<fn(R)>,
+    arithmetic: PhantomData<fn(R)>,
 }
 
 impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
@@ -168,7 +190,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             match wanted {
                 Wanted::Verdicts => {
                     verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
-                        run(block, task(k), false, &mut |at, outcome| lanes[at] = outcome.verdicts);
+                        run.verdicts(block, task(k), lanes);
                     });
                 }
                 Wanted::Outcomes => {
@@ -176,7 +198,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                     let tasks =
                         outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
                     tasks.enumerate().for_each(|(k, (lanes, verdicts))| {
-                        run(block, task(k), true, &mut |at, outcome| {
+                        run.outcomes(block, task(k), &mut |at, outcome| {
                             lanes[at] = outcome.widen();
                             verdicts[at] = outcome.verdicts;
                         });
@@ -189,7 +211,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                     let lanes_per_variant = plan.headways.len() * plan.models.len();
                     let tasks = count.div_ceil(task_units as usize);
                     let of_tasks = (0..tasks).into_par_iter().fold(empty, |mut cells, k| {
-                        run(block, task(k), true, &mut |at, outcome| {
+                        run.outcomes(block, task(k), &mut |at, outcome| {
                             let inside = at % per_unit;
                             let cell = inside / lanes_per_variant * plan.models.len() + inside % plan.models.len();
                             cells[cell].count(&outcome);

@@ -6,15 +6,18 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::batch::Fleet;
+use super::batch::Batch;
 use super::frame::{Frame, Simulation, Start};
 use super::instructions::Instructions;
 use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;
-use super::outcome::Outcome;
-use super::rules::{Rules, Stream};
+use super::lane_step::{conclude, verdicts};
+use super::outcome::{Outcome, Verdicts};
+use super::rules::Rules;
+use super::scene::Scene;
 use super::simd::burst_for;
-use super::stream::{Waiting, run_stream};
+use super::stream::run_stream;
+use super::waiting::Lanes;
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
@@ -53,12 +56,27 @@ macro_rules! declare_constants {
                 start: Start<R>,
                 observer: &mut impl Observer<R>,
             ) -> Outcome<R> {
+                self.run_in(id, Scene::unknown(case.pair != 0), case, tables, start, observer)
+            }
+
+            /// The same where something is known of the case.
+            #[inline]
+            pub(super) fn run_in(
+                &self,
+                id: ModelId,
+                scene: Scene,
+                case: &LaneCase<R>,
+                tables: &Tables<R>,
+                start: Start<R>,
+                observer: &mut impl Observer<R>,
+            ) -> Outcome<R> {
                 let (criteria, model_index) = (&self.criteria, id.index());
                 let frame = &self.frames[model_index];
                 match id {
                     $(ModelId::$model => {
                         let model = &self.$file;
-                        run_lane(&Simulation { frame, criteria, model, model_index }, case, tables, start, observer)
+                        let simulation = Simulation { frame, criteria, model, model_index, scene };
+                        run_lane(&simulation, case, tables, start, observer)
                     })+
                 }
             }
@@ -72,33 +90,56 @@ macro_rules! declare_constants {
         }
 
         impl Constants<f32> {
-            /// Do lanes of such a stream run in batches, or one by one?
-            pub(super) fn run_in_batches(&self, stream: Stream) -> bool {
-                let has_burst = stream.instructions != Instructions::Scalar && stream.instructions.is_available();
-                has_burst && Rules::of(&self.frames[0], &self.criteria, stream).is_some()
+            /// Do lanes run in batches on such instructions, or one by one?
+            pub(super) fn run_in_batches(&self, instructions: Instructions) -> bool {
+                let has_burst = instructions != Instructions::Scalar && instructions.is_available();
+                has_burst && Rules::of(&self.frames[0], &self.criteria, Scene::unknown(true), true).is_some()
             }
 
-            /// Runs a stream of lanes of the chosen model in batches; see [`run_stream`]. Only where they
-            /// [run in batches](Constants::run_in_batches). `entries` are the series that the lanes point into.
-            pub(super) fn run_stream<'c>(
+            /// Runs a stream of lanes of the chosen model in batches, where they [run in
+            /// batches](Constants::run_in_batches), and gives their outcomes in the order in which they end: lane,
+            /// counted within the stream, outcome. `entries` are the series that the stream's tracks point into.
+            pub(super) fn run_outcomes(
                 &self,
                 id: ModelId,
-                stream: Stream,
+                instructions: Instructions,
+                stream: &Lanes<'_>,
                 entries: &[f32],
-                next: impl FnMut() -> Option<Waiting<'c>>,
-                each: impl FnMut(usize, Outcome<f32>),
+                mut each: impl FnMut(usize, Outcome<f32>),
             ) {
-                const RUNS: &str = "these lanes do not run in batches";
-                let (criteria, model_index) = (&self.criteria, id.index());
-                let frame = &self.frames[model_index];
-                let rules = Rules::of(frame, criteria, stream).expect(RUNS);
+                let model_index = id.index();
+                let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
+                let scene = Scene::of(stream.cases, model_index);
                 match id {
                     $(ModelId::$model => {
-                        let model = &self.$file;
-                        let burst = burst_for(stream.instructions, rules).expect(RUNS);
-                        let simulation = Simulation { frame, criteria, model, model_index };
-                        let steps = |fleet: &mut Fleet, entries: &[f32]| burst.run(&simulation, fleet, entries);
-                        run_stream(&simulation, stream.is_pair, entries, steps, next, each);
+                        let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
+                        run_in_batches(&simulation, instructions, stream, entries, |lane, batch, k| {
+                            let (constants, state, places) = batch.last_step(k);
+                            each(lane, conclude(&simulation, &constants, &state, &places));
+                        });
+                    })+
+                }
+            }
+
+            /// The same for verdicts alone.
+            pub(super) fn run_verdicts(
+                &self,
+                id: ModelId,
+                instructions: Instructions,
+                stream: &Lanes<'_>,
+                entries: &[f32],
+                mut each: impl FnMut(usize, Verdicts),
+            ) {
+                let model_index = id.index();
+                let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
+                let scene = Scene::of(stream.cases, model_index);
+                match id {
+                    $(ModelId::$model => {
+                        let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
+                        run_in_batches(&simulation, instructions, stream, entries, |lane, batch, k| {
+                            let (constants, state, places) = batch.last_step(k);
+                            each(lane, verdicts(&simulation, &constants, &state, &places));
+                        });
                     })+
                 }
             }
@@ -106,3 +147,17 @@ macro_rules! declare_constants {
     };
 }
 for_every_driver_model!(declare_constants);
+
+/// Runs a stream on an instruction set; see [`run_stream`].
+fn run_in_batches<M: DriverModel<f32>>(
+    simulation: &Simulation<'_, f32, M>,
+    instructions: Instructions,
+    stream: &Lanes<'_>,
+    entries: &[f32],
+    each: impl FnMut(usize, &Batch, usize),
+) {
+    const RUNS: &str = "these lanes do not run in batches";
+    let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, stream.values).expect(RUNS);
+    let burst = burst_for(instructions, rules).expect(RUNS);
+    run_stream(simulation, stream, entries, |fleet, waiting| burst.run(simulation, fleet, waiting), each);
+}

@@ -5,6 +5,8 @@ use crate::criterion::Criteria;
 use crate::profile::FrameProfile;
 use crate::scalar::Real;
 
+use super::scene::Scene;
+
 /// Constants of the frame at one time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame<R> {
@@ -68,4 +70,6 @@ pub struct Simulation<'a, R, M> {
     pub model: &'a M,
     /// Its position in the registry: selects the attention windows.
     pub model_index: usize,
+    /// What is known of the other vehicles.
+    pub scene: Scene,
 }

@@ -52,7 +52,7 @@ pub fn run_lane<R: Real, M: DriverModel<R>>(
     observer: &mut impl Observer<R>,
 ) -> Outcome<R> {
     let lane = LaneConstants::new(simulation, case);
-    let is_pair = case.pair != 0;
+    let is_pair = simulation.scene.is_pair;
     let mut state = LaneState::new(simulation, case, start);
     loop {
         let first = Whereabouts::of(&case.others[0].motion, tables, state.index);
@@ -60,11 +60,11 @@ pub fn run_lane<R: Real, M: DriverModel<R>>(
         let places = [first, second];
         let index = state.index;
         let v_ego = state.v_ego;
-        let moved = advance(simulation, is_pair, &lane, &state, &places);
+        let moved = advance(simulation, &lane, &state, &places);
         observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
         state = moved.state;
         if state.over.holds() || state.index >= simulation.frame.step_cap {
-            return conclude(simulation, is_pair, &lane, &state, &places);
+            return conclude(simulation, &lane, &state, &places);
         }
     }
 }

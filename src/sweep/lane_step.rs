@@ -7,7 +7,9 @@
 //! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
 //! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
 
-use crate::criterion::{BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact, overlaps};
+use crate::criterion::{
+    BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact, overlaps_along,
+};
 use crate::driver::{DriverModel, DriverState, Hazard, View};
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -16,6 +18,7 @@ use crate::scenario::{Motion, Tables};
 use super::frame::{Frame, Simulation, Start};
 use super::lane_case::{LaneCase, LaneOther};
 use super::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+use super::scene::Scene;
 
 /// What a lane's steps need to know of another vehicle, constant within the lane.
 #[derive(Debug, Clone, Copy)]
@@ -164,18 +167,16 @@ pub struct Moved<R> {
     pub hazard: Hazard<R>,
 }
 
-/// One step; `places` are the other vehicles at `state.index`. `is_pair` says whether the second one is used. The
-/// lane is over where its state says so, or where the next index reaches the step cap; one that is over stays as it
-/// is.
+/// One step; `places` are the other vehicles at `state.index`. The lane is over where its state says so, or where the
+/// next index reaches the step cap; one that is over stays as it is.
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
-    is_pair: bool,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
     places: &[Whereabouts<R>; 2],
 ) -> Moved<R> {
-    let &Simulation { frame, criteria, model, .. } = simulation;
+    let &Simulation { frame, criteria, model, scene, .. } = simulation;
     let &LaneState { index, v_ego, .. } = state;
     let runs = !state.over;
     let ego = Ego { v: v_ego, a: (v_ego - state.v_before) * frame.inverse_dt, width: lane.ego_width };
@@ -183,26 +184,26 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
     let mut gaps = state.gaps;
     gaps[0] = moves.choose(moved_gap(frame, &ego, gaps[0], &places[0]), gaps[0]);
-    let first = see(criteria, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
+    let first = see(simulation, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
     let mut record = judge(criteria, &state.record, &first);
-    let mut hazard = check(model, &first, &lane.others[0], index);
-    let mut touched = is_touched(&first, &lane.others[0]);
-    let mut settled = is_settled(&first);
+    let mut hazard = check(simulation, &first, &lane.others[0], index);
+    let mut touched = is_touched(scene, &first, &lane.others[0]);
+    let mut settled = is_settled(scene, &first);
     let mut aborted = aborts(frame, &first);
     let mut second = first;
-    if is_pair {
+    if scene.is_pair {
         gaps[1] = moves.choose(moved_gap(frame, &ego, gaps[1], &places[1]), gaps[1]);
-        second = see(criteria, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
+        second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
         record = judge(criteria, &record, &second);
-        let other_hazard = check(model, &second, &lane.others[1], index);
+        let other_hazard = check(simulation, &second, &lane.others[1], index);
         // The nearest unsafe vehicle drives the reaction.
         let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
         hazard = Hazard {
             is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
             demand: nearer.choose(other_hazard.demand, hazard.demand),
         };
-        touched = touched | is_touched(&second, &lane.others[1]);
-        settled = settled & is_settled(&second);
+        touched = touched | is_touched(scene, &second, &lane.others[1]);
+        settled = settled & is_settled(scene, &second);
         aborted = aborted | aborts(frame, &second);
     }
     let at_rest = !v_ego.is_positive();
@@ -213,9 +214,9 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
     let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
     let state = LaneState {
-        index: runs.choose(index + 1, index),
+        index: index + runs.one(),
         v_ego: hazard.is_unsafe.choose(v_reacting, v_ego),
-        v_before: runs.choose(v_ego, state.v_before),
+        v_before: if criteria.keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
         gaps,
         driver: DriverState {
             deceleration: hazard.is_unsafe.choose(reacting.deceleration, state.driver.deceleration),
@@ -228,34 +229,57 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     Moved { state, seen: [first, second], hazard }
 }
 
+/// The verdicts of a lane whose last step has just been made, at these places.
+#[inline(always)]
+pub fn verdicts<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    lane: &LaneConstants<R>,
+    state: &LaneState<R>,
+    places: &[Whereabouts<R>; 2],
+) -> Verdicts {
+    let [first, second] = last_seen(simulation, lane, state, places);
+    let scene = simulation.scene;
+    let mut touched = is_touched(scene, &first, &lane.others[0]);
+    if scene.is_pair {
+        touched = touched | is_touched(scene, &second, &lane.others[1]);
+    }
+    let record = &state.record;
+    let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
+    // Over for no other reason: the time cap.
+    let capped = if state.over.holds() { 0 } else { Verdicts::CAPPED };
+    let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
+    Verdicts(
+        bit(Criterion::Collision, touched)
+            | bit(Criterion::Ttc, record.ttc.failed)
+            | bit(Criterion::Btn, record.btn.failed | (touched & contact_counts))
+            | capped,
+    )
+}
+
 /// The outcome of a lane whose last step has just been made, at these places.
 #[inline(always)]
 pub fn conclude<R: Real, M>(
     simulation: &Simulation<R, M>,
-    is_pair: bool,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
     places: &[Whereabouts<R>; 2],
 ) -> Outcome<R> {
-    let &Simulation { frame, criteria, .. } = simulation;
-    let index = state.index - 1;
-    let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
-    let seen = |k: usize| see(criteria, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
-    let first = seen(0);
-    let second = if is_pair { seen(1) } else { first };
+    let &Simulation { frame, criteria, scene, .. } = simulation;
+    let (index, v_ego) = (state.index - 1, state.v_before);
+    let [first, second] = last_seen(simulation, lane, state, places);
     let first_touch = touches(&first, &lane.others[0]);
-    let by_second = is_pair && first_touch == Contact::None;
+    let by_second = scene.is_pair && first_touch == Contact::None;
     let contact = if by_second { touches(&second, &lane.others[1]) } else { first_touch };
     let closing = if by_second { second.view.closing() } else { first.view.closing() };
     let collided = contact != Contact::None;
     let aborted = (aborts(frame, &first) | aborts(frame, &second)).holds();
     let over = index >= lane.horizon;
-    let settled = (is_settled(&first) & is_settled(&second)).holds();
+    let settled = (is_settled(scene, &first) & is_settled(scene, &second)).holds();
     let end = if collided {
         EndReason::Contact
     } else if aborted {
         EndReason::Aborted
-    } else if over && ego.v <= R::ZERO {
+    } else if over && v_ego <= R::ZERO {
         EndReason::Standstill
     } else if over && settled {
         EndReason::Settled
@@ -264,27 +288,35 @@ pub fn conclude<R: Real, M>(
     };
     let record = &state.record;
     let btn = if collided && criteria.btn_contact == BtnContact::Any { record.btn.fail() } else { record.btn };
-    let bit = |criterion: Criterion, failed: bool| u8::from(failed) << criterion.index();
-    let capped = if end == EndReason::Cap { Verdicts::CAPPED } else { 0 };
     Outcome {
-        verdicts: Verdicts(
-            bit(Criterion::Collision, collided)
-                | bit(Criterion::Ttc, record.ttc.failed.holds())
-                | bit(Criterion::Btn, btn.failed.holds())
-                | capped,
-        ),
+        verdicts: verdicts(simulation, lane, state, places),
         contact,
         contact_with: u8::from(collided && by_second),
         end,
         reaction_step: state.reaction_step,
         contact_step: if collided { index } else { NO_STEP },
         end_step: index,
-        impact_speed: if collided { ego.v } else { R::ZERO },
+        impact_speed: if collided { v_ego } else { R::ZERO },
         impact_closing_speed: if collided { closing } else { R::ZERO },
         min_ttc: record.ttc.value(),
         max_btn: R::from_f64(criteria.btn.value(&btn)),
         min_gap: record.min_gap,
     }
+}
+
+/// The other vehicles at a lane's last step.
+#[inline(always)]
+fn last_seen<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    lane: &LaneConstants<R>,
+    state: &LaneState<R>,
+    places: &[Whereabouts<R>; 2],
+) -> [Seen<R>; 2] {
+    let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
+    let index = state.index - 1;
+    let seen = |k: usize| see(simulation, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
+    let first = seen(0);
+    [first, if simulation.scene.is_pair { seen(1) } else { first }]
 }
 
 /// The ego at one step.
@@ -302,8 +334,8 @@ fn moved_gap<R: Real>(frame: &Frame<R>, ego: &Ego<R>, gap: R, place: &Whereabout
 
 /// `runs`: the lane is not over; else nothing is there to be seen.
 #[inline(always)]
-fn see<R: Real>(
-    criteria: &Criteria<R>,
+fn see<R: Real, M>(
+    simulation: &Simulation<R, M>,
     ego: &Ego<R>,
     other: &OtherConstants<R>,
     place: &Whereabouts<R>,
@@ -320,9 +352,17 @@ fn see<R: Real>(
         lateral_towards: place.towards,
         half_lengths: other.half_lengths,
     };
+    let &Simulation { criteria, scene, .. } = simulation;
+    let lateral = place.position;
+    if scene.in_lane {
+        return Seen { view, lateral, present: runs, judged: runs & !view.is_behind() };
+    }
+    let is_seen = criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral, ego.width);
+    if scene.always_there {
+        return Seen { view, lateral, present: runs, judged: runs & is_seen };
+    }
     let present = runs & Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until);
-    let is_seen = criteria.sees(gap, other.half_lengths, view.lateral_gap, place.position, ego.width);
-    Seen { view, lateral: place.position, present, judged: present & other.judged & is_seen }
+    Seen { view, lateral, present, judged: present & other.judged & is_seen }
 }
 
 #[inline(always)]
@@ -336,15 +376,24 @@ fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) ->
 }
 
 #[inline(always)]
-fn check<R: Real, M: DriverModel<R>>(model: &M, seen: &Seen<R>, other: &OtherConstants<R>, index: u32) -> Hazard<R> {
-    let hazard = model.check(&seen.view);
-    let attentive = seen.present & Flag::reached(index, other.attend_from);
+fn check<R: Real, M: DriverModel<R>>(
+    simulation: &Simulation<R, M>,
+    seen: &Seen<R>,
+    other: &OtherConstants<R>,
+    index: u32,
+) -> Hazard<R> {
+    let hazard = simulation.model.check(&seen.view);
+    let attends = if simulation.scene.in_lane { Flag::TRUE } else { Flag::reached(index, other.attend_from) };
+    let attentive = seen.present & attends;
     Hazard { is_unsafe: hazard.is_unsafe & attentive, demand: hazard.demand }
 }
 
 #[inline(always)]
-fn is_touched<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
-    seen.present & other.judged & overlaps(seen.view.gap, other.half_lengths, seen.view.lateral_gap)
+fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
+    let along = overlaps_along(seen.view.gap, other.half_lengths);
+    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
+    let judged = if scene.always_there { Flag::TRUE } else { other.judged };
+    seen.present & judged & across & along
 }
 
 #[inline(always)]
@@ -355,8 +404,9 @@ fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
 
 /// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
 #[inline(always)]
-fn is_settled<R: Real>(seen: &Seen<R>) -> Flag {
-    let in_lane = seen.judged | (seen.present & seen.view.lateral_gap.is_negative());
+fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
+    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
+    let in_lane = seen.judged | (seen.present & across);
     seen.view.is_behind() | !in_lane | !seen.view.closing().is_positive()
 }
 

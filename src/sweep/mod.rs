@@ -25,12 +25,14 @@ mod recheck;
 mod rules;
 mod run;
 mod runner;
+mod scene;
 mod series;
 mod simd;
 mod stream;
 mod study;
 mod trace;
 mod units;
+mod waiting;
 mod window;
 
 pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};

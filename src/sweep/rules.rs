@@ -3,24 +3,13 @@
 use crate::criterion::{BtnForm, Criteria, LateralGate};
 
 use super::frame::Frame;
-use super::instructions::Instructions;
-
-/// What is known of a stream of lanes before it runs.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stream {
-    /// Instructions that it is to run on.
-    pub instructions: Instructions,
-    /// Some case has a second vehicle.
-    pub is_pair: bool,
-    /// Continuous values are wanted, not verdicts alone.
-    pub values: bool,
-}
+use super::scene::Scene;
 
 /// A set of rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Rules {
-    /// Some case has a second vehicle.
-    pub is_pair: bool,
+    /// What is known of the other vehicles.
+    pub scene: Scene,
     is_ratio: bool,
     sees_overlap: bool,
     aborts: bool,
@@ -30,11 +19,13 @@ pub(super) struct Rules {
 
 impl Rules {
     /// Number of sets.
-    pub(super) const SETS: u32 = 20;
+    pub(super) const SETS: u32 = 21;
+
+    const IN_LANE: u32 = 20;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
-    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, stream: Stream) -> Option<Rules> {
-        let Stream { is_pair, values, .. } = stream;
+    /// `values`: continuous ones are wanted, not verdicts alone.
+    pub(super) fn of(frame: &Frame<f32>, criteria: &Criteria<f32>, scene: Scene, values: bool) -> Option<Rules> {
         let is_ratio = match criteria.btn.form() {
             BtnForm::EquivalentDelay => false,
             BtnForm::DistanceRatio => true,
@@ -43,20 +34,31 @@ impl Rules {
         let sees_overlap = criteria.gate == LateralGate::Overlap;
         let aborts = frame.abort_above_ttc > 0.0;
         // Seldom used rules have no loop of their own for verdicts alone.
-        Some(Rules { is_pair, is_ratio, sees_overlap, aborts, is_verdict_only: !values && !is_ratio && !aborts })
+        let is_verdict_only = !values && !is_ratio && !aborts;
+        let scene = Scene { in_lane: scene.in_lane && is_verdict_only, ..scene };
+        Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
     }
 
     /// As a number below [`Rules::SETS`].
     pub(super) const fn bits(self) -> u32 {
+        if self.scene.in_lane {
+            // Nothing is seen across the road, so there is no gate.
+            return Rules::IN_LANE;
+        }
         let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
-        self.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
+        self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
     }
 
     /// From that number.
     pub(super) const fn from_bits(bits: u32) -> Rules {
+        if bits == Rules::IN_LANE {
+            let scene = Scene { is_pair: false, always_there: true, in_lane: true };
+            return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
+        }
         let seldom = bits >> 2;
+        let is_pair = bits & 1 != 0;
         Rules {
-            is_pair: bits & 1 != 0,
+            scene: Scene { is_pair, always_there: !is_pair, in_lane: false },
             sees_overlap: bits & 2 != 0,
             is_ratio: seldom & 1 != 0,
             aborts: seldom & 2 != 0,

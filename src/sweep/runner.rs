@@ -9,11 +9,11 @@ use super::frame::Start;
 use super::instructions::Instructions;
 use super::lane::Silent;
 use super::lane_case::LaneCase;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
-use super::rules::Stream;
+use super::scene::Scene;
 use super::series::Series;
-use super::stream::Waiting;
+use super::waiting::Lanes;
 use crate::driver::ModelId;
 use crate::scalar::Real;
 use crate::scenario::Tables;
@@ -25,6 +25,8 @@ pub struct LaneRunner<'p, R> {
     /// One per block.
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
+    /// Lanes do no more than batches for verdicts.
+    as_in_batches: bool,
     /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
     spare: Mutex<Vec<Series>>,
 }
@@ -37,14 +39,16 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             tables: if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() },
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
+            as_in_batches: false,
             spare: Mutex::default(),
         }
     }
 
-    /// The same, but lanes gather no smallest and largest values: only verdicts and steps of their outcomes mean
-    /// something.
-    pub fn verdicts_only(mut self) -> Self {
+    /// The same, but each lane does no more than batches do for verdicts: it gathers no smallest and largest values,
+    /// so that only verdicts and steps of its outcome mean something, and asks for nothing that is known.
+    pub fn verdicts_as_in_batches(mut self) -> Self {
         self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
+        self.as_in_batches = true;
         self
     }
 
@@ -93,22 +97,76 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         start: Start<R>,
         model: ModelId,
     ) -> Outcome<R> {
-        self.constants[block].run(model, case, tables, start, &mut Silent)
+        let is_pair = case.pair != 0;
+        let scene = if self.as_in_batches {
+            Scene::of(std::slice::from_ref(case), model.index())
+        } else {
+            Scene::unknown(is_pair)
+        };
+        self.constants[block].run_in(model, Scene { is_pair, ..scene }, case, tables, start, &mut Silent)
     }
 }
 
 impl LaneRunner<'_, f32> {
     /// All lanes of some units of a block, in batches: position counted from the first unit on, outcome. In no
-    /// particular order. Without `values` only the outcomes' verdicts mean something.
+    /// particular order.
     pub fn run_units(
         &self,
         instructions: Instructions,
         block: usize,
         units: Range<u64>,
-        values: bool,
         mut each: impl FnMut(usize, Outcome<f32>),
     ) {
-        let (variants, models) = (self.plan.blocks[block].variants.len(), self.plan.models.len());
+        let models = self.plan.models.len();
+        let constants = &self.constants[block];
+        let in_batches = constants.run_in_batches(instructions);
+        self.with_units(block, units, in_batches, |cases, tables, stream, entries| {
+            for (at_model, &model) in self.plan.models.iter().enumerate() {
+                let each = |lane: usize, outcome| each(lane * models + at_model, outcome);
+                if in_batches {
+                    constants.run_outcomes(model, instructions, &Lanes { values: true, ..*stream }, entries, each);
+                } else {
+                    self.one_by_one(block, cases, tables, model, each);
+                }
+            }
+        });
+    }
+
+    /// The verdicts of all lanes of some units of a block, in batches, in the plan's order.
+    pub fn verdicts_of_units(
+        &self,
+        instructions: Instructions,
+        block: usize,
+        units: Range<u64>,
+        verdicts: &mut [Verdicts],
+    ) {
+        let models = self.plan.models.len();
+        let constants = &self.constants[block];
+        let in_batches = constants.run_in_batches(instructions);
+        self.with_units(block, units, in_batches, |cases, tables, stream, entries| {
+            for (at_model, &model) in self.plan.models.iter().enumerate() {
+                if in_batches {
+                    let each = |lane: usize, verdict| verdicts[lane * models + at_model] = verdict;
+                    constants.run_verdicts(model, instructions, stream, entries, each);
+                } else {
+                    let each = |lane: usize, outcome: Outcome<f32>| {
+                        verdicts[lane * models + at_model] = outcome.verdicts;
+                    };
+                    self.one_by_one(block, cases, tables, model, each);
+                }
+            }
+        });
+    }
+
+    /// Gives the cases of some units, the tables they point into and, unrolled, what batches need of them.
+    fn with_units(
+        &self,
+        block: usize,
+        units: Range<u64>,
+        in_batches: bool,
+        run: impl FnOnce(&[LaneCase<f32>], &Tables<f32>, &Lanes<'_>, &[f32]),
+    ) {
+        let variants = self.plan.blocks[block].variants.len();
         let mut made = Tables::default();
         let (cases, tables): (Vec<LaneCase<f32>>, _) = match self.plan.generator() {
             Some(generator) => (units.map(|unit| generator.case(unit, &mut made)).collect(), &made),
@@ -118,29 +176,31 @@ impl LaneRunner<'_, f32> {
                 (cases, &self.tables)
             }
         };
-        let stream = Stream { instructions, is_pair: cases.iter().any(|case| case.pair != 0), values };
-        let constants = &self.constants[block];
-        let in_batches = constants.run_in_batches(stream);
         let step_cap = self.plan.profile.step_cap();
         let mut series = self.spare.lock().ok().and_then(|mut spare| spare.pop()).unwrap_or_default();
         series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        for (at_model, &model) in self.plan.models.iter().enumerate() {
-            let lane = |lane: usize| {
-                let (at_case, at_start) = (lane / self.starts.len(), lane % self.starts.len());
-                Some((at_case, cases.get(at_case)?, self.starts[at_start], lane * models + at_model))
-            };
-            let mut lanes = (0..).map_while(lane);
-            if !in_batches {
-                lanes.for_each(|(_, case, start, at)| each(at, self.run_case(block, case, tables, start, model)));
-                continue;
-            }
-            let next = || lanes.next().map(|(k, case, start, at)| Waiting { case, tracks: &tracks[k], start, at });
-            constants.run_stream(model, stream, series.entries(), next, &mut each);
-        }
+        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts, values: false };
+        run(&cases, tables, &stream, series.entries());
         if let Ok(mut spare) = self.spare.lock() {
             spare.push(series);
+        }
+    }
+
+    /// All lanes of a model, each for itself.
+    fn one_by_one(
+        &self,
+        block: usize,
+        cases: &[LaneCase<f32>],
+        tables: &Tables<f32>,
+        model: ModelId,
+        mut each: impl FnMut(usize, Outcome<f32>),
+    ) {
+        for (at_case, case) in cases.iter().enumerate() {
+            for (at_start, &start) in self.starts.iter().enumerate() {
+                each(at_case * self.starts.len() + at_start, self.run_case(block, case, tables, start, model));
+            }
         }
     }
 }

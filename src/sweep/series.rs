@@ -34,6 +34,14 @@ pub(super) struct VehicleTracks {
     pub towards: Track,
 }
 
+impl VehicleTracks {
+    /// Speed, lateral position, lateral speed.
+    #[inline(always)]
+    pub fn all(&self) -> [Track; 3] {
+        [self.speed, self.position, self.towards]
+    }
+}
+
 /// Entries that a vehicle's motion takes at most.
 pub(super) fn most_entries(step_cap: u32) -> u64 {
     3 * (u64::from(step_cap) + 1 + ROWS as u64)

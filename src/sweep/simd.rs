@@ -5,29 +5,32 @@
 // Calls of functions compiled for an instruction set, after the machine was asked for it; loads and stores in them.
 #![allow(unsafe_code)]
 
-use super::batch::{Fleet, Slots, burst};
 #[cfg(target_arch = "x86_64")]
-use super::batch_arrays::{LANES, ROWS, Words};
+use super::batch::Slots;
+use super::batch::{Fleet, burst};
+#[cfg(target_arch = "x86_64")]
+use super::batch_arrays::{LANES, ROWS, TrackArrays, Words};
 use super::frame::Simulation;
 use super::instructions::Instructions;
 use super::rules::Rules;
-use super::window::Window;
+use super::waiting::{ROOM, Waiting, take};
+use super::window::{Window, goes_on, places};
 use crate::driver::DriverModel;
 
 /// [`burst`] compiled for an instruction set and a set of rules.
 ///
 /// Only [`burst_for`] makes one, and only for instructions that the machine has.
 pub(super) struct Burst<M> {
-    run: unsafe fn(&Simulation<f32, M>, &mut Fleet, &[f32]) -> Slots,
+    run: unsafe fn(&Simulation<f32, M>, &mut Fleet<'_>, &mut Waiting),
 }
 
 impl<M> Burst<M> {
     /// Runs it.
     #[inline]
-    pub(super) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet, entries: &[f32]) -> Slots {
+    pub(super) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, waiting: &mut Waiting) {
         // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
         // asked the machine for them.
-        unsafe { (self.run)(simulation, fleet, entries) }
+        unsafe { (self.run)(simulation, fleet, waiting) }
     }
 }
 
@@ -55,6 +58,7 @@ macro_rules! for_rules {
             17 => $burst::<$model, 17>,
             18 => $burst::<$model, 18>,
             19 => $burst::<$model, 19>,
+            20 => $burst::<$model, 20>,
             Rules::SETS.. => return None,
         }
     };
@@ -80,39 +84,75 @@ pub(super) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: 
 #[target_feature(enable = "avx2")]
 fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    fleet: &mut Fleet,
-    entries: &[f32],
-) -> Slots {
-    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| window.turn(steps, entries))
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(
+        simulation,
+        fleet,
+        waiting,
+        |rows, waiting, from, slots| take(rows, waiting, from, slots),
+        |window, tracks, steps, entries| window.turn(tracks, steps, entries),
+    );
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    fleet: &mut Fleet,
-    entries: &[f32],
-) -> Slots {
-    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| turn_avx512(window, steps, entries))
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(
+        simulation,
+        fleet,
+        waiting,
+        |rows, waiting, from, slots| take_avx512(rows, waiting, from, slots),
+        |window, tracks, steps, entries| turn_avx512(window, tracks, steps, entries),
+    );
 }
 
 #[cfg(target_arch = "aarch64")]
 fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
-    fleet: &mut Fleet,
-    entries: &[f32],
-) -> Slots {
-    burst::<M, RULES>(simulation, fleet, entries, |window, steps, entries| window.turn(steps, entries))
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(
+        simulation,
+        fleet,
+        waiting,
+        |rows, waiting, from, slots| take(rows, waiting, from, slots),
+        |window, tracks, steps, entries| window.turn(tracks, steps, entries),
+    );
+}
+
+/// [`take`] in registers: the entries of a row, expanded into the slots.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+#[inline]
+fn take_avx512(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
+    use std::arch::x86_64::*;
+    assert!(from + LANES <= ROOM, "lanes are taken from beyond the room");
+    for (row, waiting) in rows.iter_mut().zip(waiting) {
+        // SAFETY: a row of those that wait has LANES entries from there on, as has just been asserted; a row of a
+        // batch has LANES.
+        unsafe {
+            let next = _mm512_loadu_si512(waiting.as_ptr().add(from).cast());
+            let old = _mm512_loadu_si512(row.as_ptr().cast());
+            _mm512_storeu_si512(row.as_mut_ptr().cast(), _mm512_mask_expand_epi32(old, slots, next));
+        }
+    }
 }
 
 /// [`Window::turn`] in registers: a square of 16 lanes and 16 steps is transposed by 64 shuffles.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 #[inline]
-fn turn_avx512(window: &mut Window, steps: &Words, entries: &[f32]) {
+fn turn_avx512(window: &mut Window, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
     use std::arch::x86_64::*;
     const { assert!(LANES == 16 && ROWS == 16) };
-    let places = window.places(steps);
+    let places = places(tracks, steps);
     let mut furthest = 0;
     for &from in &places {
         furthest = furthest.max(from);
@@ -151,5 +191,5 @@ fn turn_avx512(window: &mut Window, steps: &Words, entries: &[f32]) {
             unsafe { _mm512_storeu_ps(window.rows[4 * p + j].as_mut_ptr(), row) };
         }
     }
-    window.moves = window.goes_on(steps);
+    window.moves = goes_on(tracks, steps);
 }

@@ -1,6 +1,6 @@
 //! What all lanes of a batch see of one quantity over the rows of a burst: their series, turned.
 
-use super::batch_arrays::{Floats, LANES, ROWS, Words};
+use super::batch_arrays::{Floats, LANES, ROWS, TrackArrays, Words};
 use super::series::Track;
 
 /// Rows of one quantity of one vehicle.
@@ -9,58 +9,77 @@ use super::series::Track;
 pub(super) struct Window {
     /// One row per step.
     pub rows: [Floats; ROWS],
-    /// First entries of the lanes' series.
-    first: Words,
-    /// Their last ones, counted from the first.
-    last: Words,
     /// Some lane's rows are not what it will see for ever.
     pub moves: bool,
 }
 
 impl Window {
-    /// All lanes see 0.
-    pub const IDLE: Self = Window { rows: [[0.0; LANES]; ROWS], first: [0; LANES], last: [0; LANES], moves: false };
-
-    /// Gives a slot the series of its next lane.
-    #[inline(always)]
-    pub fn set(&mut self, k: usize, track: Track, entries: &[f32]) {
-        self.first[k] = track.first;
-        self.last[k] = track.last;
-        // A constant that stands in all rows already needs no turn.
-        let stands = track.last == 0 && self.rows[0][k].to_bits() == entries[track.first as usize].to_bits();
-        self.moves |= !stands;
-    }
-
-    /// Where the lanes at these steps read their series.
-    #[inline(always)]
-    pub fn places(&self, steps: &Words) -> Words {
-        let mut places = self.first;
-        for ((place, &step), &last) in places.iter_mut().zip(steps).zip(&self.last) {
-            *place += step.min(last);
-        }
-        places
-    }
-
-    /// Some lane's series goes on beyond its step.
-    #[inline(always)]
-    pub fn goes_on(&self, steps: &Words) -> bool {
-        let mut on = 0;
-        for (&step, &last) in steps.iter().zip(&self.last) {
-            on |= u32::from(step < last);
-        }
-        on != 0
+    /// All lanes see this.
+    pub fn standing(value: f32) -> Self {
+        Window { rows: [[value; LANES]; ROWS], moves: false }
     }
 
     /// Takes the rows from the series: entry by entry, on every machine.
     #[inline(always)]
-    pub fn turn(&mut self, steps: &Words, entries: &[f32]) {
-        let places = self.places(steps);
+    pub fn turn(&mut self, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
+        let places = places(tracks, steps);
         for (k, &from) in places.iter().enumerate() {
             let ahead = &entries[from as usize..from as usize + ROWS];
             for (row, &value) in self.rows.iter_mut().zip(ahead) {
                 row[k] = value;
             }
         }
-        self.moves = self.goes_on(steps);
+        self.moves = goes_on(tracks, steps);
+    }
+}
+
+/// Where the lanes at these steps read their series.
+#[inline(always)]
+pub(super) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> Words {
+    let mut places = tracks.first;
+    for ((place, &step), &last) in places.iter_mut().zip(steps).zip(&tracks.last) {
+        *place += step.min(last);
+    }
+    places
+}
+
+/// Some lane's series goes on beyond its step.
+#[inline(always)]
+pub(super) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> bool {
+    let mut on = 0;
+    for (&step, &last) in steps.iter().zip(&tracks.last) {
+        on |= u32::from(step < last);
+    }
+    on != 0
+}
+
+/// What all of these series are at every step, if they are all the same and constant.
+pub(super) fn standing(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Option<f32> {
+    let mut found: Option<f32> = None;
+    for track in tracks {
+        let value = entries[track.first as usize];
+        let is_new = found.is_some_and(|found| found.to_bits() != value.to_bits());
+        if track.last != 0 || is_new {
+            return None;
+        }
+        found = Some(value);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What no lane ever sees move is known once for the stream; the first one counts too.
+    #[test]
+    fn only_equal_constants_stand() {
+        let entries = [1.0, 1.0, 2.0, 2.0];
+        let track = |first, last| Track { first, last };
+        let of = |tracks: &[Track]| standing(tracks.iter().copied(), &entries);
+        assert_eq!(of(&[track(0, 0), track(1, 0)]), Some(1.0));
+        assert_eq!(of(&[track(0, 0), track(2, 0)]), None);
+        assert_eq!(of(&[track(0, 2), track(1, 0)]), None);
+        assert_eq!(of(&[]), None);
     }
 }

@@ -1,0 +1,128 @@
+//! Lanes that wait for a slot, side by side already: a case is written once for all its headways, and slots that are
+//! free take what they need row by row.
+
+use crate::driver::DriverModel;
+
+use super::batch::Slots;
+use super::batch_arrays::{LANES, LaneArrays, Words};
+use super::frame::{Simulation, Start};
+use super::lane_case::LaneCase;
+use super::lane_step::{LaneConstants, LaneState};
+use super::series::VehicleTracks;
+
+/// Lanes that wait at most; small enough for a first-level cache.
+const MOST: usize = 256;
+
+/// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
+pub(super) const ROOM: usize = MOST + LANES;
+
+/// The lanes of a stream: every case with every start, the starts of a case one after the other.
+#[derive(Clone, Copy)]
+pub(super) struct Lanes<'c> {
+    /// Its cases.
+    pub cases: &'c [LaneCase<f32>],
+    /// Their motions, unrolled.
+    pub tracks: &'c [[VehicleTracks; 2]],
+    /// The headways.
+    pub starts: &'c [Start<f32>],
+    /// Continuous values are wanted, not verdicts alone.
+    pub values: bool,
+}
+
+/// The next lanes of a stream.
+pub(super) struct Waiting {
+    lanes: Box<LaneArrays<ROOM>>,
+    /// The first that waits.
+    first: usize,
+    /// The end of them.
+    end: usize,
+    /// The case to come, and its start to come.
+    case: usize,
+    start: usize,
+    /// The lane to come, counted within the stream.
+    lane: u32,
+}
+
+impl Waiting {
+    /// At the beginning of a stream.
+    pub fn new() -> Self {
+        Waiting { lanes: Box::new(LaneArrays::idle()), first: 0, end: 0, case: 0, start: 0, lane: 0 }
+    }
+
+    /// How many wait.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.end - self.first
+    }
+
+    /// Takes the next lanes; gives the place of the first of them.
+    #[inline(always)]
+    pub fn take(&mut self, count: usize) -> usize {
+        let from = self.first;
+        self.first += count;
+        from
+    }
+
+    /// All lanes, those that wait among them.
+    #[inline(always)]
+    pub fn lanes(&self) -> &LaneArrays<ROOM> {
+        &self.lanes
+    }
+
+    /// Sees to it that at least so many lanes wait, if there are more.
+    #[inline]
+    pub fn have<M: DriverModel<f32>>(&mut self, least: usize, simulation: &Simulation<f32, M>, stream: &Lanes<'_>) {
+        if self.count() >= least || self.case == stream.cases.len() {
+            return;
+        }
+        self.close_up(simulation.scene.is_pair, stream);
+        while self.end < MOST && self.case < stream.cases.len() {
+            self.add(simulation, stream);
+        }
+    }
+
+    /// Moves those that wait to the front.
+    fn close_up(&mut self, is_pair: bool, stream: &Lanes<'_>) {
+        for part in self.lanes.parts_mut(is_pair, stream.values) {
+            for row in part {
+                row.copy_within(self.first..self.end, 0);
+            }
+        }
+        (self.first, self.end) = (0, self.end - self.first);
+    }
+
+    /// Adds lanes of the case to come.
+    fn add<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, stream: &Lanes<'_>) {
+        let case = &stream.cases[self.case];
+        let tracks = &stream.tracks[self.case][..if simulation.scene.is_pair { 2 } else { 1 }];
+        let constants = LaneConstants::new(simulation, case);
+        let starts = &stream.starts[self.start..];
+        let starts = &starts[..starts.len().min(MOST - self.end)];
+        for starts in starts.chunks(LANES) {
+            let state = LaneState::new(simulation, case, starts[0]);
+            self.lanes.fill(self.end, &constants, tracks, &state, stream.values);
+            for &start in starts {
+                self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
+                self.end += 1;
+                self.lane += 1;
+            }
+        }
+        self.start += starts.len();
+        if self.start == stream.starts.len() {
+            (self.start, self.case) = (0, self.case + 1);
+        }
+    }
+}
+
+/// Gives the slots, in their order, the entries of every row from a place on: one by one, on every machine.
+#[inline(always)]
+pub(super) fn take(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
+    for (row, waiting) in rows.iter_mut().zip(waiting) {
+        let (mut left, mut from) = (slots, from);
+        while left != 0 {
+            row[left.trailing_zeros() as usize] = waiting[from];
+            left &= left - 1;
+            from += 1;
+        }
+    }
+}
