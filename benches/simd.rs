@@ -1,12 +1,12 @@
-//! One core on every instruction set: lane-steps per second of every category and model, the operations of a
+//! One core on every instruction set: lane-steps per second of every category and model and of a whole study, the operations of a
 //! lane-step, the roof of the machine, and memory at 10^5, 10^6 and 10^7 lanes.
 //!
 //! `cargo bench --bench simd` prints one CSV row per part and repetition to stdout (kept under `benches/runs` with
 //! the machine's facts) and a summary to stderr. Synthetic data of the paper's size, ten headways, the verdicts of
-//! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512`, or `-- threads`, does
-//! no more than what is named. The
-//! operations are those that verdicts need: what only smallest and largest values need is not counted. The roof is what independent additions, multiplications, or both in turn reach on values
-//! in registers; the best of them counts.
+//! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512`, `-- study`, or `-- threads`, does no more
+//! than what is named. The operations are those that batches do for verdicts: what only smallest and largest values
+//! need, or what is known of a case beforehand, is not counted. The roof is what independent additions,
+//! multiplications, or both in turn reach on values in registers; the best of them counts.
 
 #![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
 
@@ -24,6 +24,8 @@ use lanesweep::sweep::{
 };
 
 const REPETITIONS: usize = 15;
+/// All categories in one sweep.
+const STUDY: &str = "study";
 
 fn main() {
     // `cargo test --benches` calls without `--bench`: nothing to time then.
@@ -46,35 +48,57 @@ fn main() {
     memory(&scenarios);
 }
 
-/// Every category and model on every instruction set.
+/// Every model on every instruction set: each category, and all of them in one sweep.
 fn speeds(scenarios: &[Scenario]) {
     let sets: Vec<_> =
         Instructions::available().into_iter().filter(|set| is_wanted(set.name(), &instructions())).collect();
     let roofs: Vec<f64> = sets.iter().map(|&set| measured_roof(set)).collect();
-    let categories: Vec<_> = Category::ALL.iter().map(|c| c.key()).collect();
+    let wanted = Category::ALL.map(|c| c.key()).into_iter().chain([STUDY]).collect::<Vec<_>>();
     let models: Vec<_> = ModelId::ALL.iter().map(|m| m.name()).collect();
-    for category in Category::ALL.into_iter().filter(|c| is_wanted(c.key(), &categories)) {
-        for model in ModelId::ALL.into_iter().filter(|m| is_wanted(m.name(), &models)) {
+    for model in ModelId::ALL.into_iter().filter(|m| is_wanted(m.name(), &models)) {
+        let mut of_study = Work::default();
+        for category in Category::ALL.into_iter().filter(|c| is_wanted(c.key(), &wanted) || is_wanted(STUDY, &wanted)) {
             let plan = plan(scenarios, vec![category], vec![model], Headway::paper());
-            let operations = operations(&plan, category, model);
             let steps = lane_steps(&plan, &CpuBackend::lane_arithmetic());
-            eprint!("{:>7} {:>6} {operations:6.1} operations/step", category.key(), model.name());
-            for (&set, roof) in sets.iter().zip(&roofs) {
-                let backend = CpuBackend::with_instructions(set).unwrap();
-                let best = (0..REPETITIONS).map(|repetition| {
-                    let seconds = time(|| run(&plan, &backend));
-                    let key = category.key();
-                    println!("sweep,{key},{},{set},{repetition},{steps},lane-steps,{seconds}", model.name());
-                    seconds
-                });
-                let rate = steps as f64 / best.fold(f64::INFINITY, f64::min);
-                let share = 100.0 * rate * operations / roof;
-                let share = if roof.is_finite() { format!(" ({share:4.1} %)") } else { String::new() };
-                eprint!(" | {set} {:6.1} M/s{share}", rate / 1e6);
+            let work = Work { steps, operations: steps as f64 * operations(&plan, category, model) };
+            of_study = Work { steps: of_study.steps + work.steps, operations: of_study.operations + work.operations };
+            if is_wanted(category.key(), &wanted) {
+                speed(category.key(), model, &plan, work, &sets, &roofs);
             }
-            eprintln!();
+        }
+        if is_wanted(STUDY, &wanted) {
+            let plan = plan(scenarios, Category::ALL.to_vec(), vec![model], Headway::paper());
+            speed(STUDY, model, &plan, of_study, &sets, &roofs);
         }
     }
+}
+
+/// What a sweep has to do.
+#[derive(Default, Clone, Copy)]
+struct Work {
+    /// Lane-steps.
+    steps: u64,
+    /// Operations of all of them.
+    operations: f64,
+}
+
+/// Times one sweep on every instruction set.
+fn speed(name: &str, model: ModelId, plan: &LanePlan, work: Work, sets: &[Instructions], roofs: &[f64]) {
+    let Work { steps, operations } = work;
+    eprint!("{name:>7} {:>6} {:6.1} operations/step", model.name(), operations / steps as f64);
+    for (&set, roof) in sets.iter().zip(roofs) {
+        let backend = CpuBackend::with_instructions(set).unwrap();
+        let best = (0..REPETITIONS).map(|repetition| {
+            let seconds = time(|| run(plan, &backend));
+            println!("sweep,{name},{},{set},{repetition},{steps},lane-steps,{seconds}", model.name());
+            seconds
+        });
+        let best = best.fold(f64::INFINITY, f64::min);
+        let share = 100.0 * operations / best / roof;
+        let share = if roof.is_finite() { format!(" ({share:4.1} %)") } else { String::new() };
+        eprint!(" | {set} {:6.1} M/s{share}", steps as f64 / best / 1e6);
+    }
+    eprintln!();
 }
 
 fn instructions() -> Vec<&'static str> {

@@ -132,12 +132,16 @@ pub struct DriverState<R> {
 
 /// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
 pub trait DriverModel<R: Real>: Copy + Send + Sync {
-    /// Its check looks at [`View::lateral_towards`]; where it does not, batches of lanes save themselves the trouble.
+    // What follows may be false, and batches of lanes then save themselves the trouble. That it is so has to be
+    // tested: verdicts would differ from those of single lanes.
+
+    /// Its check looks at [`View::lateral_towards`].
     const SEES_LATERAL_SPEED: bool = true;
 
-    /// [`View::a_ego`] matters to the check; where it does not, lanes for verdicts alone need not keep the speed of
-    /// the step before.
+    /// Its check looks at [`View::a_ego`].
     const SEES_OWN_ACCELERATION: bool = true;
+    /// Its reaction looks at [`DriverState::deceleration`].
+    const KEEPS_DECELERATION: bool = true;
 
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;

@@ -85,6 +85,7 @@ impl<R: Real> Reg157<R> {
 impl<R: Real> DriverModel<R> for Reg157<R> {
     const SEES_LATERAL_SPEED: bool = false;
     const SEES_OWN_ACCELERATION: bool = false;
+    const KEEPS_DECELERATION: bool = false;
 
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {

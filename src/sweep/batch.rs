@@ -119,7 +119,7 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     let simulation =
         &Simulation { frame: &frame, criteria: &criteria, model: &model, scene: rules.scene, ..*simulation };
     let Fleet { batches, entries, moving } = fleet;
-    let mut furthest = 0;
+    let mut furthest = [0; LANES];
     for batch in batches.iter_mut() {
         let slots = lowest(batch.free, waiting.count());
         if slots != 0 {
@@ -133,8 +133,8 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         }
         batch.clear_free();
         batch.from = batch.lanes.state.moving.index;
-        for &index in &batch.from {
-            furthest = furthest.max(index);
+        for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
+            *furthest = index.max(*furthest);
         }
         for vehicle in 0..1 + usize::from(rules.scene.is_pair) {
             let is_seen = [true, true, M::SEES_LATERAL_SPEED];
@@ -148,7 +148,7 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         }
     }
     // No lane steps beyond the cap, so no step asks for it.
-    let rows = (frame.step_cap.max(1).saturating_sub(furthest) as usize).min(ROWS);
+    let rows = (frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize).min(ROWS);
     for row in 0..rows {
         for batch in batches.iter_mut() {
             let Batch { lanes, after, windows, .. } = batch;
@@ -180,7 +180,7 @@ fn step<M: DriverModel<f32>>(
 ) {
     for k in 0..LANES {
         let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
-        after.set(k, &moved.state, rules, M::SEES_OWN_ACCELERATION);
+        after.set::<M>(k, &moved.state, rules);
     }
 }
 
@@ -192,6 +192,19 @@ fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [Whereabouts<f32>
         Whereabouts { speed: speed.rows[row][k], position: position.rows[row][k], towards: towards.rows[row][k] }
     };
     [place(0), place(1)]
+}
+
+/// The largest, found by halves: side by side as long as it pays.
+#[inline(always)]
+fn largest(mut words: Words) -> u32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for k in 0..half {
+            words[k] = words[k].max(words[k + half]);
+        }
+        half /= 2;
+    }
+    words[0]
 }
 
 /// The first so many of these slots.

@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
-use crate::driver::DriverState;
+use crate::driver::{DriverModel, DriverState};
 use crate::flag::Flag;
 
 use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
@@ -282,17 +282,19 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// What moves in a step under these rules.
+    /// What moves in a step of a model under these rules.
     #[inline(always)]
-    pub fn set(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules, keeps_v_before: bool) {
+    pub fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
         let StateArrays { moving, ahead, values } = self;
         moving.index[k] = lane.index;
         moving.v_ego[k] = lane.v_ego;
-        if keeps_v_before || !rules.is_verdict_only {
+        if M::SEES_OWN_ACCELERATION || !rules.is_verdict_only {
             moving.v_before[k] = lane.v_before;
         }
         moving.gap[k] = lane.gaps[0];
-        moving.deceleration[k] = lane.driver.deceleration;
+        if M::KEEPS_DECELERATION {
+            moving.deceleration[k] = lane.driver.deceleration;
+        }
         moving.delay_steps[k] = lane.driver.delay_steps;
         moving.ttc_failed[k] = lane.record.ttc.failed.to_bits();
         moving.btn_failed[k] = lane.record.btn.failed.to_bits();
