@@ -5,11 +5,14 @@ mod common;
 
 use common::lane_sets::{forms, random, small_study, thresholds};
 use lanesweep::driver::ModelId;
+use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::profile::Profile;
 use lanesweep::scenario::Category;
 use lanesweep::sweep::{
-    Backend, CpuBackend, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
+    Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, StudyOptions, Verdicts, Wanted,
+    plan_study, same_words,
 };
+use lanesweep::trajectory::generator::GeneratorOptions;
 use lanesweep::verify::{Comparison, compare};
 
 /// Batches on every instruction set of this machine.
@@ -61,6 +64,30 @@ fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
 #[test]
 fn every_word_of_a_small_study_is_equal() {
     assert_equal("study", &small_study());
+}
+
+/// More headways than lanes wait at once, and numbers of them around those that a batch has: at the usual cap, and at
+/// one that most lanes reach, so that slots stay free beside lanes that go on.
+#[test]
+fn any_number_of_headways_gives_the_same_words() {
+    let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    let mut scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    for category in Category::ALL {
+        let mut seen = 0;
+        scenarios.retain(|scenario| {
+            seen += u32::from(scenario.category == category);
+            scenario.category != category || seen <= 2
+        });
+    }
+    let mut short = Profile::load("paper").unwrap();
+    short.frame.time_cap_s = 2.5;
+    for (profile, count) in
+        [(&short, 1), (&short, 15), (&short, 17), (&short, 300), (&Profile::load("paper").unwrap(), 600)]
+    {
+        let headways = (1..=count).map(|k| Headway::ThwS(3.0 * f64::from(k) / f64::from(count))).collect();
+        let options = StudyOptions { headways, ..StudyOptions::default() };
+        assert_equal(&format!("{count} headways"), &plan_study(&scenarios, profile, &options).unwrap().plan);
+    }
 }
 
 #[test]

@@ -159,5 +159,7 @@ fn run_in_batches<M: DriverModel<f32>>(
     const RUNS: &str = "these lanes do not run in batches";
     let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, stream.values).expect(RUNS);
     let burst = burst_for(instructions, rules).expect(RUNS);
+    // Some rules have no loop for verdicts alone.
+    let stream = &Lanes { values: !rules.is_verdict_only, ..*stream };
     run_stream(simulation, stream, entries, |fleet, waiting| burst.run(simulation, fleet, waiting), each);
 }

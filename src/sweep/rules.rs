@@ -77,3 +77,15 @@ impl Rules {
         (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_set_of_rules_has_a_number_of_its_own() {
+        for bits in 0..Rules::SETS {
+            assert_eq!(Rules::from_bits(bits).bits(), bits);
+        }
+    }
+}

@@ -45,3 +45,57 @@ fn is_in_lane<R: Real>(case: &LaneCase<R>, model_index: usize) -> bool {
     let has_widths = other.half_widths > R::ZERO && case.ego_width > R::ZERO;
     is_centred && has_widths && other.attend_from[model_index] == 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::Profile;
+    use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
+
+    fn case(category: Category, lateral: Lateral, has_second: bool) -> LaneCase<f64> {
+        let vehicle = |lateral| Participant { length_m: 4.5, width_m: 1.8, speed: Speed::constant(20.0), lateral };
+        let case = Case {
+            category,
+            ego_speed_mps: 30.0,
+            ego_length_m: 4.5,
+            ego_width_m: 1.8,
+            principal: vehicle(lateral),
+            ahead: has_second.then(|| Ahead { gap_m: 30.0, vehicle: vehicle(Lateral::Centred) }),
+            horizon_s: 5.0,
+        };
+        LaneCase::encode(&case, &Profile::load("paper").unwrap(), &mut Tables::default())
+    }
+
+    /// A leader is in the lane, one that cuts in is there, and one that cuts out has another one ahead of it. One
+    /// case of another kind takes what is known from all.
+    #[test]
+    fn only_what_holds_for_all_cases_is_known() {
+        let leader = case(Category::Lvd, Lateral::Centred, false);
+        let change = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
+        let cut_in = case(Category::CutIn, change, false);
+        let cut_out = case(Category::CutOut, Lateral::Centred, true);
+        let known = |always_there: bool, in_lane| Scene { is_pair: !always_there, always_there, in_lane };
+        assert_eq!(Scene::of(&[leader, leader], 0), known(true, true));
+        assert_eq!(Scene::of(&[leader, cut_in], 0), known(true, false));
+        assert_eq!(Scene::of(&[cut_in], 0), known(true, false));
+        assert_eq!(Scene::of(&[leader, cut_out], 0), known(false, false));
+    }
+
+    /// One that comes, goes, is not judged or is not attended to from the start has to be asked for.
+    #[test]
+    fn what_changes_within_a_lane_is_not_known() {
+        let leader = case(Category::Lvd, Lateral::Centred, false);
+        let with = |change: fn(&mut LaneCase<f64>)| {
+            let mut case = leader;
+            change(&mut case);
+            Scene::of(&[case], 1)
+        };
+        assert!(!with(|case| case.others[0].present_from = 3).always_there);
+        assert!(!with(|case| case.others[0].present_until = 3).always_there);
+        assert!(!with(|case| case.others[0].judged = 0).always_there);
+        let attends_late = with(|case| case.others[0].attend_from[1] = 1);
+        assert!(attends_late.always_there && !attends_late.in_lane);
+        assert!(with(|case| case.others[0].attend_from[0] = 1).in_lane);
+        assert!(!with(|case| case.others[0].motion.lateral_end = 0.5).in_lane);
+    }
+}
