@@ -14,7 +14,7 @@ use super::frame::Simulation;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
 use super::rules::Rules;
 use super::waiting::{Lanes, ROOM, Waiting};
-use super::window::{Window, standing};
+use super::window::Window;
 
 /// Batches of a burst.
 pub(super) const BATCHES: usize = 3;
@@ -26,8 +26,6 @@ pub(super) type Slots = u16;
 pub(super) struct Fleet<'c> {
     pub batches: [Batch; BATCHES],
     entries: &'c [f32],
-    /// A quantity of a vehicle that is the same for all lanes at all steps needs no turn.
-    moving: [[bool; 3]; 2],
 }
 
 /// [`LANES`] lanes in flight.
@@ -48,15 +46,13 @@ pub(super) struct Batch {
 impl<'c> Fleet<'c> {
     /// At the beginning of a stream: all slots are free.
     pub fn new(stream: &Lanes<'_>, entries: &'c [f32]) -> Self {
-        let quantity = |vehicle: usize, which: usize| {
-            let tracks = stream.tracks.iter().map(|tracks| tracks[vehicle].all()[which]);
-            standing(tracks, entries)
+        let window = |vehicle: usize, quantity: usize| {
+            Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
         };
-        let stands = [0, 1].map(|vehicle| [0, 1, 2].map(|which| quantity(vehicle, which)));
+        let windows = [0, 1].map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
         let lanes = LaneArrays::idle();
-        let windows = stands.map(|vehicle| vehicle.map(|value| Window::standing(value.unwrap_or(0.0))));
         let batch = Batch { lanes, after: lanes.state, windows, from: [0; LANES], free: !0, finished: 0 };
-        Fleet { batches: [batch; BATCHES], entries, moving: stands.map(|vehicle| vehicle.map(|value| value.is_none())) }
+        Fleet { batches: [batch; BATCHES], entries }
     }
 }
 
@@ -118,7 +114,7 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     let model = *simulation.model;
     let simulation =
         &Simulation { frame: &frame, criteria: &criteria, model: &model, scene: rules.scene, ..*simulation };
-    let Fleet { batches, entries, moving } = fleet;
+    let Fleet { batches, entries } = fleet;
     let mut furthest = [0; LANES];
     for batch in batches.iter_mut() {
         let slots = lowest(batch.free, waiting.count());
@@ -136,13 +132,13 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
             *furthest = index.max(*furthest);
         }
-        for vehicle in 0..1 + usize::from(rules.scene.is_pair) {
-            let is_seen = [true, true, M::SEES_LATERAL_SPEED];
-            for which in 0..3 {
-                let window = &mut batch.windows[vehicle][which];
-                window.moves |= slots != 0 && moving[vehicle][which];
-                if is_seen[which] && window.moves {
-                    turn(window, &batch.lanes.fixed.others[vehicle].tracks[which], &batch.from, entries);
+        let is_seen = [true, true, M::SEES_LATERAL_SPEED];
+        let Batch { lanes, windows, from, .. } = batch;
+        for (windows, other) in windows.iter_mut().zip(&lanes.fixed.others).take(1 + usize::from(rules.scene.is_pair)) {
+            for ((window, tracks), is_seen) in windows.iter_mut().zip(&other.tracks).zip(is_seen) {
+                window.moves |= slots != 0 && !window.stands;
+                if is_seen && window.moves {
+                    turn(window, tracks, from, entries);
                 }
             }
         }

@@ -5,16 +5,19 @@
 // Calls of functions compiled for an instruction set, after the machine was asked for it; loads and stores in them.
 #![allow(unsafe_code)]
 
-#[cfg(target_arch = "x86_64")]
-use super::batch::Slots;
 use super::batch::{Fleet, burst};
-#[cfg(target_arch = "x86_64")]
-use super::batch_arrays::{LANES, ROWS, TrackArrays, Words};
 use super::frame::Simulation;
 use super::instructions::Instructions;
 use super::rules::Rules;
-use super::waiting::{ROOM, Waiting, take};
-use super::window::{Window, goes_on, places};
+use super::waiting::{Waiting, take};
+use super::window::Window;
+#[cfg(target_arch = "x86_64")]
+use super::{
+    batch::Slots,
+    batch_arrays::{LANES, ROWS, TrackArrays, Words},
+    waiting::ROOM,
+    window::{goes_on, places},
+};
 use crate::driver::DriverModel;
 
 /// [`burst`] compiled for an instruction set and a set of rules.
@@ -87,13 +90,7 @@ fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     fleet: &mut Fleet<'_>,
     waiting: &mut Waiting,
 ) {
-    burst::<M, RULES>(
-        simulation,
-        fleet,
-        waiting,
-        |rows, waiting, from, slots| take(rows, waiting, from, slots),
-        |window, tracks, steps, entries| window.turn(tracks, steps, entries),
-    );
+    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -118,13 +115,7 @@ fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     fleet: &mut Fleet<'_>,
     waiting: &mut Waiting,
 ) {
-    burst::<M, RULES>(
-        simulation,
-        fleet,
-        waiting,
-        |rows, waiting, from, slots| take(rows, waiting, from, slots),
-        |window, tracks, steps, entries| window.turn(tracks, steps, entries),
-    );
+    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
 }
 
 /// [`take`] in registers: the entries of a row, expanded into the slots.

@@ -11,12 +11,15 @@ pub(super) struct Window {
     pub rows: [Floats; ROWS],
     /// Some lane's rows are not what it will see for ever.
     pub moves: bool,
+    /// All lanes of the stream see the same at all steps.
+    pub stands: bool,
 }
 
 impl Window {
-    /// All lanes see this.
-    pub fn standing(value: f32) -> Self {
-        Window { rows: [[value; LANES]; ROWS], moves: false }
+    /// Before the first lane of a stream with these series.
+    pub fn new(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Self {
+        let value = standing(tracks, entries);
+        Window { rows: [[value.unwrap_or(0.0); LANES]; ROWS], moves: false, stands: value.is_some() }
     }
 
     /// Takes the rows from the series: entry by entry, on every machine.
@@ -54,7 +57,7 @@ pub(super) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> bool {
 }
 
 /// What all of these series are at every step, if they are all the same and constant.
-pub(super) fn standing(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Option<f32> {
+fn standing(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Option<f32> {
     let mut found: Option<f32> = None;
     for track in tracks {
         let value = entries[track.first as usize];
