@@ -103,6 +103,7 @@ pub mod sweep;
 pub mod table;
 mod toml_file;
 pub mod trajectory;
+mod vector_state;
 pub mod verify;
 
 pub use error::{Error, Place, Result};

@@ -1,0 +1,59 @@
+//! The upper halves of the vector registers, as scalar code wants them.
+//!
+//! Kernels written in assembly, such as those below faer, may end without `vzeroupper`. The upper halves of the
+//! registers are then in use, and on Zen 5 every scalar operation has to keep them: single lanes ran at a third of
+//! their speed for the rest of the thread's life.
+
+// One instruction, after the machine was asked for it.
+#![allow(unsafe_code)]
+
+/// Clears them, on machines that have them.
+pub(crate) fn clear_upper_halves() {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx") {
+        #[target_feature(enable = "avx")]
+        fn clear() {
+            std::arch::x86_64::_mm256_zeroupper();
+        }
+        // SAFETY: the machine has AVX.
+        unsafe { clear() }
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+pub(crate) mod tests {
+    use std::arch::x86_64::{__cpuid_count, _xgetbv};
+
+    /// Are upper halves of the 256-bit registers in use? `None` where the machine does not say, or says so always.
+    pub(crate) fn upper_halves_in_use() -> Option<bool> {
+        let in_use = what_the_machine_says()?;
+        super::clear_upper_halves();
+        (what_the_machine_says() == Some(false)).then_some(in_use)
+    }
+
+    fn what_the_machine_says() -> Option<bool> {
+        // Leaf 13, subleaf 1, bit 2: XGETBV with 1.
+        let says = is_x86_feature_detected!("xsave") && __cpuid_count(13, 1).eax & 4 != 0;
+        #[target_feature(enable = "xsave")]
+        fn in_use() -> u64 {
+            // SAFETY: the machine says what is in use.
+            unsafe { _xgetbv(1) }
+        }
+        // SAFETY: the machine has XSAVE.
+        says.then(|| unsafe { in_use() } & 0b100 != 0)
+    }
+
+    #[test]
+    fn halves_that_are_in_use_are_cleared() {
+        if !is_x86_feature_detected!("avx") || upper_halves_in_use().is_none() {
+            eprintln!("SKIPPED: this machine does not say which registers are in use");
+            return;
+        }
+        let values = [1.5_f32; 8];
+        // SAFETY: the machine has AVX; reads eight values into a register and leaves them there.
+        unsafe { std::arch::asm!("vmovups ymm5, [{p}]", out("xmm5") _, p = in(reg) &values) };
+        assert_eq!(what_the_machine_says(), Some(true));
+        super::clear_upper_halves();
+        assert_eq!(what_the_machine_says(), Some(false));
+    }
+}
