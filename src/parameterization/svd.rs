@@ -124,6 +124,9 @@ mod tests {
         let rows: Vec<Vec<f64>> =
             (0..60).map(|r| (0..41).map(|c| (f64::from(r) * 0.7 + f64::from(c * c)).sin()).collect()).collect();
         fit_svd(&rows, 1, 40, 4, SeriesScale::PerInstant, "rows").unwrap();
-        assert_ne!(upper_halves_in_use(), Some(true));
+        match upper_halves_in_use() {
+            Some(in_use) => assert!(!in_use),
+            None => eprintln!("SKIPPED: this machine does not say which registers are in use"),
+        }
     }
 }

@@ -317,18 +317,56 @@ impl<const N: usize> StateArrays<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::Fsm;
 
-    /// Rows are named in the order in which they lie, none is left out and none overlaps another.
     #[test]
-    fn every_array_is_a_row() {
+    fn rows_lie_in_the_order_of_their_names() {
         let mut ego = EgoArrays::<4>::zeroed();
         ego.horizon[3] = 7;
         assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7]]);
         let mut moving = MovingArrays::<4>::zeroed();
-        assert_eq!(moving.rows().len(), 9);
-        moving.rows_mut()[8][1] = 5;
+        moving.rows_mut().last_mut().unwrap()[1] = 5;
         assert_eq!(moving.over, [0, 5, 0, 0]);
-        assert_eq!(OtherArrays::<4>::zeroed().rows().len(), 12);
-        assert_eq!(ValueArrays::<4>::zeroed().rows().len(), 6);
+    }
+
+    /// What is put into a slot, and what a step gives it, reaches every row, and comes back.
+    #[test]
+    fn no_row_of_a_lane_is_forgotten() {
+        let other = OtherConstants {
+            half_lengths: 1.0,
+            half_widths: 2.0,
+            present_from: 3,
+            present_until: 4,
+            attend_from: 5,
+            judged: Flag::TRUE,
+        };
+        let constants = LaneConstants { others: [other; 2], ego_width: 6.0, horizon: 7 };
+        let track = Track { first: 8, last: 9 };
+        let tracks = [VehicleTracks { speed: track, position: track, towards: track }; 2];
+        let record = Record {
+            ttc: TtcMinimum { gap: 10.0, closing: 11.0, failed: Flag::TRUE },
+            btn: BrakeThreatMaximum { numerator: 12.0, denominator: 13.0, failed: Flag::TRUE },
+            min_gap: 14.0,
+        };
+        let state = LaneState {
+            index: 15,
+            v_ego: 16.0,
+            v_before: 17.0,
+            gaps: [18.0, 19.0],
+            driver: DriverState { deceleration: 20.0, delay_steps: 21 },
+            reaction_step: 22,
+            record,
+            over: Flag::TRUE,
+        };
+        let mut lanes = LaneArrays::<32>::idle();
+        lanes.fill(16, &constants, &tracks, &state, true);
+        lanes.start(31, 23, state.gaps);
+        assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
+        assert_eq!(lanes.state.at(31), state);
+
+        let mut after: StateArrays<LANES> = LaneArrays::idle().state;
+        let everything = Rules::from_bits(1);
+        after.set::<Fsm<f32>>(3, &state, everything);
+        assert_eq!(after.at(3), state);
     }
 }

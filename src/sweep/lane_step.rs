@@ -104,7 +104,7 @@ pub struct Seen<R> {
 }
 
 /// What the steps of a lane have gathered so far.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record<R> {
     /// Smallest time to collision.
     pub ttc: TtcMinimum<R>,
@@ -115,7 +115,7 @@ pub struct Record<R> {
 }
 
 /// A lane between two steps.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneState<R> {
     /// The step to come.
     pub index: u32,
@@ -131,7 +131,8 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: [`conclude`] says why. Steps change nothing more.
+    /// The last step has been made, even if the time cap is far: [`conclude`] says why. Steps change nothing more, but
+    /// for `v_before` where only verdicts are wanted, which do not look at it.
     pub over: Flag,
 }
 
@@ -168,7 +169,8 @@ pub struct Moved<R> {
 }
 
 /// One step; `places` are the other vehicles at `state.index`. The lane is over where its state says so, or where the
-/// next index reaches the step cap; one that is over stays as it is.
+/// next index reaches the step cap; one that is over stays as it is (see
+/// [`LaneState::over`]).
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
@@ -179,7 +181,10 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let &Simulation { frame, criteria, model, scene, .. } = simulation;
     let &LaneState { index, v_ego, .. } = state;
     let runs = !state.over;
-    let ego = Ego { v: v_ego, a: (v_ego - state.v_before) * frame.inverse_dt, width: lane.ego_width };
+    let keeps_values = criteria.keeps_values;
+    let a_is_seen = keeps_values || M::SEES_OWN_ACCELERATION;
+    let a = if a_is_seen { (v_ego - state.v_before) * frame.inverse_dt } else { R::ZERO };
+    let ego = Ego { v: v_ego, a, width: lane.ego_width };
     // Step 0 is the start itself, unless index 0 is one step after it.
     let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
     let mut gaps = state.gaps;
@@ -216,7 +221,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let state = LaneState {
         index: index + runs.one(),
         v_ego: hazard.is_unsafe.choose(v_reacting, v_ego),
-        v_before: if criteria.keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
+        v_before: if keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
         gaps,
         driver: DriverState {
             deceleration: hazard.is_unsafe.choose(reacting.deceleration, state.driver.deceleration),
@@ -229,7 +234,8 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     Moved { state, seen: [first, second], hazard }
 }
 
-/// The verdicts of a lane whose last step has just been made, at these places.
+/// The verdicts of a lane whose last step has just been made, at these places. The speed that the ego had then is not
+/// known where only verdicts are wanted: neither it nor a closing speed may decide here.
 #[inline(always)]
 pub fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,

@@ -53,6 +53,7 @@ pub use plan_file::PlanContent;
 pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use run::{SweepOptions, SweepSummary, chunks, sweep};
 pub use runner::LaneRunner;
+pub use scene::Scene;
 pub use study::{StudyOptions, StudyPlan, plan_study};
 pub use trace::{Mark, Trace, TracedStep, TracedVehicle};
 pub use units::Units;

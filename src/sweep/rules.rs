@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_set_of_rules_has_a_number_of_its_own() {
+    fn every_number_of_a_set_comes_back_from_its_rules() {
         for bits in 0..Rules::SETS {
             assert_eq!(Rules::from_bits(bits).bits(), bits);
         }

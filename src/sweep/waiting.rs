@@ -10,7 +10,7 @@ use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState};
 use super::series::VehicleTracks;
 
-/// Lanes that wait at most; small enough for a first-level cache.
+/// Lanes that wait at most: 26 KB with one other vehicle and verdicts alone, 47 KB with all there is.
 const MOST: usize = 256;
 
 /// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
