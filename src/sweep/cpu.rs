@@ -119,7 +119,7 @@ impl RunUnits<f32> for InBatches<'_> {
     }
 
     fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
-        self.runner.verdicts_of_units(self.instructions, block, units, verdicts);
+        self.runner.run_units(self.instructions, block, units, |at, verdict| verdicts[at] = verdict);
     }
 }
 

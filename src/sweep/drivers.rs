@@ -6,18 +6,18 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::batch::Batch;
+use super::batch::Fleet;
+use super::ending::Ending;
 use super::frame::{Frame, Simulation, Start};
 use super::instructions::Instructions;
 use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;
-use super::lane_step::{conclude, verdicts};
-use super::outcome::{Outcome, Verdicts};
+use super::outcome::Outcome;
 use super::rules::Rules;
 use super::scene::Scene;
 use super::simd::burst_for;
 use super::stream::run_stream;
-use super::waiting::Lanes;
+use super::waiting::{Lanes, Waiting};
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
@@ -97,15 +97,15 @@ macro_rules! declare_constants {
             }
 
             /// Runs a stream of lanes of the chosen model in batches, where they [run in
-            /// batches](Constants::run_in_batches), and gives their outcomes in the order in which they end: lane,
-            /// counted within the stream, outcome. `entries` are the series that the stream's tracks point into.
-            pub(super) fn run_outcomes(
+            /// batches](Constants::run_in_batches), and gives what they say in the order in which they end: lane,
+            /// counted within the stream, and its end. `entries` are the series that the stream's tracks point into.
+            pub(super) fn run_stream<E: Ending>(
                 &self,
                 id: ModelId,
                 instructions: Instructions,
                 stream: &Lanes<'_>,
                 entries: &[f32],
-                mut each: impl FnMut(usize, Outcome<f32>),
+                each: impl FnMut(usize, E),
             ) {
                 let model_index = id.index();
                 let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
@@ -113,33 +113,7 @@ macro_rules! declare_constants {
                 match id {
                     $(ModelId::$model => {
                         let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
-                        run_in_batches(&simulation, instructions, stream, entries, |lane, batch, k| {
-                            let (constants, state, places) = batch.last_step(k);
-                            each(lane, conclude(&simulation, &constants, &state, &places));
-                        });
-                    })+
-                }
-            }
-
-            /// The same for verdicts alone.
-            pub(super) fn run_verdicts(
-                &self,
-                id: ModelId,
-                instructions: Instructions,
-                stream: &Lanes<'_>,
-                entries: &[f32],
-                mut each: impl FnMut(usize, Verdicts),
-            ) {
-                let model_index = id.index();
-                let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
-                let scene = Scene::of(stream.cases, model_index);
-                match id {
-                    $(ModelId::$model => {
-                        let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
-                        run_in_batches(&simulation, instructions, stream, entries, |lane, batch, k| {
-                            let (constants, state, places) = batch.last_step(k);
-                            each(lane, verdicts(&simulation, &constants, &state, &places));
-                        });
+                        run_in_batches(&simulation, instructions, stream, entries, each);
                     })+
                 }
             }
@@ -149,17 +123,21 @@ macro_rules! declare_constants {
 for_every_driver_model!(declare_constants);
 
 /// Runs a stream on an instruction set; see [`run_stream`].
-fn run_in_batches<M: DriverModel<f32>>(
+fn run_in_batches<M: DriverModel<f32>, E: Ending>(
     simulation: &Simulation<'_, f32, M>,
     instructions: Instructions,
     stream: &Lanes<'_>,
     entries: &[f32],
-    each: impl FnMut(usize, &Batch, usize),
+    mut each: impl FnMut(usize, E),
 ) {
     const RUNS: &str = "these lanes do not run in batches";
-    let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, stream.values).expect(RUNS);
+    let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, E::HAS_VALUES).expect(RUNS);
     let burst = burst_for(instructions, rules).expect(RUNS);
     // Some rules have no loop for verdicts alone.
-    let stream = &Lanes { values: !rules.is_verdict_only, ..*stream };
-    run_stream(simulation, stream, entries, |fleet, waiting| burst.run(simulation, fleet, waiting), each);
+    let values = !rules.is_verdict_only;
+    let steps = |fleet: &mut Fleet<'_>, waiting: &mut Waiting| burst.run(simulation, fleet, waiting);
+    run_stream(simulation, stream, values, entries, steps, |lane, batch, k| {
+        let (constants, state, places) = batch.last_step(k);
+        each(lane, E::of(simulation, &constants, &state, &places));
+    });
 }

@@ -4,9 +4,10 @@ use crate::driver::{DriverModel, Hazard};
 use crate::scalar::Real;
 use crate::scenario::Tables;
 
+use super::ending::conclude;
 use super::frame::{Simulation, Start};
 use super::lane_case::LaneCase;
-use super::lane_step::{LaneConstants, LaneState, Seen, Whereabouts, advance, conclude};
+use super::lane_step::{LaneConstants, LaneState, Seen, Whereabouts, advance};
 use super::outcome::Outcome;
 
 /// One step of a lane, for traces.

@@ -7,9 +7,7 @@
 //! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
 //! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
 
-use crate::criterion::{
-    BrakeThreatMaximum, BtnContact, Contact, Criteria, Criterion, TtcMinimum, contact, overlaps_along,
-};
+use crate::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, overlaps_along};
 use crate::driver::{DriverModel, DriverState, Hazard, View};
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -17,7 +15,7 @@ use crate::scenario::{Motion, Tables};
 
 use super::frame::{Frame, Simulation, Start};
 use super::lane_case::{LaneCase, LaneOther};
-use super::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+use super::outcome::NO_STEP;
 use super::scene::Scene;
 
 /// What a lane's steps need to know of another vehicle, constant within the lane.
@@ -131,7 +129,7 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: [`conclude`] says why. Steps change nothing more, but
+    /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Steps change nothing more, but
     /// for `v_before` where only verdicts are wanted, which do not look at it.
     pub over: Flag,
 }
@@ -234,102 +232,11 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     Moved { state, seen: [first, second], hazard }
 }
 
-/// The verdicts of a lane whose last step has just been made, at these places. The speed that the ego had then is not
-/// known where only verdicts are wanted: neither it nor a closing speed may decide here.
-#[inline(always)]
-pub fn verdicts<R: Real, M>(
-    simulation: &Simulation<R, M>,
-    lane: &LaneConstants<R>,
-    state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
-) -> Verdicts {
-    let [first, second] = last_seen(simulation, lane, state, places);
-    let scene = simulation.scene;
-    let mut touched = is_touched(scene, &first, &lane.others[0]);
-    if scene.is_pair {
-        touched = touched | is_touched(scene, &second, &lane.others[1]);
-    }
-    let record = &state.record;
-    let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
-    // Over for no other reason: the time cap.
-    let capped = if state.over.holds() { 0 } else { Verdicts::CAPPED };
-    let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
-    Verdicts(
-        bit(Criterion::Collision, touched)
-            | bit(Criterion::Ttc, record.ttc.failed)
-            | bit(Criterion::Btn, record.btn.failed | (touched & contact_counts))
-            | capped,
-    )
-}
-
-/// The outcome of a lane whose last step has just been made, at these places.
-#[inline(always)]
-pub fn conclude<R: Real, M>(
-    simulation: &Simulation<R, M>,
-    lane: &LaneConstants<R>,
-    state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
-) -> Outcome<R> {
-    let &Simulation { frame, criteria, scene, .. } = simulation;
-    let (index, v_ego) = (state.index - 1, state.v_before);
-    let [first, second] = last_seen(simulation, lane, state, places);
-    let first_touch = touches(&first, &lane.others[0]);
-    let by_second = scene.is_pair && first_touch == Contact::None;
-    let contact = if by_second { touches(&second, &lane.others[1]) } else { first_touch };
-    let closing = if by_second { second.view.closing() } else { first.view.closing() };
-    let collided = contact != Contact::None;
-    let aborted = (aborts(frame, &first) | aborts(frame, &second)).holds();
-    let over = index >= lane.horizon;
-    let settled = (is_settled(scene, &first) & is_settled(scene, &second)).holds();
-    let end = if collided {
-        EndReason::Contact
-    } else if aborted {
-        EndReason::Aborted
-    } else if over && v_ego <= R::ZERO {
-        EndReason::Standstill
-    } else if over && settled {
-        EndReason::Settled
-    } else {
-        EndReason::Cap
-    };
-    let record = &state.record;
-    let btn = if collided && criteria.btn_contact == BtnContact::Any { record.btn.fail() } else { record.btn };
-    Outcome {
-        verdicts: verdicts(simulation, lane, state, places),
-        contact,
-        contact_with: u8::from(collided && by_second),
-        end,
-        reaction_step: state.reaction_step,
-        contact_step: if collided { index } else { NO_STEP },
-        end_step: index,
-        impact_speed: if collided { v_ego } else { R::ZERO },
-        impact_closing_speed: if collided { closing } else { R::ZERO },
-        min_ttc: record.ttc.value(),
-        max_btn: R::from_f64(criteria.btn.value(&btn)),
-        min_gap: record.min_gap,
-    }
-}
-
-/// The other vehicles at a lane's last step.
-#[inline(always)]
-fn last_seen<R: Real, M>(
-    simulation: &Simulation<R, M>,
-    lane: &LaneConstants<R>,
-    state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
-) -> [Seen<R>; 2] {
-    let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
-    let index = state.index - 1;
-    let seen = |k: usize| see(simulation, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
-    let first = seen(0);
-    [first, if simulation.scene.is_pair { seen(1) } else { first }]
-}
-
 /// The ego at one step.
-struct Ego<R> {
-    v: R,
-    a: R,
-    width: R,
+pub(super) struct Ego<R> {
+    pub v: R,
+    pub a: R,
+    pub width: R,
 }
 
 /// The gap a step later.
@@ -340,7 +247,7 @@ fn moved_gap<R: Real>(frame: &Frame<R>, ego: &Ego<R>, gap: R, place: &Whereabout
 
 /// `runs`: the lane is not over; else nothing is there to be seen.
 #[inline(always)]
-fn see<R: Real, M>(
+pub(super) fn see<R: Real, M>(
     simulation: &Simulation<R, M>,
     ego: &Ego<R>,
     other: &OtherConstants<R>,
@@ -395,29 +302,23 @@ fn check<R: Real, M: DriverModel<R>>(
 }
 
 #[inline(always)]
-fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
+pub(super) fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
     let along = overlaps_along(seen.view.gap, other.half_lengths);
     let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
     let judged = if scene.always_there { Flag::TRUE } else { other.judged };
     seen.present & judged & across & along
 }
 
-#[inline(always)]
-fn touches<R: Real>(seen: &Seen<R>, other: &OtherConstants<R>) -> Contact {
-    let is_judged = (seen.present & other.judged).holds();
-    if is_judged { contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap) } else { Contact::None }
-}
-
 /// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
 #[inline(always)]
-fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
+pub(super) fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
     let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
     let in_lane = seen.judged | (seen.present & across);
     seen.view.is_behind() | !in_lane | !seen.view.closing().is_positive()
 }
 
 #[inline(always)]
-fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> Flag {
+pub(super) fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> Flag {
     if frame.abort_above_ttc > R::ZERO {
         let overlap = seen.present & seen.view.lateral_gap.is_negative() & !seen.view.is_behind();
         let limit = frame.abort_above_ttc * seen.view.closing().abs();

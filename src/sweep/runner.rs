@@ -5,11 +5,12 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::drivers::Constants;
+use super::ending::Ending;
 use super::frame::Start;
 use super::instructions::Instructions;
 use super::lane::Silent;
 use super::lane_case::LaneCase;
-use super::outcome::{Outcome, Verdicts};
+use super::outcome::Outcome;
 use super::plan::{LaneKey, LanePlan};
 use super::scene::Scene;
 use super::series::Series;
@@ -97,74 +98,24 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         start: Start<R>,
         model: ModelId,
     ) -> Outcome<R> {
-        let is_pair = case.pair != 0;
         let scene = if self.as_in_batches {
             Scene::of(std::slice::from_ref(case), model.index())
         } else {
-            Scene::unknown(is_pair)
+            Scene::unknown(case.pair != 0)
         };
-        self.constants[block].run_in(model, Scene { is_pair, ..scene }, case, tables, start, &mut Silent)
+        self.constants[block].run_in(model, scene, case, tables, start, &mut Silent)
     }
 }
 
 impl LaneRunner<'_, f32> {
-    /// All lanes of some units of a block, in batches: position counted from the first unit on, outcome. In no
-    /// particular order.
-    pub fn run_units(
+    /// All lanes of some units of a block, in batches: position counted from the first unit on, what is wanted of its
+    /// end. In no particular order.
+    pub fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
         block: usize,
         units: Range<u64>,
-        mut each: impl FnMut(usize, Outcome<f32>),
-    ) {
-        let models = self.plan.models.len();
-        let constants = &self.constants[block];
-        let in_batches = constants.run_in_batches(instructions);
-        self.with_units(block, units, in_batches, |cases, tables, stream, entries| {
-            for (at_model, &model) in self.plan.models.iter().enumerate() {
-                let each = |lane: usize, outcome| each(lane * models + at_model, outcome);
-                if in_batches {
-                    constants.run_outcomes(model, instructions, &Lanes { values: true, ..*stream }, entries, each);
-                } else {
-                    self.one_by_one(block, cases, tables, model, each);
-                }
-            }
-        });
-    }
-
-    /// The verdicts of all lanes of some units of a block, in batches, in the plan's order.
-    pub fn verdicts_of_units(
-        &self,
-        instructions: Instructions,
-        block: usize,
-        units: Range<u64>,
-        verdicts: &mut [Verdicts],
-    ) {
-        let models = self.plan.models.len();
-        let constants = &self.constants[block];
-        let in_batches = constants.run_in_batches(instructions);
-        self.with_units(block, units, in_batches, |cases, tables, stream, entries| {
-            for (at_model, &model) in self.plan.models.iter().enumerate() {
-                if in_batches {
-                    let each = |lane: usize, verdict| verdicts[lane * models + at_model] = verdict;
-                    constants.run_verdicts(model, instructions, stream, entries, each);
-                } else {
-                    let each = |lane: usize, outcome: Outcome<f32>| {
-                        verdicts[lane * models + at_model] = outcome.verdicts;
-                    };
-                    self.one_by_one(block, cases, tables, model, each);
-                }
-            }
-        });
-    }
-
-    /// Gives the cases of some units, the tables they point into and, unrolled, what batches need of them.
-    fn with_units(
-        &self,
-        block: usize,
-        units: Range<u64>,
-        in_batches: bool,
-        run: impl FnOnce(&[LaneCase<f32>], &Tables<f32>, &Lanes<'_>, &[f32]),
+        mut each: impl FnMut(usize, E),
     ) {
         let variants = self.plan.blocks[block].variants.len();
         let mut made = Tables::default();
@@ -176,30 +127,41 @@ impl LaneRunner<'_, f32> {
                 (cases, &self.tables)
             }
         };
+        let constants = &self.constants[block];
+        let in_batches = constants.run_in_batches(instructions);
         let step_cap = self.plan.profile.step_cap();
         let mut series = self.spare.lock().ok().and_then(|mut spare| spare.pop()).unwrap_or_default();
         series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts, values: false };
-        run(&cases, tables, &stream, series.entries());
+        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts };
+        let models = self.plan.models.len();
+        for (at_model, &model) in self.plan.models.iter().enumerate() {
+            let each = |lane: usize, end: E| each(lane * models + at_model, end);
+            if in_batches {
+                constants.run_stream(model, instructions, &stream, series.entries(), each);
+            } else {
+                self.one_by_one(block, &cases, tables, model, each);
+            }
+        }
         if let Ok(mut spare) = self.spare.lock() {
             spare.push(series);
         }
     }
 
     /// All lanes of a model, each for itself.
-    fn one_by_one(
+    fn one_by_one<E: Ending>(
         &self,
         block: usize,
         cases: &[LaneCase<f32>],
         tables: &Tables<f32>,
         model: ModelId,
-        mut each: impl FnMut(usize, Outcome<f32>),
+        mut each: impl FnMut(usize, E),
     ) {
         for (at_case, case) in cases.iter().enumerate() {
             for (at_start, &start) in self.starts.iter().enumerate() {
-                each(at_case * self.starts.len() + at_start, self.run_case(block, case, tables, start, model));
+                let outcome = self.run_case(block, case, tables, start, model);
+                each(at_case * self.starts.len() + at_start, outcome.into());
             }
         }
     }

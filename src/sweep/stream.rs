@@ -8,17 +8,18 @@ use super::batch_arrays::LANES;
 use super::frame::Simulation;
 use super::waiting::{Lanes, Waiting};
 
-/// Runs a stream of lanes of one model. `steps` is a [`burst`](super::batch::burst), `each` takes the lanes after
+/// Runs a stream of lanes of one model; `values`: continuous ones are wanted, not verdicts alone. `steps` is a [`burst`](super::batch::burst), `each` takes the lanes after
 /// their last steps, in the order in which they end: the lane, counted within the stream, its batch and its slot.
 pub(super) fn run_stream<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     stream: &Lanes<'_>,
+    values: bool,
     entries: &[f32],
     steps: impl Fn(&mut Fleet<'_>, &mut Waiting),
     mut each: impl FnMut(usize, &Batch, usize),
 ) {
     let mut fleet = Fleet::new(stream, entries);
-    let mut waiting = Waiting::new();
+    let mut waiting = Waiting::new(values);
     loop {
         waiting.have(BATCHES * LANES, simulation, stream);
         if waiting.count() == 0 && fleet.batches.iter().all(|batch| batch.free == !0) {

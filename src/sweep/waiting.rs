@@ -25,13 +25,13 @@ pub(super) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
-    /// Continuous values are wanted, not verdicts alone.
-    pub values: bool,
 }
 
 /// The next lanes of a stream.
 pub(super) struct Waiting {
     lanes: Box<LaneArrays<ROOM>>,
+    /// Continuous values are wanted, not verdicts alone.
+    values: bool,
     /// The first that waits.
     first: usize,
     /// The end of them.
@@ -45,8 +45,8 @@ pub(super) struct Waiting {
 
 impl Waiting {
     /// At the beginning of a stream.
-    pub fn new() -> Self {
-        Waiting { lanes: Box::new(LaneArrays::idle()), first: 0, end: 0, case: 0, start: 0, lane: 0 }
+    pub fn new(values: bool) -> Self {
+        Waiting { lanes: Box::new(LaneArrays::idle()), values, first: 0, end: 0, case: 0, start: 0, lane: 0 }
     }
 
     /// How many wait.
@@ -75,15 +75,15 @@ impl Waiting {
         if self.count() >= least || self.case == stream.cases.len() {
             return;
         }
-        self.close_up(simulation.scene.is_pair, stream);
+        self.close_up(simulation.scene.is_pair);
         while self.end < MOST && self.case < stream.cases.len() {
             self.add(simulation, stream);
         }
     }
 
     /// Moves those that wait to the front.
-    fn close_up(&mut self, is_pair: bool, stream: &Lanes<'_>) {
-        for part in self.lanes.parts_mut(is_pair, stream.values) {
+    fn close_up(&mut self, is_pair: bool) {
+        for part in self.lanes.parts_mut(is_pair, self.values) {
             for row in part {
                 row.copy_within(self.first..self.end, 0);
             }
@@ -100,7 +100,7 @@ impl Waiting {
         let starts = &starts[..starts.len().min(MOST - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
-            self.lanes.fill(self.end, &constants, tracks, &state, stream.values);
+            self.lanes.fill(self.end, &constants, tracks, &state, self.values);
             for &start in starts {
                 self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
                 self.end += 1;
