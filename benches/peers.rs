@@ -1,5 +1,5 @@
-//! The same lanes as plain Python, NumPy, numba and JAX compute them: leader decelerations of a study of the
-//! paper's size, Reg157 and FSM, profile `paper`, one thread each.
+//! The same lanes as plain Python, NumPy, numba and JAX compute them: leader decelerations and cut-outs of a study
+//! of the paper's size, Reg157 and FSM, profile `paper`, one thread each.
 //!
 //! `cargo bench --bench peers` computes the lanes with the CPU backend, writes them to a temporary folder for
 //! `benches/peers/run.py`, and makes the virtual environment with the pinned packages it needs. CSV rows go to
@@ -12,12 +12,14 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
-use lanesweep::driver::ModelId;
+use lanesweep::driver::{ModelId, NEVER};
 use lanesweep::profile::Profile;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, StudyOptions};
-use lanesweep::sweep::{SweepOptions, Wanted, plan_study, sweep};
+use lanesweep::scenario::{Category, Motion, Scenario};
+use lanesweep::sweep::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome};
+use lanesweep::sweep::{StudyOptions, SweepOptions, Wanted, plan_study, sweep};
 
+/// The smallest lanes, and those that most steps of a study are made for.
+const CATEGORIES: [Category; 2] = [Category::Lvd, Category::CutOut];
 const MODELS: [ModelId; 2] = [ModelId::Reg157, ModelId::Fsm];
 const REPETITIONS: usize = 7;
 /// Oldest Python that the pinned packages support.
@@ -28,17 +30,21 @@ fn main() {
     if !std::env::args().any(|arg| arg == "--bench") {
         return;
     }
-    let mut scenarios = paper_size_scenarios();
-    scenarios.retain(|s| s.category == Category::Lvd);
+    let scenarios = paper_size_scenarios();
     let profile = Profile::load("paper").unwrap();
     let folder = tempfile::tempdir().unwrap();
-    println!("peer,model,lanes,lane_steps,seconds,lane_steps_per_s,ratio_to_ours,verdicts_differing,ends_differing");
+    println!(
+        "peer,category,model,lanes,lane_steps,seconds,lane_steps_per_s,ratio_to_ours,verdicts_differing,ends_differing"
+    );
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let ours: Vec<Measured> = MODELS
-        .into_iter()
-        .map(|model| one_thread.install(|| measure(&scenarios, &profile, model, folder.path())))
-        .collect();
-    write_manifest(folder.path(), &profile, &ours);
+    for category in CATEGORIES {
+        let folder = folder.path().join(category.key());
+        std::fs::create_dir(&folder).unwrap();
+        let of_category: Vec<Scenario> = scenarios.iter().filter(|s| s.category == category).cloned().collect();
+        let measure = |model| one_thread.install(|| measure(&of_category, &profile, category, model, &folder));
+        let ours: Vec<Measured> = MODELS.into_iter().map(measure).collect();
+        write_manifest(&folder, &profile, category, &ours);
+    }
     match python_with_packages() {
         Ok(python) => run_peers(&python, folder.path()),
         Err(reason) => eprintln!("SKIPPED: the peers did not run, only ours did: {reason}"),
@@ -50,15 +56,15 @@ struct Measured {
     model: ModelId,
     lanes: usize,
     cases: usize,
-    /// Length of the leaders' speed series.
+    /// Length of the series.
     width: usize,
     seconds: f64,
     lane_steps_per_s: f64,
 }
 
 /// Times the sweep of one model's lanes, prints its row and writes its lanes.
-fn measure(scenarios: &[Scenario], profile: &Profile, model: ModelId, folder: &Path) -> Measured {
-    let options = StudyOptions { categories: vec![Category::Lvd], models: vec![model], ..StudyOptions::default() };
+fn measure(scenarios: &[Scenario], profile: &Profile, category: Category, model: ModelId, folder: &Path) -> Measured {
+    let options = StudyOptions { categories: vec![category], models: vec![model], ..StudyOptions::default() };
     let plan = plan_study(scenarios, profile, &options).unwrap().plan;
     let backend = CpuBackend::lane_arithmetic();
     let best = |backend: &dyn Backend| {
@@ -73,22 +79,23 @@ fn measure(scenarios: &[Scenario], profile: &Profile, model: ModelId, folder: &P
     let outcomes = run(&plan, &backend, Wanted::Outcomes);
     let steps = lane_steps(&plan, &backend);
     let rate = steps as f64 / seconds;
-    println!("lanesweep,{},{},{steps},{seconds},{rate},1,0,0", model.name(), outcomes.len());
-    eprintln!("{}, {}: {seconds:.3} s, {:.2} M lane-steps/s", backend.describe(), model.name(), rate / 1e6);
+    let (lanes, name) = (outcomes.len(), format!("{},{}", category.key(), model.name()));
+    println!("lanesweep,{name},{lanes},{steps},{seconds},{rate},1,0,0");
+    eprintln!("{}, {name}: {seconds:.3} s, {:.2} M lane-steps/s", backend.describe(), rate / 1e6);
     // Beside the best instructions those of smaller machines.
     for set in Instructions::available().into_iter().filter(|set| *set != Instructions::best()) {
         let seconds = best(&CpuBackend::with_instructions(set).unwrap());
-        let (lanes, slower) = (outcomes.len(), steps as f64 / seconds);
-        println!("lanesweep {set},{},{lanes},{steps},{seconds},{slower},{},0,0", model.name(), rate / slower);
-        eprintln!("{set}, {}: {seconds:.3} s, {:.2} M lane-steps/s", model.name(), slower / 1e6);
+        let slower = steps as f64 / seconds;
+        println!("lanesweep {set},{name},{lanes},{steps},{seconds},{slower},{},0,0", rate / slower);
+        eprintln!("{set}, {name}: {seconds:.3} s, {:.2} M lane-steps/s", slower / 1e6);
     }
-    let (cases, width) = write_cases(folder, &plan);
+    let (cases, width) = write_cases(folder, category, &plan);
     let verdicts: Vec<u8> = outcomes.iter().map(|o| o.verdicts.0).collect();
     std::fs::write(folder.join(format!("verdicts_{}.u8", model.name())), verdicts).unwrap();
     write_words(folder, &format!("end_step_{}.u32", model.name()), outcomes.iter().map(|o| o.end_step.to_le_bytes()));
     let keys: Vec<String> = (0..plan.lane_count()).map(|lane| plan.key_text(&plan.key(lane).unwrap())).collect();
     std::fs::write(folder.join(format!("keys_{}.txt", model.name())), keys.join("\n")).unwrap();
-    Measured { model, lanes: outcomes.len(), cases, width, seconds, lane_steps_per_s: rate }
+    Measured { model, lanes, cases, width, seconds, lane_steps_per_s: rate }
 }
 
 fn run(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Vec<Outcome<f64>> {
@@ -101,36 +108,66 @@ fn run(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Vec<Outcome<f6
     outcomes
 }
 
-/// Writes what the lanes of a plan share per case: ego speed, horizon, the leader's speed at every step, in the
-/// lane arithmetic. Gives the number of cases and of steps. Lane = case × headways + headway.
-fn write_cases(folder: &Path, plan: &LanePlan) -> (usize, usize) {
+/// Writes what the lanes of a plan share per case, in the lane arithmetic: ego, horizon, the other vehicles at every
+/// step. Gives the number of cases and of steps. Lane = case × headways + headway.
+fn write_cases(folder: &Path, category: Category, plan: &LanePlan) -> (usize, usize) {
     let variants = plan.blocks[0].variants.len();
     let cases: Vec<LaneCase<f32>> = (0..plan.unit_count())
         .flat_map(|unit| (0..variants).map(move |variant| (unit, variant)))
         .map(|(unit, variant)| plan.case(0, unit, variant).cast())
         .collect();
     let tables = plan.tables().cast::<f32>();
-    let events = |case: &LaneCase<f32>| case.others[0].motion.speed_len.max(case.others[0].motion.speed_until + 2);
-    let width = cases.iter().map(events).max().unwrap_or(1);
-    // What peers leave out: a leader that is always ahead in the ego's lane, and seen from the start.
-    for case in &cases {
-        let other = &case.others[0];
-        assert!(case.pair == 0 && other.judged == 1 && other.gap_offset == 0.0 && other.half_widths > 0.0);
-        assert!(other.present_from == 0 && MODELS.iter().all(|m| other.attend_from[m.index()] == 0));
-        assert!((0..width).all(|i| other.motion.lateral(&tables, i).position == 0.0));
-    }
-    write_words(folder, "ego_speed.f32", cases.iter().map(|c| c.ego_speed.to_le_bytes()));
+    let width = cases.iter().map(|case| events(case, category)).max().unwrap_or(1).min(plan.profile.step_cap());
     write_words(folder, "horizon.u32", cases.iter().map(|c| c.horizon.to_le_bytes()));
-    let speeds = cases.iter().flat_map(|c| (0..width).map(|i| c.others[0].motion.speed(&tables, i).to_le_bytes()));
-    write_words(folder, "leader_speed.f32", speeds);
+    let per_case = |name: &str, number: fn(&LaneCase<f32>) -> f32| {
+        write_words(folder, &format!("{name}.f32"), cases.iter().map(|c| number(c).to_le_bytes()));
+    };
+    let per_step = |name: &str, number: &dyn Fn(&Motion<f32>, u32) -> f32, vehicle: usize| {
+        let of = |case: &LaneCase<f32>| (0..width).map(|i| number(&case.others[vehicle].motion, i)).collect::<Vec<_>>();
+        write_words(folder, &format!("{name}.f32"), cases.iter().flat_map(of).map(f32::to_le_bytes));
+    };
+    // The vehicle that stays in the lane.
+    let leader = usize::from(category == Category::CutOut);
+    per_case("ego_speed", |c| c.ego_speed);
+    per_case("leader_gap_offset", if leader == 1 { |c| c.others[1].gap_offset } else { |c| c.others[0].gap_offset });
+    per_step("leader_speed", &|motion, i| motion.speed(&tables, i), leader);
+    if category == Category::CutOut {
+        per_case("ego_width", |c| c.ego_width);
+        per_case("cutter_half_lengths", |c| c.others[0].half_lengths);
+        per_case("cutter_half_widths", |c| c.others[0].half_widths);
+        per_step("cutter_speed", &|motion, i| motion.speed(&tables, i), 0);
+        per_step("cutter_lateral", &|motion, i| motion.lateral(&tables, i).position, 0);
+        per_step("cutter_towards", &|motion, i| motion.lateral(&tables, i).towards, 0);
+    }
+    // What peers leave out: vehicles that come, go, are not judged or not seen from the start; a leader beside the lane.
+    for case in &cases {
+        assert_eq!(case.pair as usize, leader);
+        for other in &case.others[..=leader] {
+            assert!(other.judged == 1 && other.used == 1 && other.present_from == 0 && other.present_until == NEVER);
+            assert!(MODELS.iter().all(|m| other.attend_from[m.index()] == 0));
+        }
+        let stays = &case.others[leader];
+        assert!(stays.half_widths > 0.0 && (0..width).all(|i| stays.motion.lateral(&tables, i).position == 0.0));
+        assert!(case.others[0].gap_offset == 0.0);
+    }
     (cases.len(), width as usize)
+}
+
+/// Steps after which nothing changes any more.
+fn events(case: &LaneCase<f32>, category: Category) -> u32 {
+    let of = |motion: &Motion<f32>| {
+        let until = motion.speed_until.max(motion.lateral_until).saturating_add(2);
+        until.max(motion.speed_len).max(motion.lateral_len)
+    };
+    let ahead = if category == Category::CutOut { of(&case.others[1].motion) } else { 0 };
+    of(&case.others[0].motion).max(ahead)
 }
 
 fn write_words(folder: &Path, name: &str, words: impl Iterator<Item = [u8; 4]>) {
     std::fs::write(folder.join(name), words.flatten().collect::<Vec<u8>>()).unwrap();
 }
 
-fn write_manifest(folder: &Path, profile: &Profile, ours: &[Measured]) {
+fn write_manifest(folder: &Path, profile: &Profile, category: Category, ours: &[Measured]) {
     let headways: Vec<f64> = Headway::paper()
         .iter()
         .map(|headway| match headway {
@@ -149,6 +186,7 @@ fn write_manifest(folder: &Path, profile: &Profile, ours: &[Measured]) {
         })
         .collect();
     let manifest = serde_json::json!({
+        "category": category.key(),
         "cases": ours[0].cases,
         "width": ours[0].width,
         "headways_s": headways,

@@ -1,9 +1,10 @@
 """The lanes that every peer computes, and the constants of the profile `paper`.
 
-Written from the specification of the driver models (sections 1, 2.1, 2.4 and 4). A lane is one leader
-deceleration: the leader brakes along a given speed series, the ego follows at a time headway and reacts as its
-driver model says. The leader stays in the ego's lane, so nothing lateral is computed, and a lane asks for its
-verdicts only: both are less work than the sweep does.
+Written from the specification of the driver models (sections 1, 2.1, 2.4 and 4). The ego starts at a time headway
+and reacts as its driver model says to vehicles that move along given series. In a leader deceleration that is one
+vehicle, the leader. In a cut-out another one is between the two at first and leaves the ego's lane: the cutter.
+The leader stays in the middle of the ego's lane, so nothing lateral is computed for it, and a lane asks for its
+verdicts only.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 
 MODELS = ("Reg157", "FSM")
+CATEGORIES = ("lvd", "cut_out")
 
 # Verdict bits.
 COLLISION, TTC, BTN, CAPPED = 1, 2, 4, 8
@@ -52,6 +54,8 @@ class Constants(NamedTuple):
     reg157_half_inverse: float = 1.0 / (2.0 * 6.0)
     reg157_constant: float = 0.35 + 0.1
     reg157_deceleration: float = 6.0
+    # Reg157 looks at vehicles up to this lateral gap, m.
+    reg157_gate: float = 0.5
     # FSM: τ, b_comf, b_max − b_comf, 1/(2b) of both and of the leader's 7 m/s², d1.
     tau: float = 0.75
     half_tau: float = 0.75 / 2.0
@@ -61,6 +65,8 @@ class Constants(NamedTuple):
     half_inverse_max: float = 1.0 / (2.0 * 6.0)
     half_inverse_lead: float = 1.0 / (2.0 * 7.0)
     margin: float = 2.0
+    # FSM: added to the time in which a vehicle comes in, s.
+    gate_margin: float = 0.1
     jerk_per_step: float = JERK_MPS3 * DT_S
     max_deceleration: float = MAX_DECELERATION_MPS2
 
@@ -85,12 +91,32 @@ class Ours:
 
 
 @dataclass(frozen=True)
+class Cutters:
+    """The vehicles between ego and leader that leave the ego's lane."""
+
+    # Per lane: gap at step 0; halves of the sums of the lengths and of the widths; width of the ego, m.
+    gap: Floats
+    half_lengths: Floats
+    half_widths: Floats
+    ego_width: Floats
+    # Speed, m/s; distance from the middle of the ego's lane, m; lateral speed towards the ego, m/s: cases × steps.
+    speed: Floats
+    lateral: Floats
+    towards: Floats
+
+    def every(self, stride: int) -> Cutters:
+        """Every so many lanes."""
+        per_lane = (self.gap, self.half_lengths, self.half_widths, self.ego_width)
+        return Cutters(*(numbers[::stride] for numbers in per_lane), self.speed, self.lateral, self.towards)
+
+
+@dataclass(frozen=True)
 class Lanes:
     """Lanes, one entry each, and the cases they share."""
 
     # Index of the case.
     case: NDArray[np.int32]
-    # Gap at step 0, m.
+    # Gap to the leader at step 0, m.
     gap: Floats
     # Speed of the ego at step 0, m/s.
     ego_speed: Floats
@@ -98,6 +124,8 @@ class Lanes:
     horizon: NDArray[np.int32]
     # Speed of the leader, m/s: cases × steps; the last one is held.
     leader_speed: Floats
+    # None in leader decelerations.
+    cutters: Cutters | None
 
     def __len__(self) -> int:
         return len(self.case)
@@ -110,6 +138,7 @@ class Lanes:
             self.ego_speed[::stride],
             self.horizon[::stride],
             self.leader_speed,
+            None if self.cutters is None else self.cutters.every(stride),
         )
 
 
@@ -134,16 +163,34 @@ def read(folder: Path) -> tuple[Lanes, dict[str, Ours]]:
     if (manifest["dt_s"], manifest["step_cap"]) != (DT_S, STEP_CAP):
         raise ValueError("the lanes have another time step or cap than benches/peers/lanes.py")
     headways = np.array(manifest["headways_s"], "<f4")
-    ego_speed = np.fromfile(folder / "ego_speed.f32", "<f4")
-    horizon = np.fromfile(folder / "horizon.u32", "<u4").astype(np.int32)
-    leader_speed = np.fromfile(folder / "leader_speed.f32", "<f4").reshape(-1, manifest["width"])
     case = np.repeat(np.arange(manifest["cases"], dtype=np.int32), len(headways))
+
+    def per_lane(name: str) -> Floats:
+        return np.fromfile(folder / f"{name}.f32", "<f4")[case]
+
+    def series(name: str) -> Floats:
+        return np.fromfile(folder / f"{name}.f32", "<f4").reshape(-1, manifest["width"])
+
+    ego_speed = per_lane("ego_speed")
+    gap = np.tile(headways, manifest["cases"]) * ego_speed
+    cutters = None
+    if manifest["category"] == "cut_out":
+        cutters = Cutters(
+            gap=gap,
+            half_lengths=per_lane("cutter_half_lengths"),
+            half_widths=per_lane("cutter_half_widths"),
+            ego_width=per_lane("ego_width"),
+            speed=series("cutter_speed"),
+            lateral=np.abs(series("cutter_lateral")),
+            towards=series("cutter_towards"),
+        )
     lanes = Lanes(
         case=case,
-        gap=np.tile(headways, manifest["cases"]) * ego_speed[case],
-        ego_speed=ego_speed[case],
-        horizon=horizon[case],
-        leader_speed=leader_speed,
+        gap=gap + per_lane("leader_gap_offset"),
+        ego_speed=ego_speed,
+        horizon=np.fromfile(folder / "horizon.u32", "<u4").astype(np.int32)[case],
+        leader_speed=series("leader_speed"),
+        cutters=cutters,
     )
     ours = {
         model["name"]: Ours(

@@ -18,13 +18,13 @@ class Driver:
         self.delay = delay
         self.deceleration = 0.0
 
-    def brake(self, deceleration: float, speed: float) -> float:
-        """Next speed after an unsafe step."""
+    def brake(self, demand: float, speed: float) -> float:
+        """Speed one step later, if the driver wants to brake that hard."""
         if self.delay > 0:
             self.delay -= 1
             return speed
-        self.deceleration = deceleration
-        return max(speed - deceleration * C.dt, 0.0)
+        self.deceleration = self.limited(demand)
+        return max(speed - self.deceleration * C.dt, 0.0)
 
 
 class Reg157(Driver):
@@ -33,12 +33,20 @@ class Reg157(Driver):
     def __init__(self) -> None:
         super().__init__(DELAY_STEPS["Reg157"])
 
-    def next_speed(self, speed: float, before: float, leader: float, gap: float) -> float:
-        """One step of the ego."""
-        dv = speed - leader
+    def demand(self, speed: float, before: float, other: float, gap: float) -> float:
+        """How hard to brake for a vehicle; 0 is safe."""
+        dv = speed - other
         if dv != 0.0 and abs(gap) <= abs(dv) * (dv * C.reg157_half_inverse + C.reg157_constant):
-            return self.brake(C.reg157_deceleration, speed)
-        return speed
+            return C.reg157_deceleration
+        return 0.0
+
+    def looks_at(self, lateral_gap: float, towards: float, dv: float, passing: float) -> bool:
+        """Is a vehicle near enough across the road?"""
+        return lateral_gap <= C.reg157_gate
+
+    def limited(self, demand: float) -> float:
+        """The deceleration of this step."""
+        return demand
 
 
 class Fsm(Driver):
@@ -47,15 +55,24 @@ class Fsm(Driver):
     def __init__(self) -> None:
         super().__init__(DELAY_STEPS["FSM"])
 
-    def next_speed(self, speed: float, before: float, leader: float, gap: float) -> float:
-        """One step of the ego."""
-        pfs = proactive(speed, leader, gap)
-        cfs = critical(speed, leader, gap, (speed - before) * C.inverse_dt)
-        if pfs <= 0.0 and cfs <= 0.0:
-            return speed
-        demand = cfs * C.b_span + C.b_comf if cfs > 0.0 else pfs * C.b_comf
-        ramp = min(self.deceleration + C.jerk_per_step, C.max_deceleration)
-        return self.brake(min(ramp, demand), speed)
+    def demand(self, speed: float, before: float, other: float, gap: float) -> float:
+        """How hard to brake for a vehicle; 0 is safe."""
+        cfs = critical(speed, other, gap, (speed - before) * C.inverse_dt)
+        if cfs > 0.0:
+            return cfs * C.b_span + C.b_comf
+        return proactive(speed, other, gap) * C.b_comf
+
+    def looks_at(self, lateral_gap: float, towards: float, dv: float, passing: float) -> bool:
+        """Is a vehicle in the way, or will it be before the ego has passed it?"""
+        if lateral_gap <= 0.0:
+            return True
+        if towards <= 0.0 or dv < 0.0:
+            return False
+        return dv == 0.0 or lateral_gap * dv <= towards * (passing + C.gate_margin * dv)
+
+    def limited(self, demand: float) -> float:
+        """The deceleration of this step: more only with the jerk, less at once."""
+        return min(self.deceleration + C.jerk_per_step, C.max_deceleration, demand)
 
 
 def fuzzy(distance: float, safe: float, dangerous: float) -> float:
@@ -67,33 +84,33 @@ def fuzzy(distance: float, safe: float, dangerous: float) -> float:
     return (distance - safe) / (dangerous - safe)
 
 
-def proactive(speed: float, leader: float, gap: float) -> float:
-    """PFS: the leader's possible braking."""
+def proactive(speed: float, other: float, gap: float) -> float:
+    """PFS: the other vehicle's possible braking."""
     reaction = speed * C.tau
-    lead_stop = leader * leader * C.half_inverse_lead
+    lead_stop = other * other * C.half_inverse_lead
     safe = reaction + speed * speed * C.half_inverse_comf - lead_stop + C.margin
     dangerous = reaction + speed * speed * C.half_inverse_max - lead_stop
     return fuzzy(gap - C.margin, safe, dangerous)
 
 
-def critical(speed: float, leader: float, gap: float, acceleration: float) -> float:
+def critical(speed: float, other: float, gap: float, acceleration: float) -> float:
     """CFS: the present closing."""
-    if speed <= leader:
+    if speed <= other:
         return 0.0
     limited = max(acceleration, -C.b_comf)
     new_speed = speed + C.tau * limited
-    if new_speed < leader:
-        dv = speed - leader
+    if new_speed < other:
+        dv = speed - other
         return 1.0 if (gap + gap) * abs(acceleration) < dv * dv else 0.0
-    new_dv = new_speed - leader
-    new_distance = (speed + limited * C.half_tau - leader) * C.tau
+    new_dv = new_speed - other
+    new_distance = (speed + limited * C.half_tau - other) * C.tau
     safe = new_distance + new_dv * new_dv * C.half_inverse_comf
     dangerous = new_distance + new_dv * new_dv * C.half_inverse_max
     return fuzzy(gap, safe, dangerous)
 
 
-def simulate(driver: Reg157 | Fsm, speed: float, gap: float, leaders: list[float], horizon: int) -> tuple[int, int]:
-    """One lane: verdict bits and last step."""
+def deceleration(driver: Reg157 | Fsm, speed: float, gap: float, horizon: int, leaders: list[float]) -> tuple[int, int]:
+    """One leader deceleration: verdict bits and last step."""
     verdicts = 0
     before = speed
     last = len(leaders) - 1
@@ -107,29 +124,107 @@ def simulate(driver: Reg157 | Fsm, speed: float, gap: float, leaders: list[float
             room = gap - closing * C.btn_ramp_delay
             if room <= 0.0 or closing * closing > C.btn_two_a_limit * room:
                 verdicts |= BTN
-        next_speed = driver.next_speed(speed, before, leader, gap)
+        demand = driver.demand(speed, before, leader, gap)
         if gap < 0.0:
             return verdicts | COLLISION | BTN, step
         if step >= horizon and (speed <= 0.0 or closing <= 0.0):
             return verdicts, step
         if step + 1 >= STEP_CAP:
             return verdicts | CAPPED, step
+        before = speed
+        if demand > 0.0:
+            speed = driver.brake(demand, speed)
         step += 1
-        before, speed = speed, next_speed
         leader = leaders[min(step, last)]
         gap += (leader - speed) * C.dt
 
 
+# Speed of the leader; of the one that cuts out: speed, distance from the middle of the lane, speed towards the ego.
+Step = tuple[float, float, float, float]
+# Gap; halves of the sums of lengths and widths; width of the ego.
+Sizes = tuple[float, float, float, float]
+
+
+def cut_out(
+    driver: Reg157 | Fsm, speed: float, gap: float, horizon: int, sizes: Sizes, steps: list[Step]
+) -> tuple[int, int]:
+    """One cut-out: verdict bits and last step."""
+    verdicts = 0
+    before = speed
+    last = len(steps) - 1
+    cutter_gap, half_lengths, half_widths, ego_width = sizes
+    leader, cutter, lateral, towards = steps[0]
+    step = 0
+    while True:
+        closing = speed - leader
+        if closing > 0.0:
+            if max(gap, 0.0) < C.ttc_threshold * closing:
+                verdicts |= TTC
+            room = gap - closing * C.btn_ramp_delay
+            if room <= 0.0 or closing * closing > C.btn_two_a_limit * room:
+                verdicts |= BTN
+        demand = driver.demand(speed, before, leader, gap)
+        touched = gap < 0.0
+        settled = closing <= 0.0
+        # Once the ego has passed the one that cuts out, it looks at it no more.
+        if cutter_gap + half_lengths >= 0.0:
+            cutter_closing = speed - cutter
+            lateral_gap = lateral - half_widths
+            if cutter_closing > 0.0 and lateral <= ego_width:
+                if max(cutter_gap, 0.0) < C.ttc_threshold * cutter_closing:
+                    verdicts |= TTC
+                room = cutter_gap - cutter_closing * C.btn_ramp_delay
+                if room <= 0.0 or cutter_closing * cutter_closing > C.btn_two_a_limit * room:
+                    verdicts |= BTN
+            passing = cutter_gap + half_lengths + half_lengths
+            if driver.looks_at(lateral_gap, towards, cutter_closing, passing):
+                cutter_demand = driver.demand(speed, before, cutter, cutter_gap)
+                # The nearest unsafe vehicle counts.
+                if cutter_demand > 0.0 and not (demand > 0.0 and gap < cutter_gap):
+                    demand = cutter_demand
+            if lateral <= ego_width or lateral_gap < 0.0:
+                settled = settled and cutter_closing <= 0.0
+        if cutter_gap < 0.0 and cutter_gap + half_lengths + half_lengths > 0.0 and lateral < half_widths:
+            touched = True
+        if touched:
+            return verdicts | COLLISION | BTN, step
+        if step >= horizon and (speed <= 0.0 or settled):
+            return verdicts, step
+        if step + 1 >= STEP_CAP:
+            return verdicts | CAPPED, step
+        before = speed
+        if demand > 0.0:
+            speed = driver.brake(demand, speed)
+        step += 1
+        leader, cutter, lateral, towards = steps[min(step, last)]
+        gap += (leader - speed) * C.dt
+        cutter_gap += (cutter - speed) * C.dt
+
+
 def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
     """Series and numbers as Python's own lists and floats."""
-    series = lanes.leader_speed.tolist()
-    columns = (lanes.case, lanes.ego_speed, lanes.gap, lanes.horizon)
-    numbers = list(zip(*(column.tolist() for column in columns), strict=True))
     new_driver = {"Reg157": Reg157, "FSM": Fsm}[model]
+    columns = (lanes.ego_speed, lanes.gap, lanes.horizon)
+    starts = list(zip(*(column.tolist() for column in columns), strict=True))
+    cases = lanes.case.tolist()
+    cutters = lanes.cutters
+    if cutters is None:
+        series = lanes.leader_speed.tolist()
+
+        def simulate(lane: int) -> tuple[int, int]:
+            return deceleration(new_driver(), *starts[lane], series[cases[lane]])
+    else:
+        tables = (lanes.leader_speed, cutters.speed, cutters.lateral, cutters.towards)
+        # Only cases that have a lane here: a row of Python's floats is long.
+        steps = {case: list(zip(*(table[case].tolist() for table in tables), strict=True)) for case in set(cases)}
+        columns = (cutters.gap, cutters.half_lengths, cutters.half_widths, cutters.ego_width)
+        sizes = list(zip(*(column.tolist() for column in columns), strict=True))
+
+        def simulate(lane: int) -> tuple[int, int]:
+            return cut_out(new_driver(), *starts[lane], sizes[lane], steps[cases[lane]])
 
     def work() -> Result:
-        ends = [simulate(new_driver(), speed, gap, series[case], horizon) for case, speed, gap, horizon in numbers]
-        verdicts, steps = zip(*ends, strict=True)
-        return Result(np.array(verdicts, np.uint8), np.array(steps, np.uint32))
+        verdicts, ends = zip(*map(simulate, range(len(lanes))), strict=True)
+        return Result(np.array(verdicts, np.uint8), np.array(ends, np.uint32))
 
     return work

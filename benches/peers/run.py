@@ -1,7 +1,7 @@
 """Times the peers on the lanes of `cargo bench --bench peers` and compares their verdicts with ours.
 
-`run.py FOLDER` starts one process per peer, so that no library's threads or settings reach another's; each is
-held to one core. CSV rows go to stdout, a table to stderr.
+`run.py FOLDER` starts one process per peer and category, so that no library's threads or settings reach another's;
+each is held to one core. CSV rows go to stdout, a table to stderr.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from __future__ import annotations
 import argparse
 import csv
 import importlib
+import itertools
 import json
 import os
 import platform
 import subprocess
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
@@ -45,8 +46,8 @@ class Peer:
     # Package whose version is shown; none for the language alone.
     package: str | None
     repetitions: int
-    # Computes every so many lanes only.
-    stride: int = 1
+    # Computes every so many lanes only, by category; all where none is given.
+    strides: dict[str, int] = field(default_factory=dict)
     xla_flags: str = XLA_ONE_THREAD
 
     def label(self) -> str:
@@ -55,8 +56,8 @@ class Peer:
 
 
 PEERS = (
-    # 11 is prime to the ten headways.
-    Peer("python", "plain", None, repetitions=3, stride=11),
+    # Prime to the ten headways.
+    Peer("python", "plain", None, repetitions=3, strides={"lvd": 11, "cut_out": 101}),
     Peer("numpy", "vectorized", "numpy", repetitions=5),
     Peer("numba", "compiled", "numba", repetitions=7),
     Peer("jax", "scanned", "jax", repetitions=5),
@@ -70,6 +71,7 @@ class Row:
     """One row of the output."""
 
     peer: str
+    category: str
     model: str
     lanes: int
     lane_steps: int
@@ -93,12 +95,13 @@ class Measured:
     named: list[str]
 
 
-def measure(peer: Peer, folder: Path) -> list[Measured]:
-    """Runs one peer on all models, in this process."""
+def measure(peer: Peer, folder: Path, category: str) -> list[Measured]:
+    """Runs one peer on all models of a category, in this process."""
     import lanes as lane_files
 
-    everything, ours_of = lane_files.read(folder)
-    lanes = everything.every(peer.stride)
+    everything, ours_of = lane_files.read(folder / category)
+    stride = peer.strides.get(category, 1)
+    lanes = everything.every(stride)
     module = importlib.import_module(peer.module)
     bits = {
         "collision": lane_files.COLLISION,
@@ -117,12 +120,13 @@ def measure(peer: Peer, folder: Path) -> list[Measured]:
             result = work()
             times.append(time.perf_counter() - start)
         seconds = min(times[1:])
-        verdicts, end_step = ours.verdicts[:: peer.stride], ours.end_step[:: peer.stride]
+        verdicts, end_step = ours.verdicts[::stride], ours.end_step[::stride]
         # Steps that a lane needs, not those that a peer spends on lanes that have ended.
         steps = int(end_step.sum(dtype="u8")) + len(lanes)
         other_bits = result.verdicts ^ verdicts
         row = Row(
             peer=peer.name,
+            category=category,
             model=model,
             lanes=len(lanes),
             lane_steps=steps,
@@ -133,29 +137,31 @@ def measure(peer: Peer, folder: Path) -> list[Measured]:
             ends_differing=int((result.end_step != end_step).sum()),
         )
         differing = {name: int(((other_bits & bit) != 0).sum()) for name, bit in bits.items()}
-        named = [ours.keys[lane * peer.stride] for lane in other_bits.nonzero()[0][:NAMED]]
+        named = [ours.keys[lane * stride] for lane in other_bits.nonzero()[0][:NAMED]]
         measured.append(Measured(row, peer.label(), max(0.0, times[0] - seconds), differing, named))
     return measured
 
 
-def child(peer: Peer, folder: Path) -> None:
-    """Measures one peer and prints the results as JSON."""
+def child(peer: Peer, folder: Path, category: str) -> None:
+    """Measures one peer in one category and prints the results as JSON."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    print(json.dumps([asdict(measured) for measured in measure(peer, folder)]))
+    print(json.dumps([asdict(measured) for measured in measure(peer, folder, category)]))
 
 
 def parent(folder: Path) -> int:
-    """Starts one process per peer; gives the number of those that failed."""
+    """Starts one process per peer and category; gives the number of those that failed."""
+    from lanes import CATEGORIES
+
     writer = csv.writer(sys.stdout, lineterminator="\n")
     all_measured: list[Measured] = []
     failed = 0
-    for peer in PEERS:
+    for category, peer in itertools.product(CATEGORIES, PEERS):
         environment = os.environ | ONE_THREAD | {"XLA_FLAGS": peer.xla_flags}
-        command = [sys.executable, __file__, str(folder), "--peer", peer.name]
+        command = [sys.executable, __file__, str(folder), "--peer", peer.name, "--category", category]
         done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode != 0:
-            print(f"FAILED: {peer.name} ended with {done.returncode}", file=sys.stderr)
+            print(f"FAILED: {peer.name}, {category}, ended with {done.returncode}", file=sys.stderr)
             failed += 1
             continue
         for values in json.loads(done.stdout):
@@ -169,13 +175,13 @@ def parent(folder: Path) -> int:
 
 def table(all_measured: list[Measured]) -> None:
     """What the rows say, and what they leave out, for people."""
-    heading = f"{'peer':<20} {'model':<7} {'M lane-steps/s':>15} {'ours/peer':>10} {'compile etc.':>13}"
+    heading = f"{'peer':<20} {'category':<8} {'model':<7} {'M lane-steps/s':>15} {'ours/peer':>10} {'compile etc.':>13}"
     print(f"\n{heading}  differing verdicts (ends) of lanes", file=sys.stderr)
     for measured in all_measured:
         row = measured.row
         bits = ", ".join(f"{name} {count}" for name, count in measured.differing.items() if count)
         print(
-            f"{measured.label if row.peer != 'jax-no-fma' else row.peer:<20} {row.model:<7}"
+            f"{measured.label if row.peer != 'jax-no-fma' else row.peer:<20} {row.category:<8} {row.model:<7}"
             f" {row.lane_steps_per_s / 1e6:>15.3f} {row.ratio_to_ours:>10.2f}"
             f" {measured.first_call_extra_s:>11.2f} s"
             f"  {row.verdicts_differing} ({row.ends_differing}) of {row.lanes}{': ' + bits if bits else ''}",
@@ -190,10 +196,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="the lanes, as `cargo bench --bench peers` writes them")
     parser.add_argument("--peer", choices=[peer.name for peer in PEERS], help="only this one, in this process")
+    parser.add_argument("--category", default="lvd", help="of a single peer: lvd or cut_out")
     arguments = parser.parse_args()
     if arguments.peer is None:
         return min(1, parent(arguments.folder))
-    child(next(peer for peer in PEERS if peer.name == arguments.peer), arguments.folder)
+    child(next(peer for peer in PEERS if peer.name == arguments.peer), arguments.folder, arguments.category)
     return 0
 
 

@@ -20,8 +20,8 @@ COMPACT_EVERY = 16
 class State:
     """One entry per lane that still runs."""
 
-    lane: NDArray[np.int64]
-    case: NDArray[np.int32]
+    lane: NDArray[np.intp]
+    case: NDArray[np.intp]
     horizon: NDArray[np.int32]
     speed: Floats
     before: Floats
@@ -30,29 +30,62 @@ class State:
     delay: NDArray[np.int32]
     verdicts: NDArray[np.uint8]
     running: NDArray[np.bool_]
+    # Of the vehicles that cut out; empty where there are none.
+    cutter_gap: Floats
+    half_lengths: Floats
+    half_widths: Floats
+    ego_width: Floats
 
     def compact(self) -> None:
         """Takes the lanes out that have ended."""
         keep = self.running
         for field in fields(self):
-            setattr(self, field.name, getattr(self, field.name)[keep])
+            numbers = getattr(self, field.name)
+            if len(numbers) > 0:
+                setattr(self, field.name, numbers[keep])
 
 
-def reg157(s: State, leader: Floats) -> tuple[NDArray[np.bool_], Floats]:
-    """Which lanes are unsafe, and how hard they brake: 6 m/s² below the TTC that 6 m/s² and 0.35 s need."""
-    dv = s.speed - leader
-    threshold = np.abs(dv) * (dv * C.reg157_half_inverse + C.reg157_constant)
-    unsafe = (dv != C.zero) & (np.abs(s.gap) <= threshold)
-    return unsafe, np.full_like(dv, C.reg157_deceleration)
+class Reg157:
+    """UN R157, 5.2.5.2: full braking once the TTC falls below what 6 m/s² and 0.35 s need."""
+
+    delay = DELAY_STEPS["Reg157"]
+
+    def demand(self, s: State, other: Floats, gap: Floats) -> Floats:
+        """How hard each lane's driver would brake for a vehicle; 0 is safe."""
+        dv = s.speed - other
+        threshold = np.abs(dv) * (dv * C.reg157_half_inverse + C.reg157_constant)
+        unsafe = (dv != C.zero) & (np.abs(gap) <= threshold)
+        return unsafe * C.reg157_deceleration
+
+    def looks_at(self, lateral_gap: Floats, towards: Floats, closing: Floats, passing: Floats) -> NDArray[np.bool_]:
+        """Is a vehicle near enough across the road?"""
+        return lateral_gap <= C.reg157_gate
+
+    def limited(self, s: State, demand: Floats) -> Floats:
+        """The deceleration of this step."""
+        return demand
 
 
-def fsm(s: State, leader: Floats) -> tuple[NDArray[np.bool_], Floats]:
-    """Which lanes are unsafe, and how hard they brake: proactive and critical surrogate."""
-    pfs = proactive(s.speed, leader, s.gap)
-    cfs = critical(s.speed, leader, s.gap, (s.speed - s.before) * C.inverse_dt)
-    demand = np.where(cfs > C.zero, cfs * C.b_span + C.b_comf, pfs * C.b_comf)
-    ramp = np.minimum(s.deceleration + C.jerk_per_step, C.max_deceleration)
-    return (pfs > C.zero) | (cfs > C.zero), np.minimum(ramp, demand)
+class Fsm:
+    """Fuzzy Safety Model: proactive and critical surrogate tell how hard to brake."""
+
+    delay = DELAY_STEPS["FSM"]
+
+    def demand(self, s: State, other: Floats, gap: Floats) -> Floats:
+        """How hard each lane's driver would brake for a vehicle; 0 is safe."""
+        pfs = proactive(s.speed, other, gap)
+        cfs = critical(s.speed, other, gap, (s.speed - s.before) * C.inverse_dt)
+        return np.where(cfs > C.zero, cfs * C.b_span + C.b_comf, pfs * C.b_comf)
+
+    def looks_at(self, lateral_gap: Floats, towards: Floats, closing: Floats, passing: Floats) -> NDArray[np.bool_]:
+        """Is a vehicle in the way, or will it be before the ego has passed it?"""
+        soon = lateral_gap * closing <= towards * (passing + C.gate_margin * closing)
+        comes = (towards > C.zero) & (closing >= C.zero) & ((closing == C.zero) | soon)
+        return (lateral_gap <= C.zero) | comes
+
+    def limited(self, s: State, demand: Floats) -> Floats:
+        """The deceleration of this step: more only with the jerk, less at once."""
+        return np.minimum(np.minimum(s.deceleration + C.jerk_per_step, C.max_deceleration), demand)
 
 
 def fuzzy(distance: Floats, safe: Floats, dangerous: Floats) -> Floats:
@@ -61,68 +94,86 @@ def fuzzy(distance: Floats, safe: Floats, dangerous: Floats) -> Floats:
     return np.where(distance >= safe, C.zero, np.where(distance <= dangerous, C.one, between))
 
 
-def proactive(speed: Floats, leader: Floats, gap: Floats) -> Floats:
-    """PFS: the leader's possible braking."""
+def proactive(speed: Floats, other: Floats, gap: Floats) -> Floats:
+    """PFS: the other vehicle's possible braking."""
     reaction = speed * C.tau
-    lead_stop = leader * leader * C.half_inverse_lead
+    lead_stop = other * other * C.half_inverse_lead
     speed_squared = speed * speed
     safe = reaction + speed_squared * C.half_inverse_comf - lead_stop + C.margin
     dangerous = reaction + speed_squared * C.half_inverse_max - lead_stop
     return fuzzy(gap - C.margin, safe, dangerous)
 
 
-def critical(speed: Floats, leader: Floats, gap: Floats, acceleration: Floats) -> Floats:
+def critical(speed: Floats, other: Floats, gap: Floats, acceleration: Floats) -> Floats:
     """CFS: the present closing."""
     limited = np.maximum(acceleration, -C.b_comf)
     new_speed = speed + C.tau * limited
-    dv = speed - leader
-    new_dv = new_speed - leader
-    new_distance = (speed + limited * C.half_tau - leader) * C.tau
+    dv = speed - other
+    new_dv = new_speed - other
+    new_distance = (speed + limited * C.half_tau - other) * C.tau
     new_dv_squared = new_dv * new_dv
     safe = new_distance + new_dv_squared * C.half_inverse_comf
     dangerous = new_distance + new_dv_squared * C.half_inverse_max
     stops = ((gap + gap) * np.abs(acceleration) < dv * dv).astype(np.float32)
-    closing = np.where(new_speed < leader, stops, fuzzy(gap, safe, dangerous))
-    return np.where(speed <= leader, C.zero, closing)
+    closing = np.where(new_speed < other, stops, fuzzy(gap, safe, dangerous))
+    return np.where(speed <= other, C.zero, closing)
 
 
-CHECKS = {"Reg157": reg157, "FSM": fsm}
+DRIVERS = {"Reg157": Reg157, "FSM": Fsm}
 
 
-def judge(closing: Floats, gap: Floats) -> NDArray[np.uint8]:
-    """Bits of TTC and BTN at one step."""
-    counts = closing > C.zero
+def judge(counts: NDArray[np.bool_], closing: Floats, gap: Floats) -> NDArray[np.uint8]:
+    """Bits of TTC and BTN at one step, where a vehicle counts."""
     ttc = counts & (np.maximum(gap, C.zero) < C.ttc_threshold * closing)
     room = gap - closing * C.btn_ramp_delay
     btn = counts & ((room <= C.zero) | (closing * closing > C.btn_two_a_limit * room))
     return ttc * np.uint8(TTC) | btn * np.uint8(BTN)
 
 
-def sweep(lanes: Lanes, model: str, leaders: Floats) -> Result:
-    """Runs all lanes to their ends. `leaders` is steps × cases."""
-    check = CHECKS[model]
+def look_at_cutters(
+    s: State, driver: Reg157 | Fsm, cutter: Floats, lateral: Floats, towards: Floats, demand: Floats
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Takes the vehicles that cut out into account: demand of the nearest unsafe vehicle; whether they touch the ego;
+    whether nothing can happen with them any more."""
+    closing = s.speed - cutter
+    lateral_gap = lateral - s.half_widths
+    overlaps = lateral_gap < C.zero
+    centres = s.cutter_gap + s.half_lengths
+    passing = centres + s.half_lengths
+    in_front = centres >= C.zero
+    judged = in_front & (lateral <= s.ego_width)
+    approached = closing > C.zero
+    s.verdicts |= judge(judged & approached, closing, s.cutter_gap)
+    seen = in_front & driver.looks_at(lateral_gap, towards, closing, passing)
+    of_cutter = np.where(seen, driver.demand(s, cutter, s.cutter_gap), C.zero)
+    leader_is_nearer = (demand > C.zero) & (s.gap < s.cutter_gap)
+    demand = np.where((of_cutter > C.zero) & ~leader_is_nearer, of_cutter, demand)
+    touched = overlaps & (s.cutter_gap < C.zero) & (passing > C.zero)
+    return demand, touched, ~((judged | (in_front & overlaps)) & approached)
+
+
+def sweep(lanes: Lanes, driver: Reg157 | Fsm, leaders: Floats, cutters: tuple[Floats, Floats, Floats] | None) -> Result:
+    """Runs all lanes to their ends. Series are steps × cases."""
     count = len(lanes)
     result = Result(np.zeros(count, np.uint8), np.zeros(count, np.uint32))
-    s = State(
-        lane=np.arange(count),
-        case=lanes.case,
-        horizon=lanes.horizon,
-        speed=lanes.ego_speed,
-        before=lanes.ego_speed,
-        gap=lanes.gap,
-        deceleration=np.zeros(count, np.float32),
-        delay=np.full(count, DELAY_STEPS[model], np.int32),
-        verdicts=np.zeros(count, np.uint8),
-        running=np.ones(count, np.bool_),
-    )
+    s = initial(lanes, driver.delay)
     last = len(leaders) - 1
     leader = leaders[0][s.case]
     for step in range(STEP_CAP):
         closing = s.speed - leader
-        s.verdicts |= judge(closing, s.gap)
-        unsafe, braking = check(s, leader)
+        approached = closing > C.zero
+        s.verdicts |= judge(approached, closing, s.gap)
+        demand = driver.demand(s, leader, s.gap)
         contact = s.gap < C.zero
-        over = contact | ((step >= s.horizon) & ((s.speed <= C.zero) | (closing <= C.zero)))
+        settled = ~approached
+        if cutters is not None:
+            cutter, lateral, towards = (table[min(step, last)][s.case] for table in cutters)
+            if step > 0:
+                s.cutter_gap = s.cutter_gap + (cutter - s.speed) * C.dt
+            demand, touched, calm = look_at_cutters(s, driver, cutter, lateral, towards, demand)
+            contact |= touched
+            settled &= calm
+        over = contact | ((step >= s.horizon) & ((s.speed <= C.zero) | settled))
         capped = (~over & (step + 1 >= STEP_CAP)).astype(np.uint8)
         s.verdicts |= contact * np.uint8(COLLISION | BTN) | capped * np.uint8(CAPPED)
         ends = s.running & (over | (step + 1 >= STEP_CAP))
@@ -130,8 +181,10 @@ def sweep(lanes: Lanes, model: str, leaders: Floats) -> Result:
             result.verdicts[s.lane[ends]] = s.verdicts[ends]
             result.end_step[s.lane[ends]] = step
             s.running &= ~ends
+        unsafe = demand > C.zero
         waiting = s.delay > 0
         brakes = unsafe & ~waiting
+        braking = driver.limited(s, demand)
         s.before = s.speed
         s.speed = np.where(brakes, np.maximum(s.speed - braking * C.dt, C.zero), s.speed)
         s.deceleration = np.where(brakes, braking, s.deceleration)
@@ -147,12 +200,37 @@ def sweep(lanes: Lanes, model: str, leaders: Floats) -> Result:
     return result
 
 
+def initial(lanes: Lanes, delay: int) -> State:
+    """All lanes before their first step."""
+    count, cutters = len(lanes), lanes.cutters
+    nothing = np.zeros(0, np.float32)
+    return State(
+        lane=np.arange(count),
+        case=lanes.case.astype(np.intp),
+        horizon=lanes.horizon,
+        speed=lanes.ego_speed,
+        before=lanes.ego_speed,
+        gap=lanes.gap,
+        deceleration=np.zeros(count, np.float32),
+        delay=np.full(count, delay, np.int32),
+        verdicts=np.zeros(count, np.uint8),
+        running=np.ones(count, np.bool_),
+        cutter_gap=nothing if cutters is None else cutters.gap,
+        half_lengths=nothing if cutters is None else cutters.half_lengths,
+        half_widths=nothing if cutters is None else cutters.half_widths,
+        ego_width=nothing if cutters is None else cutters.ego_width,
+    )
+
+
 def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
-    """Leaders as steps × cases, so that one step's speeds lie together."""
+    """Series as steps × cases, so that one step's numbers lie together."""
     leaders = np.ascontiguousarray(lanes.leader_speed.T)
+    cutters = lanes.cutters
+    tables = (cutters.speed, cutters.lateral, cutters.towards) if cutters is not None else ()
+    series = tuple(np.ascontiguousarray(table.T) for table in tables) or None
 
     def work() -> Result:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return sweep(lanes, model, leaders)
+            return sweep(lanes, DRIVERS[model](), leaders, series)
 
     return work
