@@ -82,12 +82,19 @@ fn measure(scenarios: &[Scenario], profile: &Profile, category: Category, model:
     let (lanes, name) = (outcomes.len(), format!("{},{}", category.key(), model.name()));
     println!("lanesweep,{name},{lanes},{steps},{seconds},{rate},1,0,0");
     eprintln!("{}, {name}: {seconds:.3} s, {:.2} M lane-steps/s", backend.describe(), rate / 1e6);
-    // Beside the best instructions those of smaller machines.
+    // Beside it what it would be with every step made, as peers do, and on the instructions of smaller machines.
+    let mut others = vec![("every step".to_owned(), CpuBackend::lane_arithmetic().every_step())];
     for set in Instructions::available().into_iter().filter(|set| *set != Instructions::best()) {
-        let seconds = best(&CpuBackend::with_instructions(set).unwrap());
+        others.push((set.to_string(), CpuBackend::with_instructions(set).unwrap()));
+        if set != Instructions::Scalar {
+            others.push((format!("{set} every step"), CpuBackend::with_instructions(set).unwrap().every_step()));
+        }
+    }
+    for (what, backend) in others {
+        let seconds = best(&backend);
         let slower = steps as f64 / seconds;
-        println!("lanesweep {set},{name},{lanes},{steps},{seconds},{slower},{},0,0", rate / slower);
-        eprintln!("{set}, {name}: {seconds:.3} s, {:.2} M lane-steps/s", slower / 1e6);
+        println!("lanesweep {what},{name},{lanes},{steps},{seconds},{slower},{},0,0", rate / slower);
+        eprintln!("{what}, {name}: {seconds:.3} s, {:.2} M lane-steps/s", slower / 1e6);
     }
     let (cases, width) = write_cases(folder, category, &plan);
     let verdicts: Vec<u8> = outcomes.iter().map(|o| o.verdicts.0).collect();

@@ -153,6 +153,15 @@ impl<R: Real> BrakeThreat<R> {
         ]
     }
 
+    /// No larger gap fails at this closing speed, m/s > 0, but for rounding; m. Infinite for forms of which it is not
+    /// known.
+    pub fn safe_gap(&self, closing: R) -> R {
+        match self.form {
+            BtnForm::EquivalentDelay => closing * self.ramp_delay + (closing * closing).exact_div(self.two_a_limit),
+            BtnForm::DistanceRatio | BtnForm::Exact => R::INFINITY,
+        }
+    }
+
     /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s. Without
     /// `keeps_value` the largest value stays as it is.
     #[inline(always)]

@@ -42,6 +42,11 @@ impl<R: Real> Default for TtcMinimum<R> {
 }
 
 impl<R: Real> TimeToCollision<R> {
+    /// No larger gap fails at this closing speed, m/s > 0, but for rounding; m.
+    pub fn safe_gap(&self, closing: R) -> R {
+        self.threshold * closing
+    }
+
     /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0. Without
     /// `keeps_value` the smallest value stays as it is.
     #[inline(always)]

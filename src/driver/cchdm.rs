@@ -108,6 +108,16 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
     const SEES_LATERAL_SPEED: bool = false;
     const SEES_OWN_ACCELERATION: bool = false;
 
+    #[inline(always)]
+    fn safe_gap(&self, v_ego: R, v_other: R) -> R {
+        if self.always_unsafe { R::INFINITY } else { self.ttc * (v_ego - v_other).abs() }
+    }
+
+    #[inline(always)]
+    fn ignores(&self, lateral_gap: R, _lateral_towards: R) -> Flag {
+        !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
+    }
+
     /// The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {

@@ -109,14 +109,32 @@ fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
 }
 
 impl<R: Real> Fsm<R> {
-    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
+    /// Safe and unsafe distance of the PFS, m.
     #[inline(always)]
-    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
+    fn pfs_distances(&self, v_ego: R, v_other: R) -> (R, R) {
         let reaction = v_ego * self.tau;
         let lead_stop = v_other * v_other * self.half_inverse_lead;
         let d_safe = reaction + v_ego * v_ego * self.half_inverse_comf - lead_stop + self.margin;
         let d_unsafe = reaction + v_ego * v_ego * self.half_inverse_max - lead_stop;
+        (d_safe, d_unsafe)
+    }
+
+    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
+    #[inline(always)]
+    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
+        let (d_safe, d_unsafe) = self.pfs_distances(v_ego, v_other);
         fuzzy(gap - self.margin, d_safe, d_unsafe)
+    }
+
+    /// Safe and unsafe distance of the CFS, m, at the ego's acceleration limited to comfort, m/s².
+    #[inline(always)]
+    fn cfs_distances(&self, v_ego: R, v_other: R, a_limited: R) -> (R, R) {
+        let v_new = v_ego + self.tau * a_limited;
+        let dv_new = v_new - v_other;
+        let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
+        let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
+        let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
+        (d_safe, d_unsafe)
     }
 
     /// Critical fuzzy surrogate of the present closing, 0…1.
@@ -126,10 +144,7 @@ impl<R: Real> Fsm<R> {
         let v_new = v_ego + self.tau * a_limited;
         let dv = v_ego - v_other;
         let a_step = if self.limited_step { a_limited } else { a_ego };
-        let dv_new = v_new - v_other;
-        let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
-        let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
-        let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
+        let (d_safe, d_unsafe) = self.cfs_distances(v_ego, v_other, a_limited);
         // g < dv²/(2|a|), multiplied out.
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
         let slower_then = is_short.choose(R::ONE, R::ZERO);
@@ -152,6 +167,21 @@ impl<R: Real> Fsm<R> {
 }
 
 impl<R: Real> DriverModel<R> for Fsm<R> {
+    /// The larger of the distances at which PFS and CFS become 0.
+    #[inline(always)]
+    fn safe_gap(&self, v_ego: R, v_other: R) -> R {
+        let (proactive, _) = self.pfs_distances(v_ego, v_other);
+        let (critical, _) = self.cfs_distances(v_ego, v_other, R::ZERO);
+        let closes = v_ego.is_above(v_other);
+        (proactive + self.margin).larger(closes.choose(critical, R::ZERO)).larger(R::ZERO)
+    }
+
+    /// The gate is closed to what is outside and does not come in.
+    #[inline(always)]
+    fn ignores(&self, lateral_gap: R, lateral_towards: R) -> Flag {
+        lateral_gap.is_positive() & !lateral_towards.is_positive()
+    }
+
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }

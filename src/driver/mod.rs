@@ -132,8 +132,8 @@ pub struct DriverState<R> {
 
 /// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
 pub trait DriverModel<R: Real>: Copy + Send + Sync {
-    // What follows may be false, and batches of lanes then save themselves the trouble. That it is so has to be
-    // tested: verdicts would differ from those of single lanes.
+    // What follows is what a model promises, and saves batches of lanes trouble; without a word from a model they
+    // assume nothing. What it says has to be tested: verdicts would differ from those of single lanes.
 
     /// Its check looks at [`View::lateral_towards`].
     const SEES_LATERAL_SPEED: bool = true;
@@ -142,6 +142,20 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     const SEES_OWN_ACCELERATION: bool = true;
     /// Its reaction looks at [`DriverState::deceleration`].
     const KEEPS_DECELERATION: bool = true;
+
+    /// Safe distance, m ≥ 0: while both keep their speeds, m/s, a vehicle that overlaps with the ego across the road is
+    /// safe at every larger gap. Rounding may be left to the caller; infinite where nothing is promised.
+    #[inline(always)]
+    fn safe_gap(&self, _v_ego: R, _v_other: R) -> R {
+        R::INFINITY
+    }
+
+    /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap
+    /// and at all speeds.
+    #[inline(always)]
+    fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
+        Flag::FALSE
+    }
 
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;
@@ -173,6 +187,9 @@ fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::profile::Profile;
+    use crate::random::{philox4x32_10, unit_uniform};
+    use crate::scenario::Category;
 
     #[test]
     fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {
@@ -182,6 +199,63 @@ mod tests {
         assert_eq!(delay_steps(0.0, 0.04), 0);
         // Never, as a step that lanes can count down from.
         assert_eq!(delay_steps(f64::MAX, 0.04), Flag::LATEST_STEP);
+    }
+
+    /// What a model promises about gaps and vehicles beside the lane, on random vehicles: it keeps the promise, and
+    /// promises as much as it can.
+    fn keeps_its_promises<M: DriverModel<f32>>(name: &str, model: M) {
+        let mut drawn = 0;
+        let mut between = |least: f32, most: f32| {
+            drawn += 1;
+            least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
+        };
+        let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
+        for _ in 0..200_000 {
+            let (v_ego, v_other) = (between(0.0, 45.0), between(0.0, 45.0));
+            let view = View {
+                v_ego,
+                a_ego: 0.0,
+                v_other,
+                gap: between(0.0, 200.0),
+                lateral_gap: between(-2.0, 0.0),
+                lateral_towards: between(-2.0, 2.0),
+                half_lengths: between(3.0, 10.0),
+            };
+            let safe_gap = model.safe_gap(v_ego, v_other);
+            let is_unsafe = model.check(&view).is_unsafe.holds();
+            if view.gap > 1.001 * safe_gap + 0.001 {
+                assert!(!is_unsafe, "{name}: {view:?} is unsafe beyond {safe_gap} m");
+                safe += 1;
+            } else if is_unsafe && view.gap > 0.9 * safe_gap {
+                unsafe_below += 1;
+            }
+            let beside = View { lateral_gap: between(0.0, 4.0), gap: between(-20.0, 50.0), ..view };
+            let is_unsafe = model.check(&beside).is_unsafe.holds();
+            if model.ignores(beside.lateral_gap, beside.lateral_towards).holds() {
+                assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");
+                ignored += 1;
+            }
+        }
+        assert!(safe > 1000 && ignored > 1000, "{name}: {safe} safe, {ignored} ignored");
+        assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
+    }
+
+    /// Of the models that come with the crate.
+    #[test]
+    fn models_keep_their_promises_under_every_profile() {
+        for name in Profile::names() {
+            let profile = Profile::load(name).unwrap();
+            let dt_s = profile.frame.dt_s;
+            let always = |categories: &[Category]| categories.contains(&Category::CutOut);
+            if !always(&profile.reg157.always_unsafe) {
+                keeps_its_promises(name, profile.reg157.resolve::<f32>(dt_s, Category::CutOut));
+            }
+            if !always(&profile.cchdm.always_unsafe) {
+                keeps_its_promises(name, profile.cchdm.resolve::<f32>(dt_s, Category::CutOut));
+            }
+            keeps_its_promises(name, profile.rss.resolve::<f32>(dt_s, Category::CutOut));
+            keeps_its_promises(name, profile.fsm.resolve::<f32>(dt_s, Category::CutOut));
+        }
     }
 
     #[test]

@@ -88,6 +88,17 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
     const KEEPS_DECELERATION: bool = false;
 
     #[inline(always)]
+    fn safe_gap(&self, v_ego: R, v_other: R) -> R {
+        let dv = v_ego - v_other;
+        if self.always_unsafe { R::INFINITY } else { (dv.abs() * self.ttc_threshold(dv)).larger(R::ZERO) }
+    }
+
+    #[inline(always)]
+    fn ignores(&self, lateral_gap: R, _lateral_towards: R) -> Flag {
+        !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
+    }
+
+    #[inline(always)]
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }
     }

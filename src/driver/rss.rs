@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
 
@@ -112,6 +113,16 @@ impl<R: Real> Rss<R> {
 
 impl<R: Real> DriverModel<R> for Rss<R> {
     const SEES_OWN_ACCELERATION: bool = false;
+
+    #[inline(always)]
+    fn safe_gap(&self, v_ego: R, v_other: R) -> R {
+        self.longitudinal_distance(v_ego, v_other).larger(R::ZERO)
+    }
+
+    #[inline(always)]
+    fn ignores(&self, lateral_gap: R, lateral_towards: R) -> Flag {
+        !lateral_gap.is_below(self.lateral_distance(lateral_towards))
+    }
 
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {

@@ -9,7 +9,8 @@
 use crate::driver::DriverModel;
 use crate::flag::Flag;
 
-use super::batch_arrays::{FixedArrays, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
+use super::batch_arrays::{FixedArrays, Floats, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
+use super::calm::calm_steps;
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
 use super::rules::Rules;
@@ -18,6 +19,9 @@ use super::window::Window;
 
 /// Batches of a burst.
 pub(super) const BATCHES: usize = 3;
+
+/// Steps before calm ones are looked for again where none were found.
+const LOOK_AGAIN: u32 = 8 * ROWS as u32;
 
 /// Slots of a batch: one bit each.
 pub(super) type Slots = u16;
@@ -41,6 +45,10 @@ pub(super) struct Batch {
     pub free: Slots,
     /// Slots whose lane has made its last step in this burst.
     pub finished: Slots,
+    /// Slots whose lane may have come to calm steps: nothing around it changes any more, nor did its speed.
+    pub calm: Slots,
+    /// Speeds of the egos at the first row.
+    speeds: Floats,
 }
 
 impl<'c> Fleet<'c> {
@@ -51,7 +59,16 @@ impl<'c> Fleet<'c> {
         };
         let windows = [0, 1].map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
         let lanes = LaneArrays::idle();
-        let batch = Batch { lanes, after: lanes.state, windows, from: [0; LANES], free: !0, finished: 0 };
+        let batch = Batch {
+            lanes,
+            after: lanes.state,
+            windows,
+            from: [0; LANES],
+            free: !0,
+            finished: 0,
+            calm: 0,
+            speeds: [0.0; LANES],
+        };
         Fleet { batches: [batch; BATCHES], entries }
     }
 }
@@ -85,12 +102,32 @@ impl Batch {
     #[inline(always)]
     fn find_finished(&mut self, step_cap: u32) {
         let moving = &self.lanes.state.moving;
-        let mut finished = 0;
-        for k in 0..LANES {
+        let restless_until = &self.lanes.fixed.ego.restless_until;
+        let (mut finished, mut calm) = (0, 0);
+        for (k, &restless_until) in restless_until.iter().enumerate() {
             let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
+            let is_calm = moving.index[k] > restless_until && moving.v_ego[k] == self.speeds[k];
+            calm |= u16::from(is_calm) << k;
         }
         self.finished = finished & !self.free;
+        self.calm = calm & !finished & !self.free;
+    }
+
+    /// Leaves out calm steps of a lane where it pays, else looks again later.
+    pub fn leave_out_calm<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
+        let (constants, state, places) = self.last_step(k);
+        let LaneArrays { fixed, state: arrays } = &mut self.lanes;
+        let restless_until = &mut fixed.ego.restless_until[k];
+        match calm_steps(simulation, &constants, &state, &places) {
+            Some(calm) => {
+                arrays.moving.index[k] += calm.steps;
+                arrays.moving.gap[k] = calm.gaps[0];
+                arrays.ahead.gap[k] = calm.gaps[1];
+                *restless_until = arrays.moving.index[k];
+            }
+            None => *restless_until = state.index + LOOK_AGAIN,
+        }
     }
 
     /// Frees the slots whose lanes have finished.
@@ -129,6 +166,7 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         }
         batch.clear_free();
         batch.from = batch.lanes.state.moving.index;
+        batch.speeds = batch.lanes.state.moving.v_ego;
         for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
             *furthest = index.max(*furthest);
         }

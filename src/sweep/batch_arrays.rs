@@ -50,6 +50,8 @@ pub(super) struct EgoArrays<const N: usize> {
     pub lane: [u32; N],
     width: [f32; N],
     horizon: [u32; N],
+    /// Up to this step it is not worth looking for calm ones.
+    pub restless_until: [u32; N],
 }
 
 /// What is constant within the lanes for another vehicle.
@@ -90,9 +92,9 @@ pub(super) struct StateArrays<const N: usize> {
 #[repr(C)]
 pub(super) struct MovingArrays<const N: usize> {
     pub index: [u32; N],
-    v_ego: [f32; N],
+    pub v_ego: [f32; N],
     v_before: [f32; N],
-    gap: [f32; N],
+    pub gap: [f32; N],
     deceleration: [f32; N],
     delay_steps: [u32; N],
     ttc_failed: [u32; N],
@@ -104,7 +106,7 @@ pub(super) struct MovingArrays<const N: usize> {
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(super) struct AheadArrays<const N: usize> {
-    gap: [f32; N],
+    pub gap: [f32; N],
 }
 
 /// What a step moves where more than verdicts is wanted.
@@ -199,6 +201,8 @@ impl<const N: usize> LaneArrays<N> {
         }
         fill(&mut self.fixed.ego.width, from, constants.ego_width);
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
+        let ends = tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last);
+        fill(&mut self.fixed.ego.restless_until, from, ends.max().unwrap_or(0));
         let moving = &mut self.state.moving;
         fill(&mut moving.index, from, state.index);
         fill(&mut moving.v_ego, from, state.v_ego);
@@ -323,7 +327,7 @@ mod tests {
     fn rows_lie_in_the_order_of_their_names() {
         let mut ego = EgoArrays::<4>::zeroed();
         ego.horizon[3] = 7;
-        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7]]);
+        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7], [0; 4]]);
         let mut moving = MovingArrays::<4>::zeroed();
         moving.rows_mut().last_mut().unwrap()[1] = 5;
         assert_eq!(moving.over, [0, 5, 0, 0]);

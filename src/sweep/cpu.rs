@@ -29,18 +29,19 @@ const TASK_ENTRIES: u64 = 1 << 24;
 #[derive(Debug)]
 pub struct CpuBackend<R> {
     instructions: Instructions,
+    every_step: bool,
     arithmetic: PhantomData<R>,
 }
 
 impl CpuBackend<f32> {
     /// The lane arithmetic: binary32, on the best instructions of the machine.
     pub fn lane_arithmetic() -> Self {
-        CpuBackend { instructions: Instructions::best(), arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::best(), every_step: false, arithmetic: PhantomData }
     }
 
     /// The lane arithmetic lane by lane: what every other backend is compared with.
     pub fn scalar() -> Self {
-        CpuBackend { instructions: Instructions::Scalar, arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
     }
 
     /// The lane arithmetic on chosen instructions.
@@ -48,14 +49,20 @@ impl CpuBackend<f32> {
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) where this machine does not have them.
     pub fn with_instructions(instructions: Instructions) -> Result<Self> {
-        Ok(CpuBackend { instructions: instructions.checked()?, arithmetic: PhantomData })
+        Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
+    }
+
+    /// The same, but it makes every step of every lane; without it, batches leave out those in which nothing can
+    /// happen, where only verdicts are wanted. The verdicts are the same. For benchmarks and tests.
+    pub fn every_step(self) -> Self {
+        CpuBackend { every_step: true, ..self }
     }
 }
 
 impl CpuBackend<f64> {
     /// The reference: binary64, same source, lane by lane.
     pub fn reference() -> Self {
-        CpuBackend { instructions: Instructions::Scalar, arithmetic: PhantomData }
+        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
     }
 }
 
@@ -74,7 +81,7 @@ impl Backend for CpuBackend<f32> {
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
-        let (runner, instructions) = (LaneRunner::<f32>::new(plan), self.instructions);
+        let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
         if instructions == Instructions::Scalar {
             return Ok(Box::new(lane_by_lane(plan, runner)));
         }

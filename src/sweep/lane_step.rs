@@ -279,7 +279,7 @@ pub(super) fn see<R: Real, M>(
 }
 
 #[inline(always)]
-fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
+pub(super) fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
     let (gap, closing) = (seen.view.gap, seen.view.closing());
     let keeps_values = criteria.keeps_values;
     let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing, keeps_values);
@@ -289,7 +289,7 @@ fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) ->
 }
 
 #[inline(always)]
-fn check<R: Real, M: DriverModel<R>>(
+pub(super) fn check<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
     seen: &Seen<R>,
     other: &OtherConstants<R>,

@@ -7,6 +7,7 @@
 mod backend;
 mod batch;
 mod batch_arrays;
+mod calm;
 mod cpu;
 mod drivers;
 mod ending;

@@ -28,6 +28,7 @@ pub struct LaneRunner<'p, R> {
     starts: Vec<Start<R>>,
     /// Lanes do no more than batches for verdicts.
     as_in_batches: bool,
+    every_step: bool,
     /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
     spare: Mutex<Vec<Series>>,
 }
@@ -41,6 +42,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
             as_in_batches: false,
+            every_step: false,
             spare: Mutex::default(),
         }
     }
@@ -50,6 +52,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     pub fn verdicts_as_in_batches(mut self) -> Self {
         self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
         self.as_in_batches = true;
+        self
+    }
+
+    /// The same, but batches make every step; without it they leave out those in which nothing can happen, where only
+    /// verdicts are wanted. The verdicts are the same.
+    pub fn every_step(mut self, every_step: bool) -> Self {
+        self.every_step = every_step;
         self
     }
 
@@ -134,7 +143,7 @@ impl LaneRunner<'_, f32> {
         series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts };
+        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts, every_step: self.every_step };
         let models = self.plan.models.len();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);

@@ -8,8 +8,9 @@ use super::batch_arrays::LANES;
 use super::frame::Simulation;
 use super::waiting::{Lanes, Waiting};
 
-/// Runs a stream of lanes of one model; `values`: continuous ones are wanted, not verdicts alone. `steps` is a [`burst`](super::batch::burst), `each` takes the lanes after
-/// their last steps, in the order in which they end: the lane, counted within the stream, its batch and its slot.
+/// Runs a stream of lanes of one model; `values`: continuous ones are wanted, not verdicts alone. `steps` is a
+/// [`burst`](super::batch::burst), `each` takes the lanes after their last steps, in the order in which they end: the
+/// lane, counted within the stream, its batch and its slot.
 pub(super) fn run_stream<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     stream: &Lanes<'_>,
@@ -19,6 +20,7 @@ pub(super) fn run_stream<M: DriverModel<f32>>(
     mut each: impl FnMut(usize, &Batch, usize),
 ) {
     let mut fleet = Fleet::new(stream, entries);
+    let leaves_out = !values && !stream.every_step;
     let mut waiting = Waiting::new(values);
     loop {
         waiting.have(BATCHES * LANES, simulation, stream);
@@ -34,6 +36,11 @@ pub(super) fn run_stream<M: DriverModel<f32>>(
                 each(batch.lane(k) as usize, batch, k);
             }
             batch.free_finished();
+            let mut calm = if leaves_out { batch.calm } else { 0 };
+            while calm != 0 {
+                batch.leave_out_calm(simulation, calm.trailing_zeros() as usize);
+                calm &= calm - 1;
+            }
         }
     }
 }

@@ -25,6 +25,8 @@ pub(super) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
+    /// Calm steps are made as well.
+    pub every_step: bool,
 }
 
 /// The next lanes of a stream.
