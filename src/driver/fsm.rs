@@ -126,10 +126,10 @@ impl<R: Real> Fsm<R> {
         fuzzy(gap - self.margin, d_safe, d_unsafe)
     }
 
-    /// Safe and unsafe distance of the CFS, m, at the ego's acceleration limited to comfort, m/s².
+    /// Safe and unsafe distance of the CFS, m, at the ego's acceleration limited to comfort, m/s², and the speed `v_new`
+    /// that it would have with it after τ, m/s.
     #[inline(always)]
-    fn cfs_distances(&self, v_ego: R, v_other: R, a_limited: R) -> (R, R) {
-        let v_new = v_ego + self.tau * a_limited;
+    fn cfs_distances(&self, v_ego: R, v_other: R, a_limited: R, v_new: R) -> (R, R) {
         let dv_new = v_new - v_other;
         let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
         let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
@@ -144,7 +144,7 @@ impl<R: Real> Fsm<R> {
         let v_new = v_ego + self.tau * a_limited;
         let dv = v_ego - v_other;
         let a_step = if self.limited_step { a_limited } else { a_ego };
-        let (d_safe, d_unsafe) = self.cfs_distances(v_ego, v_other, a_limited);
+        let (d_safe, d_unsafe) = self.cfs_distances(v_ego, v_other, a_limited, v_new);
         // g < dv²/(2|a|), multiplied out.
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
         let slower_then = is_short.choose(R::ONE, R::ZERO);
@@ -171,7 +171,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
     #[inline(always)]
     fn safe_gap(&self, v_ego: R, v_other: R) -> R {
         let (proactive, _) = self.pfs_distances(v_ego, v_other);
-        let (critical, _) = self.cfs_distances(v_ego, v_other, R::ZERO);
+        let (critical, _) = self.cfs_distances(v_ego, v_other, R::ZERO, v_ego);
         let closes = v_ego.is_above(v_other);
         (proactive + self.margin).larger(closes.choose(critical, R::ZERO)).larger(R::ZERO)
     }

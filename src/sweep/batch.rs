@@ -20,8 +20,9 @@ use super::window::Window;
 /// Batches of a burst.
 pub(super) const BATCHES: usize = 3;
 
-/// Steps before calm ones are looked for again where none were found.
-const LOOK_AGAIN: u32 = 8 * ROWS as u32;
+/// Steps before calm ones are looked for again where none were found: at least so many, and a share of those behind.
+const LOOK_AGAIN: u32 = 4 * ROWS as u32;
+const LOOK_AGAIN_SHARE: u32 = 4;
 
 /// Slots of a batch: one bit each.
 pub(super) type Slots = u16;
@@ -126,7 +127,7 @@ impl Batch {
                 arrays.ahead.gap[k] = calm.gaps[1];
                 *restless_until = arrays.moving.index[k];
             }
-            None => *restless_until = state.index + LOOK_AGAIN,
+            None => *restless_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE),
         }
     }
 
