@@ -118,11 +118,15 @@ fn is_wanted(name: &str, kind: &[&str]) -> bool {
     named.peek().is_none() || named.any(|arg| arg == name)
 }
 
-/// The whole study on one and on two threads.
+/// The whole study on one and on two threads, as it is swept and with every step made.
 fn threads(scenarios: &[Scenario]) {
     let plan = plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
-    let backend = CpuBackend::lane_arithmetic();
-    let steps = lane_steps(&plan, &backend);
+    threads_of("", &plan, &CpuBackend::lane_arithmetic());
+    threads_of(", every step", &plan, &CpuBackend::lane_arithmetic().every_step());
+}
+
+fn threads_of(way: &str, plan: &LanePlan, backend: &CpuBackend<f32>) {
+    let steps = lane_steps(plan, backend);
     let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
     let mut best = [f64::INFINITY; 2];
     let mut least_cpu = [f64::INFINITY; 2];
@@ -130,13 +134,13 @@ fn threads(scenarios: &[Scenario]) {
     for repetition in 0..REPETITIONS {
         for (k, pool) in pools.iter().enumerate() {
             let before = cpu_seconds();
-            let seconds = pool.install(|| time(|| run(&plan, &backend)));
+            let seconds = pool.install(|| time(|| run(plan, backend)));
             let (threads, set) = (pool.current_num_threads(), Instructions::best());
-            println!("study on {threads} threads,,,{set},{repetition},{steps},lane-steps,{seconds}");
+            println!("study on {threads} threads{way},,,{set},{repetition},{steps},lane-steps,{seconds}");
             best[k] = best[k].min(seconds);
             if let (Some(before), Some(after)) = (before, cpu_seconds()) {
                 let cpu = after - before;
-                println!("study on {threads} threads: CPU time,,,{set},{repetition},{steps},lane-steps,{cpu}");
+                println!("study on {threads} threads{way}: CPU time,,,{set},{repetition},{steps},lane-steps,{cpu}");
                 least_cpu[k] = least_cpu[k].min(cpu);
             }
         }
@@ -144,10 +148,10 @@ fn threads(scenarios: &[Scenario]) {
     let lanes = plan.lane_count();
     for (pool, best) in pools.iter().zip(best) {
         let (threads, rate) = (pool.current_num_threads(), steps as f64 / best / 1e6);
-        eprintln!("{threads} threads: {lanes} lanes in {best:.3} s, {rate:.1} M lane-steps/s");
+        eprintln!("{threads} threads{way}: {lanes} lanes in {best:.3} s, {rate:.1} M lane-steps/s");
     }
     if least_cpu[0].is_finite() {
-        eprintln!("CPU time of a lane-step on two threads over that on one: {:.3}", least_cpu[1] / least_cpu[0]);
+        eprintln!("CPU time of a lane-step on two threads over that on one{way}: {:.3}", least_cpu[1] / least_cpu[0]);
     }
 }
 
