@@ -109,32 +109,14 @@ fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
 }
 
 impl<R: Real> Fsm<R> {
-    /// Safe and unsafe distance of the PFS, m.
+    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
     #[inline(always)]
-    fn pfs_distances(&self, v_ego: R, v_other: R) -> (R, R) {
+    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
         let reaction = v_ego * self.tau;
         let lead_stop = v_other * v_other * self.half_inverse_lead;
         let d_safe = reaction + v_ego * v_ego * self.half_inverse_comf - lead_stop + self.margin;
         let d_unsafe = reaction + v_ego * v_ego * self.half_inverse_max - lead_stop;
-        (d_safe, d_unsafe)
-    }
-
-    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
-    #[inline(always)]
-    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
-        let (d_safe, d_unsafe) = self.pfs_distances(v_ego, v_other);
         fuzzy(gap - self.margin, d_safe, d_unsafe)
-    }
-
-    /// Safe and unsafe distance of the CFS, m, at the ego's acceleration limited to comfort, m/s², and the speed `v_new`
-    /// that it would have with it after τ, m/s.
-    #[inline(always)]
-    fn cfs_distances(&self, v_ego: R, v_other: R, a_limited: R, v_new: R) -> (R, R) {
-        let dv_new = v_new - v_other;
-        let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
-        let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
-        let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
-        (d_safe, d_unsafe)
     }
 
     /// Critical fuzzy surrogate of the present closing, 0…1.
@@ -144,7 +126,10 @@ impl<R: Real> Fsm<R> {
         let v_new = v_ego + self.tau * a_limited;
         let dv = v_ego - v_other;
         let a_step = if self.limited_step { a_limited } else { a_ego };
-        let (d_safe, d_unsafe) = self.cfs_distances(v_ego, v_other, a_limited, v_new);
+        let dv_new = v_new - v_other;
+        let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
+        let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
+        let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
         // g < dv²/(2|a|), multiplied out.
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
         let slower_then = is_short.choose(R::ONE, R::ZERO);
@@ -167,13 +152,14 @@ impl<R: Real> Fsm<R> {
 }
 
 impl<R: Real> DriverModel<R> for Fsm<R> {
-    /// The larger of the distances at which PFS and CFS become 0.
+    /// The larger of the distances at which PFS and, without acceleration, CFS become 0.
     #[inline(always)]
     fn safe_gap(&self, v_ego: R, v_other: R) -> R {
-        let (proactive, _) = self.pfs_distances(v_ego, v_other);
-        let (critical, _) = self.cfs_distances(v_ego, v_other, R::ZERO, v_ego);
-        let closes = v_ego.is_above(v_other);
-        (proactive + self.margin).larger(closes.choose(critical, R::ZERO)).larger(R::ZERO)
+        let dv = (v_ego - v_other).larger(R::ZERO);
+        let own_stop = v_ego * self.tau + v_ego * v_ego * self.half_inverse_comf;
+        let proactive = own_stop - v_other * v_other * self.half_inverse_lead + self.margin + self.margin;
+        let critical = dv * self.tau + dv * dv * self.half_inverse_comf;
+        proactive.larger(critical)
     }
 
     /// The gate is closed to what is outside and does not come in.
