@@ -48,17 +48,20 @@ pub(super) struct Batch {
     pub finished: Slots,
     /// Slots whose lane may have come to calm steps: nothing around it changes any more, nor did its speed.
     pub calm: Slots,
-    /// Speeds of the egos at the first row.
+    /// Slots whose lane goes on with the second vehicle alone.
+    pub alone: Slots,
+    /// Speeds of the egos at the first row, and the gaps before it.
     speeds: Floats,
+    gaps: Floats,
 }
 
 impl<'c> Fleet<'c> {
-    /// At the beginning of a stream: all slots are free.
-    pub fn new(stream: &Lanes<'_>, entries: &'c [f32]) -> Self {
+    /// At the beginning of a stream: all slots are free. `vehicles` are those that its batches look at.
+    pub fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
         let window = |vehicle: usize, quantity: usize| {
             Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
         };
-        let windows = [0, 1].map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
+        let windows = vehicles.map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
         let lanes = LaneArrays::idle();
         let batch = Batch {
             lanes,
@@ -68,7 +71,9 @@ impl<'c> Fleet<'c> {
             free: !0,
             finished: 0,
             calm: 0,
+            alone: 0,
             speeds: [0.0; LANES],
+            gaps: [0.0; LANES],
         };
         Fleet { batches: [batch; BATCHES], entries }
     }
@@ -103,16 +108,20 @@ impl Batch {
     #[inline(always)]
     fn find_finished(&mut self, step_cap: u32) {
         let moving = &self.lanes.state.moving;
-        let restless_until = &self.lanes.fixed.ego.restless_until;
-        let (mut finished, mut calm) = (0, 0);
-        for (k, &restless_until) in restless_until.iter().enumerate() {
+        let ego = &self.lanes.fixed.ego;
+        let (mut finished, mut calm, mut alone) = (0, 0, 0);
+        for k in 0..LANES {
             let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
-            let is_calm = moving.index[k] > restless_until && moving.v_ego[k] == self.speeds[k];
-            calm |= u16::from(is_calm) << k;
+            let index = moving.index[k];
+            let is_worth_a_look = index > ego.restless_until[k];
+            let is_still = index > ego.steady_from[k] && moving.gap[k] == self.gaps[k];
+            calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
+            alone |= u16::from(index >= ego.alone_from[k]) << k;
         }
         self.finished = finished & !self.free;
         self.calm = calm & !finished & !self.free;
+        self.alone = alone & !finished & !self.free;
     }
 
     /// Leaves out calm steps of a lane where it pays, else looks again later.
@@ -134,6 +143,15 @@ impl Batch {
     /// Frees the slots whose lanes have finished.
     pub fn free_finished(&mut self) {
         self.free |= self.finished;
+    }
+
+    /// Lets the lanes go that go on with the second vehicle alone.
+    pub fn set_apart(&mut self, apart: &mut Waiting) {
+        self.free |= self.alone;
+        while self.alone != 0 {
+            apart.add_alone(&self.lanes, self.alone.trailing_zeros() as usize);
+            self.alone &= self.alone - 1;
+        }
     }
 }
 
@@ -168,6 +186,7 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         batch.clear_free();
         batch.from = batch.lanes.state.moving.index;
         batch.speeds = batch.lanes.state.moving.v_ego;
+        batch.gaps = batch.lanes.state.moving.gap;
         for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
             *furthest = index.max(*furthest);
         }

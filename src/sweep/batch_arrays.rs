@@ -9,6 +9,7 @@ use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::driver::{DriverModel, DriverState};
 use crate::flag::Flag;
 
+use super::alone::NEVER_ALONE;
 use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use super::rules::Rules;
 use super::series::{Track, VehicleTracks};
@@ -52,6 +53,10 @@ pub(super) struct EgoArrays<const N: usize> {
     horizon: [u32; N],
     /// Up to this step it is not worth looking for calm ones.
     pub restless_until: [u32; N],
+    /// From this step on the other vehicles keep speed and lateral position.
+    pub steady_from: [u32; N],
+    /// From this step on only the second vehicle matters.
+    pub alone_from: [u32; N],
 }
 
 /// What is constant within the lanes for another vehicle.
@@ -185,6 +190,7 @@ impl<const N: usize> LaneArrays<N> {
         constants: &LaneConstants<f32>,
         tracks: &[VehicleTracks],
         state: &LaneState<f32>,
+        alone_from: u32,
         values: bool,
     ) {
         for ((other, constants), tracks) in self.fixed.others.iter_mut().zip(&constants.others).zip(tracks) {
@@ -201,8 +207,10 @@ impl<const N: usize> LaneArrays<N> {
         }
         fill(&mut self.fixed.ego.width, from, constants.ego_width);
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
-        let ends = tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last);
-        fill(&mut self.fixed.ego.restless_until, from, ends.max().unwrap_or(0));
+        let steady_from = tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0);
+        fill(&mut self.fixed.ego.restless_until, from, steady_from);
+        fill(&mut self.fixed.ego.steady_from, from, steady_from);
+        fill(&mut self.fixed.ego.alone_from, from, alone_from);
         let moving = &mut self.state.moving;
         fill(&mut moving.index, from, state.index);
         fill(&mut moving.v_ego, from, state.v_ego);
@@ -221,6 +229,18 @@ impl<const N: usize> LaneArrays<N> {
             fill(&mut values.btn_denominator, from, state.record.btn.denominator);
             fill(&mut values.min_gap, from, state.record.min_gap);
         }
+    }
+
+    /// Puts one of these lanes into place `to`, as it goes on with the second vehicle alone; where only verdicts are
+    /// wanted.
+    #[inline]
+    pub fn set_alone(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize) {
+        let (fixed, state) = (&lanes.fixed, &lanes.state);
+        copy(self.fixed.ego.rows_mut(), to, fixed.ego.rows(), k);
+        copy(self.fixed.others[0].rows_mut(), to, fixed.others[1].rows(), k);
+        copy(self.state.moving.rows_mut(), to, state.moving.rows(), k);
+        self.state.moving.gap[to] = state.ahead.gap[k];
+        self.fixed.ego.alone_from[to] = NEVER_ALONE;
     }
 
     /// Says which lane of the stream stands here, and how far the other vehicles are from it.
@@ -248,6 +268,14 @@ impl<const N: usize> FixedArrays<N> {
             }
         };
         LaneConstants { others: [other(0), other(1)], ego_width: self.ego.width[k], horizon: self.ego.horizon[k] }
+    }
+}
+
+/// Puts entry `k` of every row into place `to`.
+#[inline(always)]
+fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[Words], k: usize) {
+    for (row, from) in rows.iter_mut().zip(from) {
+        row[to] = from[k];
     }
 }
 
@@ -327,7 +355,7 @@ mod tests {
     fn rows_lie_in_the_order_of_their_names() {
         let mut ego = EgoArrays::<4>::zeroed();
         ego.horizon[3] = 7;
-        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7], [0; 4]]);
+        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7], [0; 4], [0; 4], [0; 4]]);
         let mut moving = MovingArrays::<4>::zeroed();
         moving.rows_mut().last_mut().unwrap()[1] = 5;
         assert_eq!(moving.over, [0, 5, 0, 0]);
@@ -363,7 +391,7 @@ mod tests {
             over: Flag::TRUE,
         };
         let mut lanes = LaneArrays::<32>::idle();
-        lanes.fill(16, &constants, &tracks, &state, true);
+        lanes.fill(16, &constants, &tracks, &state, 24, true);
         lanes.start(31, 23, state.gaps);
         assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
         assert_eq!(lanes.state.at(31), state);

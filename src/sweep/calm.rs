@@ -5,8 +5,8 @@
 //! Those steps are counted instead of made: [`calm_gap`] is the gap down to which all is well, [`carried`] tells how many
 //! steps the lane stays above it, and where that leaves the gap to the bit.
 //!
-//! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]; a model that gives
-//! none has all its steps made.
+//! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Without a promise go
+//! steps that change no bit of a lane: all that follow change none either.
 
 use crate::driver::DriverModel;
 use crate::flag::Flag;
@@ -14,7 +14,7 @@ use crate::scalar::Real;
 
 use super::batch_arrays::ROWS;
 use super::frame::Simulation;
-use super::lane_step::{Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, check, judge, see};
+use super::lane_step::{Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, judge, see};
 
 /// Fewer steps are sooner made than counted.
 const FEWEST: u32 = 4 * ROWS as u32;
@@ -36,20 +36,10 @@ pub(super) fn calm_steps<M: DriverModel<f32>>(
     places: &[Whereabouts<f32>; 2],
 ) -> Option<Calm> {
     let index = state.index;
-    // A model that does not see its acceleration has no speed before kept.
-    if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
-        return None;
-    }
     // A burst is left to be made, so that the lane's end is reached as any other's.
     let mut most = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
     let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
-    let mut lowest = [None; 2];
-    let mut settled = true;
-    for vehicle in 0..vehicles {
-        let (other, place) = (&lane.others[vehicle], &places[vehicle]);
-        if index >= other.present_until {
-            continue;
-        }
+    for other in &lane.others[..vehicles] {
         if index < other.present_from {
             return None;
         }
@@ -57,6 +47,22 @@ pub(super) fn calm_steps<M: DriverModel<f32>>(
             if event > index {
                 most = most.min(event - index);
             }
+        }
+    }
+    if is_still(simulation, lane, state, places) {
+        let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
+        return (steps >= FEWEST).then_some(Calm { steps, gaps: state.gaps });
+    }
+    // A model that does not see its acceleration has no speed before kept.
+    if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
+        return None;
+    }
+    let mut lowest = [None; 2];
+    let mut settled = true;
+    for vehicle in 0..vehicles {
+        let (other, place) = (&lane.others[vehicle], &places[vehicle]);
+        if index >= other.present_until {
+            continue;
         }
         if is_out_of_the_way(simulation, lane, other, place) {
             continue;
@@ -86,8 +92,31 @@ pub(super) fn calm_steps<M: DriverModel<f32>>(
     (steps >= FEWEST).then_some(Calm { steps, gaps })
 }
 
+/// The next step changes nothing: a driver often follows so closely to the speed ahead that what it would brake, and
+/// what the gap would lose, is lost in rounding. Then no step changes anything before an event.
+fn is_still<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    state: &LaneState<f32>,
+    places: &[Whereabouts<f32>; 2],
+) -> bool {
+    // Seldom so: what it is about comes first.
+    let change = (places[0].speed - state.v_ego) * simulation.frame.dt;
+    if state.gaps[0] + change != state.gaps[0] {
+        return false;
+    }
+    let bits = |state: &LaneState<f32>| {
+        // What a step does not look at may not be kept: see `StateArrays::set`.
+        let v_before = if M::SEES_OWN_ACCELERATION { state.v_before } else { 0.0 };
+        let numbers = [state.v_ego, v_before, state.gaps[0], state.gaps[1], state.driver.deceleration];
+        let flags = [state.record.ttc.failed, state.record.btn.failed, state.over];
+        (numbers.map(f32::to_bits), state.driver.delay_steps, flags.map(Flag::to_bits))
+    };
+    bits(&advance(simulation, lane, state, places).state) == bits(state)
+}
+
 /// Beside the ego's lane, where it meets no contact, no criterion and no reaction, wherever it is along the road.
-fn is_out_of_the_way<M: DriverModel<f32>>(
+pub(super) fn is_out_of_the_way<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     other: &OtherConstants<f32>,
@@ -189,7 +218,6 @@ mod tests {
     use crate::sweep::drivers::Constants;
     use crate::sweep::frame::Frame;
     use crate::sweep::lane_case::NEVER;
-    use crate::sweep::lane_step::advance;
     use crate::sweep::scene::Scene;
 
     /// The same, sum by sum.
@@ -303,26 +331,72 @@ mod tests {
             let slowing = LaneState { v_before: start.v_ego + 0.1, ..start };
             assert!(!M::SEES_OWN_ACCELERATION || calm_steps(simulation, &lane, &slowing, &places).is_none(), "{name}");
             let Some(calm) = calm else { continue };
-            let mut state = start;
-            for _ in 0..calm.steps {
-                state = advance(simulation, &lane, &state, &places).state;
-                assert!(!state.over.holds(), "{name}, lane {number} ends at step {}: {calm:?}", state.index);
-            }
-            let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
-            assert_eq!(state.index, start.index + calm.steps);
-            assert!(state.v_ego == start.v_ego && state.driver == start.driver, "{name}, lane {number}: {calm:?}");
-            assert_eq!(failed(&state), failed(&start), "{name}, lane {number}: {calm:?}");
-            let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
-            for (vehicle, place) in places.iter().enumerate().take(vehicles) {
-                let out_of_the_way = is_out_of_the_way(simulation, &lane, &lane.others[vehicle], place);
-                let gone = start.index >= lane.others[vehicle].present_until;
-                let gaps = (calm.gaps[vehicle], state.gaps[vehicle]);
-                assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}, lane {number}: {calm:?} {gaps:?}");
-            }
+            make_one_by_one(simulation, &lane, &start, &places, &calm, &format!("{name}, lane {number}"));
             found += 1;
             lasting += u32::from(calm.steps > 500);
         }
         assert!(found > 200 && lasting > 20, "{name}: {found} found, {lasting} of them long");
+    }
+
+    /// Makes calm steps; gives the lane after them.
+    fn make_one_by_one<M: DriverModel<f32>>(
+        simulation: &Simulation<f32, M>,
+        lane: &LaneConstants<f32>,
+        start: &LaneState<f32>,
+        places: &[Whereabouts<f32>; 2],
+        calm: &Calm,
+        name: &str,
+    ) -> LaneState<f32> {
+        let mut state = *start;
+        for _ in 0..calm.steps {
+            state = advance(simulation, lane, &state, places).state;
+            assert!(!state.over.holds(), "{name} ends at step {}: {calm:?}", state.index);
+        }
+        let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
+        assert_eq!(state.index, start.index + calm.steps);
+        assert!(state.v_ego == start.v_ego && state.driver == start.driver, "{name}: {calm:?}");
+        assert_eq!(failed(&state), failed(start), "{name}: {calm:?}");
+        let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
+        for (vehicle, place) in places.iter().enumerate().take(vehicles) {
+            let out_of_the_way = is_out_of_the_way(simulation, lane, &lane.others[vehicle], place);
+            let gone = start.index >= lane.others[vehicle].present_until;
+            let gaps = (calm.gaps[vehicle], state.gaps[vehicle]);
+            assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}: {calm:?} {gaps:?}");
+        }
+        state
+    }
+
+    /// FSM comes nearer and nearer to the speed ahead, until rounding lets it brake no more and the gap lose no more:
+    /// from there on one look leaves out all steps to the end, although the driver counts as unsafe at every one.
+    #[test]
+    fn one_who_follows_comes_to_stand_still_in_rounding() {
+        let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
+        let frame = &Frame { step_cap: 6000, ..constants.frames[0] };
+        let criteria = &Criteria { keeps_values: false, ..constants.criteria };
+        let scene = Scene { is_pair: false, always_there: true, in_lane: true };
+        let simulation = Simulation { frame, criteria, model: &constants.fsm, model_index: 0, scene };
+        let mut stood_still = 0;
+        for number in 0..200 {
+            let (lane, start, places) = lane(number);
+            let speed = start.v_ego.max(5.0) - 0.01 * (number % 100) as f32;
+            let place = Whereabouts { speed, position: 0.0, towards: 0.0 };
+            let always = OtherConstants { present_from: 0, present_until: Flag::LATEST_STEP, attend_from: 0, ..lane.others[0] };
+            let lane = LaneConstants { others: [always; 2], horizon: Flag::LATEST_STEP, ..lane };
+            let mut state = LaneState { index: 1, v_ego: start.v_ego.max(5.0), v_before: start.v_ego.max(5.0), ..start };
+            state.gaps = [state.v_ego * (1.5 + (number % 7) as f32 / 2.0); 2];
+            let places = [place, places[1]];
+            while !state.over.holds() && state.index < frame.step_cap {
+                let Some(calm) = calm_steps(&simulation, &lane, &state, &places) else {
+                    state = advance(&simulation, &lane, &state, &places).state;
+                    continue;
+                };
+                let is_unsafe = advance(&simulation, &lane, &state, &places).hazard.is_unsafe.holds();
+                stood_still += u32::from(is_unsafe);
+                state = make_one_by_one(&simulation, &lane, &state, &places, &calm, &format!("lane {number}"));
+                assert!(!is_unsafe || state.index == frame.step_cap - ROWS as u32, "lane {number}: {calm:?} is not all");
+            }
+        }
+        assert!(stood_still > 100, "{stood_still}");
     }
 
     #[test]

@@ -52,8 +52,9 @@ impl CpuBackend<f32> {
         Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
     }
 
-    /// The same, but it makes every step of every lane; without it, batches leave out those in which nothing can
-    /// happen, where only verdicts are wanted. The verdicts are the same. For benchmarks and tests.
+    /// The same, but it makes every step of every lane, with all its vehicles; without it, where only verdicts are
+    /// wanted, batches leave out steps in which nothing can happen and vehicles that do not matter any more. The verdicts
+    /// are the same. For benchmarks and tests.
     pub fn every_step(self) -> Self {
         CpuBackend { every_step: true, ..self }
     }

@@ -6,7 +6,6 @@ use crate::profile::Profile;
 use crate::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::batch::Fleet;
 use super::ending::Ending;
 use super::frame::{Frame, Simulation, Start};
 use super::instructions::Instructions;
@@ -15,9 +14,8 @@ use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::rules::Rules;
 use super::scene::Scene;
-use super::simd::burst_for;
 use super::stream::run_stream;
-use super::waiting::{Lanes, Waiting};
+use super::waiting::Lanes;
 
 /// Makes [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
@@ -113,7 +111,7 @@ macro_rules! declare_constants {
                 match id {
                     $(ModelId::$model => {
                         let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
-                        run_in_batches(&simulation, instructions, stream, entries, each);
+                        run_stream(&simulation, instructions, stream, entries, each);
                     })+
                 }
             }
@@ -121,23 +119,3 @@ macro_rules! declare_constants {
     };
 }
 for_every_driver_model!(declare_constants);
-
-/// Runs a stream on an instruction set; see [`run_stream`].
-fn run_in_batches<M: DriverModel<f32>, E: Ending>(
-    simulation: &Simulation<'_, f32, M>,
-    instructions: Instructions,
-    stream: &Lanes<'_>,
-    entries: &[f32],
-    mut each: impl FnMut(usize, E),
-) {
-    const RUNS: &str = "these lanes do not run in batches";
-    let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, E::HAS_VALUES).expect(RUNS);
-    let burst = burst_for(instructions, rules).expect(RUNS);
-    // Some rules have no loop for verdicts alone.
-    let values = !rules.is_verdict_only;
-    let steps = |fleet: &mut Fleet<'_>, waiting: &mut Waiting| burst.run(simulation, fleet, waiting);
-    run_stream(simulation, stream, values, entries, steps, |lane, batch, k| {
-        let (constants, state, places) = batch.last_step(k);
-        each(lane, E::of(simulation, &constants, &state, &places));
-    });
-}

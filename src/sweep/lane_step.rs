@@ -129,8 +129,8 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Steps change nothing more, but
-    /// for `v_before` where only verdicts are wanted, which do not look at it.
+    /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Steps change
+    /// nothing more, but for `v_before` where only verdicts are wanted, which do not look at it.
     pub over: Flag,
 }
 
@@ -167,8 +167,7 @@ pub struct Moved<R> {
 }
 
 /// One step; `places` are the other vehicles at `state.index`. The lane is over where its state says so, or where the
-/// next index reaches the step cap; one that is over stays as it is (see
-/// [`LaneState::over`]).
+/// next index reaches the step cap; one that is over stays as it is (see [`LaneState::over`]).
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,

@@ -4,6 +4,7 @@
 //! and partial results. Here lives no physics of a driver or a criterion, and nothing about scores. Cases
 //! come from [`crate::scenario`] and [`crate::parameterization`]; partials go to [`crate::score`].
 
+mod alone;
 mod backend;
 mod batch;
 mod batch_arrays;

@@ -28,6 +28,7 @@ pub struct LaneRunner<'p, R> {
     starts: Vec<Start<R>>,
     /// Lanes do no more than batches for verdicts.
     as_in_batches: bool,
+    /// Batches spare nothing.
     every_step: bool,
     /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
     spare: Mutex<Vec<Series>>,
@@ -55,8 +56,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self
     }
 
-    /// The same, but batches make every step; without it they leave out those in which nothing can happen, where only
-    /// verdicts are wanted. The verdicts are the same.
+    /// The same, but batches make every step with all vehicles; without it, where only verdicts are wanted, they leave
+    /// out steps in which nothing can happen and vehicles that do not matter any more. The verdicts are the same.
     pub fn every_step(mut self, every_step: bool) -> Self {
         self.every_step = every_step;
         self

@@ -3,7 +3,7 @@
 use crate::scalar::Real;
 use crate::scenario::LATERAL_SAMPLED;
 
-use super::lane_case::{LaneCase, NEVER};
+use super::lane_case::{LaneCase, LaneOther, NEVER};
 
 /// What all lanes of a stream have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +29,13 @@ impl Scene {
         let in_lane = always_there && cases.iter().all(|case| is_in_lane(case, model_index));
         Scene { is_pair: !always_there, always_there, in_lane }
     }
+
+    /// What holds for lanes of these cases [once only their second vehicles matter](super::alone): they are there,
+    /// judged and attended to.
+    pub(super) fn of_second_alone<R: Real>(cases: &[LaneCase<R>]) -> Scene {
+        let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
+        Scene { is_pair: false, always_there: true, in_lane }
+    }
 }
 
 /// One other vehicle, and it neither comes nor goes.
@@ -39,11 +46,15 @@ fn is_always_there<R: Real>(case: &LaneCase<R>) -> bool {
 
 /// The same, in the middle of the ego's lane from the first step to the last.
 fn is_in_lane<R: Real>(case: &LaneCase<R>, model_index: usize) -> bool {
-    let (other, motion) = (&case.others[0], &case.others[0].motion);
+    is_centred(&case.others[0], case.ego_width) && case.others[0].attend_from[model_index] == 0
+}
+
+/// It keeps to the middle of the ego's lane.
+fn is_centred<R: Real>(other: &LaneOther<R>, ego_width: R) -> bool {
+    let motion = &other.motion;
     let positions = [motion.lateral_initial, motion.lateral_per_step, motion.lateral_end, motion.lateral_towards];
-    let is_centred = motion.kind & LATERAL_SAMPLED == 0 && positions.iter().all(|&number| number == R::ZERO);
-    let has_widths = other.half_widths > R::ZERO && case.ego_width > R::ZERO;
-    is_centred && has_widths && other.attend_from[model_index] == 0
+    let stays = motion.kind & LATERAL_SAMPLED == 0 && positions.iter().all(|&number| number == R::ZERO);
+    stays && other.half_widths > R::ZERO && ego_width > R::ZERO
 }
 
 #[cfg(test)]

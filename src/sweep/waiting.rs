@@ -3,6 +3,7 @@
 
 use crate::driver::DriverModel;
 
+use super::alone::{NEVER_ALONE, alone_from};
 use super::batch::Slots;
 use super::batch_arrays::{LANES, LaneArrays, Words};
 use super::frame::{Simulation, Start};
@@ -10,8 +11,8 @@ use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState};
 use super::series::VehicleTracks;
 
-/// Lanes that wait at most: 26 KB with one other vehicle and verdicts alone, 47 KB with all there is.
-const MOST: usize = 256;
+/// Lanes that wait at most: 27 KB with one other vehicle and verdicts alone, 48 KB with all there is.
+pub(super) const MOST: usize = 256;
 
 /// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
 pub(super) const ROOM: usize = MOST + LANES;
@@ -25,7 +26,7 @@ pub(super) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
-    /// Calm steps are made as well.
+    /// Calm steps are made as well, and no vehicle is let go.
     pub every_step: bool,
 }
 
@@ -73,14 +74,30 @@ impl Waiting {
 
     /// Sees to it that at least so many lanes wait, if there are more.
     #[inline]
-    pub fn have<M: DriverModel<f32>>(&mut self, least: usize, simulation: &Simulation<f32, M>, stream: &Lanes<'_>) {
+    /// `sets_apart`: the series, where lanes are set apart that go on with the second vehicle alone.
+    pub fn have<M: DriverModel<f32>>(
+        &mut self,
+        least: usize,
+        simulation: &Simulation<f32, M>,
+        stream: &Lanes<'_>,
+        sets_apart: Option<&[f32]>,
+    ) {
         if self.count() >= least || self.case == stream.cases.len() {
             return;
         }
         self.close_up(simulation.scene.is_pair);
         while self.end < MOST && self.case < stream.cases.len() {
-            self.add(simulation, stream);
+            self.add(simulation, stream, sets_apart);
         }
+    }
+
+    /// Adds a lane that goes on with the second vehicle alone.
+    pub fn add_alone(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
+        if self.end == MOST {
+            self.close_up(false);
+        }
+        self.lanes.set_alone(self.end, lanes, k);
+        self.end += 1;
     }
 
     /// Moves those that wait to the front.
@@ -94,15 +111,25 @@ impl Waiting {
     }
 
     /// Adds lanes of the case to come.
-    fn add<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, stream: &Lanes<'_>) {
+    fn add<M: DriverModel<f32>>(
+        &mut self,
+        simulation: &Simulation<f32, M>,
+        stream: &Lanes<'_>,
+        sets_apart: Option<&[f32]>,
+    ) {
         let case = &stream.cases[self.case];
-        let tracks = &stream.tracks[self.case][..if simulation.scene.is_pair { 2 } else { 1 }];
+        let tracks = &stream.tracks[self.case];
         let constants = LaneConstants::new(simulation, case);
+        let alone_from = match sets_apart {
+            Some(entries) => alone_from(simulation, &constants, tracks, entries),
+            None => NEVER_ALONE,
+        };
+        let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
         let starts = &stream.starts[self.start..];
         let starts = &starts[..starts.len().min(MOST - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
-            self.lanes.fill(self.end, &constants, tracks, &state, self.values);
+            self.lanes.fill(self.end, &constants, tracks, &state, alone_from, self.values);
             for &start in starts {
                 self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
                 self.end += 1;
