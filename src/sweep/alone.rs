@@ -7,6 +7,7 @@
 use crate::driver::DriverModel;
 use crate::flag::Flag;
 
+use super::batch_arrays::ROWS;
 use super::calm::is_out_of_the_way;
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, Whereabouts};
@@ -28,18 +29,30 @@ pub(super) fn alone_from<M: DriverModel<f32>>(
         return NEVER_ALONE;
     }
     let VehicleTracks { position, towards, .. } = tracks[0];
-    let at = |track: Track, step: u32| entries[(track.first + step.min(track.last)) as usize];
-    let is_out = |step: u32| {
-        let place = Whereabouts { speed: 0.0, position: at(position, step), towards: at(towards, step) };
-        is_out_of_the_way(simulation, lane, principal, &place)
+    // So many entries of a series from a step on; its last one is repeated.
+    let at = |track: Track, step: u32, count: usize| {
+        let from = (track.first + step.min(track.last)) as usize;
+        &entries[from..from + count]
+    };
+    // Beside the lane at all of these steps; without a branch, so that a compiler can ask for many at once.
+    let is_out = |step: u32, count: usize| {
+        let mut is_out = Flag::TRUE;
+        for (&position, &towards) in at(position, step, count).iter().zip(at(towards, step, count)) {
+            let place = Whereabouts { speed: 0.0, position, towards };
+            is_out = is_out & is_out_of_the_way(simulation, lane, principal, &place);
+        }
+        is_out.holds()
     };
     let gone_from = if principal.present_from == NEVER_ALONE { 0 } else { principal.present_until };
     // From the end, where it stays: back to the last step at which it is in the way.
     let mut from = position.last.max(towards.last).min(gone_from);
-    if from < gone_from && !is_out(from) {
+    if from < gone_from && !is_out(from, 1) {
         from = gone_from;
     }
-    while from > 0 && is_out(from - 1) {
+    while from >= ROWS as u32 && is_out(from - ROWS as u32, ROWS) {
+        from -= ROWS as u32;
+    }
+    while from > 0 && is_out(from - 1, 1) {
         from -= 1;
     }
     from.max(second.present_from).max(second.attend_from)
@@ -107,7 +120,8 @@ mod tests {
         if from != NEVER_ALONE && from > second.present_from.max(second.attend_from) {
             let first = Whereabouts::of(&case.others[0].motion, tables, from - 1);
             let present = from - 1 < constants.others[0].present_until;
-            assert!(present && !is_out_of_the_way(pair, &constants, &constants.others[0], &first), "{name}");
+            let is_out = is_out_of_the_way(pair, &constants, &constants.others[0], &first).holds();
+            assert!(present && !is_out, "{name}");
         }
         let ignores = pair.model.ignores(10.0, 0.0).holds();
         let comes = constants.others[0].present_from < NEVER_ALONE;

@@ -14,7 +14,9 @@ use crate::scalar::Real;
 
 use super::batch_arrays::ROWS;
 use super::frame::Simulation;
-use super::lane_step::{Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, judge, see};
+use super::lane_step::{
+    Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, judge, see,
+};
 
 /// Fewer steps are sooner made than counted.
 const FEWEST: u32 = 4 * ROWS as u32;
@@ -64,7 +66,7 @@ pub(super) fn calm_steps<M: DriverModel<f32>>(
         if index >= other.present_until {
             continue;
         }
-        if is_out_of_the_way(simulation, lane, other, place) {
+        if is_out_of_the_way(simulation, lane, other, place).holds() {
             continue;
         }
         settled &= state.v_ego <= place.speed;
@@ -116,15 +118,16 @@ fn is_still<M: DriverModel<f32>>(
 }
 
 /// Beside the ego's lane, where it meets no contact, no criterion and no reaction, wherever it is along the road.
+#[inline(always)]
 pub(super) fn is_out_of_the_way<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     other: &OtherConstants<f32>,
     place: &Whereabouts<f32>,
-) -> bool {
+) -> Flag {
     let lateral_gap = place.position.abs() - other.half_widths;
     let judged = simulation.criteria.sees(0.0, other.half_lengths, lateral_gap, place.position, lane.ego_width);
-    lateral_gap >= 0.0 && !judged.holds() && simulation.model.ignores(lateral_gap, place.towards).holds()
+    !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards)
 }
 
 /// A gap down to which nothing happens with a vehicle; none where it is not in the ego's lane, or already too near.
@@ -358,7 +361,7 @@ mod tests {
         assert_eq!(failed(&state), failed(start), "{name}: {calm:?}");
         let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
         for (vehicle, place) in places.iter().enumerate().take(vehicles) {
-            let out_of_the_way = is_out_of_the_way(simulation, lane, &lane.others[vehicle], place);
+            let out_of_the_way = is_out_of_the_way(simulation, lane, &lane.others[vehicle], place).holds();
             let gone = start.index >= lane.others[vehicle].present_until;
             let gaps = (calm.gaps[vehicle], state.gaps[vehicle]);
             assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}: {calm:?} {gaps:?}");
@@ -380,9 +383,11 @@ mod tests {
             let (lane, start, places) = lane(number);
             let speed = start.v_ego.max(5.0) - 0.01 * (number % 100) as f32;
             let place = Whereabouts { speed, position: 0.0, towards: 0.0 };
-            let always = OtherConstants { present_from: 0, present_until: Flag::LATEST_STEP, attend_from: 0, ..lane.others[0] };
+            let always =
+                OtherConstants { present_from: 0, present_until: Flag::LATEST_STEP, attend_from: 0, ..lane.others[0] };
             let lane = LaneConstants { others: [always; 2], horizon: Flag::LATEST_STEP, ..lane };
-            let mut state = LaneState { index: 1, v_ego: start.v_ego.max(5.0), v_before: start.v_ego.max(5.0), ..start };
+            let mut state =
+                LaneState { index: 1, v_ego: start.v_ego.max(5.0), v_before: start.v_ego.max(5.0), ..start };
             state.gaps = [state.v_ego * (1.5 + (number % 7) as f32 / 2.0); 2];
             let places = [place, places[1]];
             while !state.over.holds() && state.index < frame.step_cap {
@@ -393,7 +398,10 @@ mod tests {
                 let is_unsafe = advance(&simulation, &lane, &state, &places).hazard.is_unsafe.holds();
                 stood_still += u32::from(is_unsafe);
                 state = make_one_by_one(&simulation, &lane, &state, &places, &calm, &format!("lane {number}"));
-                assert!(!is_unsafe || state.index == frame.step_cap - ROWS as u32, "lane {number}: {calm:?} is not all");
+                assert!(
+                    !is_unsafe || state.index == frame.step_cap - ROWS as u32,
+                    "lane {number}: {calm:?} is not all"
+                );
             }
         }
         assert!(stood_still > 100, "{stood_still}");
