@@ -1,12 +1,12 @@
-//! One core on every instruction set: lane-steps per second of every category and model and of a whole study, the operations of a
-//! lane-step, the roof of the machine, and memory at 10^5, 10^6 and 10^7 lanes.
+//! One core on every instruction set: lane-steps per second of every category and model and of a whole study, the
+//! operations of a lane-step, the roof of the machine, one and two threads, and memory at 10^5, 10^6 and 10^7 lanes.
 //!
 //! `cargo bench --bench simd` prints one CSV row per part and repetition to stdout (kept under `benches/runs` with
 //! the machine's facts) and a summary to stderr. Synthetic data of the paper's size, ten headways, the verdicts of
 //! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512`, `-- study`, or `-- threads`, does no more
 //! than what is named. Batches leave out calm steps; they are timed with every step made as well, and that is what shares
-//! of the roof are worked out from: steps that are not made have no operations. The operations are those that batches do for verdicts: what only smallest and largest values
-//! need, or what is known of a case beforehand, is not counted. The roof is what independent additions,
+//! of the roof are worked out from: steps that are not made have no operations. The operations are those that batches do
+//! for verdicts: what only smallest and largest values need, or what is known of a case beforehand, is not counted. The roof is what independent additions,
 //! multiplications, or both in turn reach on values in registers; the best of them counts.
 
 #![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
@@ -23,8 +23,12 @@ use lanesweep::scenario::{Category, Scenario};
 use lanesweep::sweep::{
     CpuBackend, Headway, Instructions, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
 };
+use rayon::prelude::*;
 
 const REPETITIONS: usize = 15;
+const THREADS_REPETITIONS: usize = 31;
+/// Loops of the roof that threads share.
+const ROOF_TASKS: usize = 32;
 /// All categories in one sweep.
 const STUDY: &str = "study";
 
@@ -118,40 +122,49 @@ fn is_wanted(name: &str, kind: &[&str]) -> bool {
     named.peek().is_none() || named.any(|arg| arg == name)
 }
 
-/// The whole study on one and on two threads, as it is swept and with every step made.
+/// Work on one and on two threads, in turn, so that all of it sees the same machine: the whole study, as it is swept and
+/// with every step made, and the roof's loop, which needs no memory. What that loop loses is the machine's.
 fn threads(scenarios: &[Scenario]) {
-    let plan = plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
-    threads_of("", &plan, &CpuBackend::lane_arithmetic());
-    threads_of(", every step", &plan, &CpuBackend::lane_arithmetic().every_step());
-}
-
-fn threads_of(way: &str, plan: &LanePlan, backend: &CpuBackend<f32>) {
-    let steps = lane_steps(plan, backend);
+    let plan = &plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
+    let (swept, every_step) = (CpuBackend::lane_arithmetic(), CpuBackend::lane_arithmetic().every_step());
+    let (steps, set) = (lane_steps(plan, &swept), Instructions::best());
+    let roof = || (0..ROOF_TASKS).into_par_iter().map(|_| roof::operations(set, 2)).sum::<u64>();
+    let operations = roof();
+    let works: [(&str, u64, &str, &(dyn Fn() + Sync)); 3] = [
+        ("study", steps, "lane-steps", &|| run(plan, &swept)),
+        ("study every step", steps, "lane-steps", &|| run(plan, &every_step)),
+        ("roof both in turn", operations, "operations", &|| assert_eq!(roof(), operations)),
+    ];
     let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
-    let mut best = [f64::INFINITY; 2];
-    let mut least_cpu = [f64::INFINITY; 2];
-    // In turn, so that both see the same machine.
-    for repetition in 0..REPETITIONS {
-        for (k, pool) in pools.iter().enumerate() {
-            let before = cpu_seconds();
-            let seconds = pool.install(|| time(|| run(plan, backend)));
-            let (threads, set) = (pool.current_num_threads(), Instructions::best());
-            println!("study on {threads} threads{way},,,{set},{repetition},{steps},lane-steps,{seconds}");
-            best[k] = best[k].min(seconds);
-            if let (Some(before), Some(after)) = (before, cpu_seconds()) {
-                let cpu = after - before;
-                println!("study on {threads} threads{way}: CPU time,,,{set},{repetition},{steps},lane-steps,{cpu}");
-                least_cpu[k] = least_cpu[k].min(cpu);
+    // Per work and number of threads: wall time and CPU time of every repetition.
+    let mut times = vec![[Vec::new(), Vec::new()]; works.len()];
+    for repetition in 0..THREADS_REPETITIONS {
+        for (&(name, amount, unit, work), times) in works.iter().zip(&mut times) {
+            for (pool, times) in pools.iter().zip(times) {
+                let before = cpu_seconds().unwrap_or(f64::NAN);
+                let seconds = pool.install(|| time(work));
+                let cpu = cpu_seconds().unwrap_or(f64::NAN) - before;
+                let threads = pool.current_num_threads();
+                println!("{name} on {threads} threads,,,{set},{repetition},{amount},{unit},{seconds}");
+                println!("{name} on {threads} threads: CPU time,,,{set},{repetition},{amount},{unit},{cpu}");
+                times.push((seconds, cpu));
             }
         }
     }
-    let lanes = plan.lane_count();
-    for (pool, best) in pools.iter().zip(best) {
-        let (threads, rate) = (pool.current_num_threads(), steps as f64 / best / 1e6);
-        eprintln!("{threads} threads{way}: {lanes} lanes in {best:.3} s, {rate:.1} M lane-steps/s");
-    }
-    if least_cpu[0].is_finite() {
-        eprintln!("CPU time of a lane-step on two threads over that on one{way}: {:.3}", least_cpu[1] / least_cpu[0]);
+    for ((name, amount, unit, _), [one, two]) in works.iter().zip(&times) {
+        let best = |times: &[(f64, f64)]| times.iter().fold(f64::INFINITY, |best, time| best.min(time.0));
+        let (of_one, of_two) = (best(one), best(two));
+        let rate = |seconds: f64| *amount as f64 / seconds / 1e6;
+        eprintln!(
+            "{name}: one thread {of_one:.3} s, two {of_two:.3} s; {:.0} and {:.0} M {unit}/s",
+            rate(of_one),
+            rate(of_two)
+        );
+        let mut ratios: Vec<f64> = one.iter().zip(two).map(|(one, two)| two.1 / one.1).collect();
+        ratios.sort_by(f64::total_cmp);
+        let quartile = |k: usize| ratios[k * (ratios.len() - 1) / 4];
+        let (low, middle, high) = (quartile(1), quartile(2), quartile(3));
+        eprintln!("    CPU time on two threads over that on one: median {middle:.3}, quartiles {low:.3} and {high:.3}");
     }
 }
 
