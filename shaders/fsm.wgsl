@@ -26,30 +26,21 @@ override driver_jerk_per_step: f32;
 override driver_max_deceleration: f32;
 override driver_delay_steps: u32;
 
-// How dangerous a distance is. Not divided yet: only one of two surrogates is braked for.
-struct Fuzzy {
-    // What is missing to the safe distance, m; not positive where it is safe.
-    short: f32,
-    // From the safe distance down to the dangerous one, m.
-    way: f32,
-}
-
-// 0 beyond the safe distance, 1 below the dangerous one, linear between.
-fn fuzzy(distance: f32, safe: f32, dangerous: f32) -> Fuzzy {
-    return Fuzzy(safe - distance, safe - dangerous);
-}
-
-// 0 (safe) to 1.
-fn value(fuzzy: Fuzzy) -> f32 {
-    var share = 0.0;
-    if fuzzy.short > 0.0 {
-        share = exact_div(fuzzy.short, larger(fuzzy.short, fuzzy.way));
+// 0 beyond the safe distance, 1 below the unsafe one, linear between.
+fn fuzzy(distance: f32, safe: f32, dangerous: f32) -> f32 {
+    var value = 0.0;
+    if distance >= safe {
+        value = 0.0;
+    } else if distance <= dangerous {
+        value = 1.0;
+    } else {
+        value = exact_div(distance - safe, dangerous - safe);
     }
-    return share;
+    return value;
 }
 
 // Proactive fuzzy surrogate of the leader's possible braking, 0…1.
-fn pfs(v_ego: f32, v_other: f32, gap: f32) -> Fuzzy {
+fn pfs(v_ego: f32, v_other: f32, gap: f32) -> f32 {
     let reaction = v_ego * driver_tau;
     let lead_stop = v_other * v_other * driver_half_inverse_lead;
     let d_safe = reaction + v_ego * v_ego * driver_half_inverse_comf - lead_stop + driver_margin;
@@ -58,7 +49,7 @@ fn pfs(v_ego: f32, v_other: f32, gap: f32) -> Fuzzy {
 }
 
 // Critical fuzzy surrogate of the present closing, 0…1.
-fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> Fuzzy {
+fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> f32 {
     let a_limited = larger(a_ego, -driver_b_comf);
     let v_new = v_ego + driver_tau * a_limited;
     let dv = v_ego - v_other;
@@ -67,16 +58,17 @@ fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> Fuzzy {
     let d_new = (v_ego + a_limited * driver_half_tau - v_other) * driver_tau;
     let d_safe = d_new + dv_new * dv_new * driver_half_inverse_comf;
     let d_unsafe = d_new + dv_new * dv_new * driver_half_inverse_max;
-    // g < dv²/(2|a|), multiplied out.
-    let is_short = (gap + gap) * abs(a_step) < dv * dv;
-    let slower_then = Fuzzy(select(0.0, 1.0, is_short), 0.0);
-    let faster_then = fuzzy(gap, d_safe, d_unsafe);
-    let closes = v_ego > v_other;
-    let is_slower = v_new < v_other;
-    return Fuzzy(
-        select(0.0, select(faster_then.short, slower_then.short, is_slower), closes),
-        select(faster_then.way, slower_then.way, is_slower),
-    );
+    var value = 0.0;
+    if v_ego <= v_other {
+        value = 0.0;
+    } else if v_new < v_other {
+        // g < dv²/(2|a|), multiplied out.
+        let twice = gap + gap;
+        value = select(0.0, 1.0, twice * abs(a_step) < dv * dv);
+    } else {
+        value = fuzzy(gap, d_safe, d_unsafe);
+    }
+    return value;
 }
 
 // Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or while it
@@ -99,11 +91,9 @@ fn initial() -> DriverState {
 fn check(view: View) -> Hazard {
     let pfs = pfs(view.v_ego, view.v_other, view.gap);
     let cfs = cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
-    let is_critical = cfs.short > 0.0;
-    let braked_for = Fuzzy(select(pfs.short, cfs.short, is_critical), select(pfs.way, cfs.way, is_critical));
-    let surrogate = value(braked_for);
-    let demand = select(surrogate * driver_b_comf, surrogate * driver_b_span + driver_b_comf, is_critical);
-    return Hazard(!is_behind(view) & (surrogate > 0.0) & gate_is_open(view), demand);
+    let surrogate = (pfs > 0.0) | (cfs > 0.0);
+    let demand = select(pfs * driver_b_comf, cfs * driver_b_span + driver_b_comf, cfs > 0.0);
+    return Hazard(!is_behind(view) & surrogate & gate_is_open(view), demand);
 }
 
 // Hold the speed for τ, then the demand: reached with 12.65 m/s³ upwards, at once downwards.

@@ -19,8 +19,8 @@ pub fn compare_functions(table: &Table, profile: &Profile) -> Result<Vec<Tally>>
         let name = row.text("fn")?;
         let v_ego = row.number("v_ego")?;
         let ours = match name {
-            "PFS" => fsm.pfs(v_ego, row.number("v_lead")?, row.number("gap")?).value(),
-            "CFS" => fsm.cfs(v_ego, row.number("v_lead")?, row.number("gap")?, row.number("a_ego")?).value(),
+            "PFS" => fsm.pfs(v_ego, row.number("v_lead")?, row.number("gap")?),
+            "CFS" => fsm.cfs(v_ego, row.number("v_lead")?, row.number("gap")?, row.number("a_ego")?),
             "RSS_dlon" => rss.longitudinal_distance(v_ego, row.number("v_lead")?),
             "RSS_dlat" => rss.lateral_distance(v_ego),
             "Reg157_ttc_thr_JRC" => reg157.ttc_threshold(v_ego - row.number("v_lead")?),

@@ -98,35 +98,20 @@ impl DriverProfile for FsmProfile {
     }
 }
 
-/// How dangerous a distance is. Not divided yet: only one of two surrogates is braked for.
-#[derive(Debug, Clone, Copy)]
-pub struct Fuzzy<R> {
-    /// What is missing to the safe distance, m; not positive where it is safe.
-    short: R,
-    /// From the safe distance down to the dangerous one, m.
-    way: R,
-}
-
-/// 0 beyond the safe distance, 1 below the dangerous one, linear between.
+/// 0 beyond the safe distance, 1 below the unsafe one, linear between.
 #[inline(always)]
-fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> Fuzzy<R> {
-    Fuzzy { short: safe - distance, way: safe - dangerous }
-}
-
-impl<R: Real> Fuzzy<R> {
-    /// 0 (safe) to 1.
-    #[inline(always)]
-    pub fn value(&self) -> R {
-        // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
-        let share = self.short.exact_div(self.short.larger(self.way));
-        self.short.is_positive().choose(share, R::ZERO)
-    }
+fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
+    // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
+    let between = (distance - safe).exact_div(dangerous - safe);
+    let is_safe = distance.is_at_least(safe);
+    let is_dangerous = distance.is_at_most(dangerous);
+    is_safe.choose(R::ZERO, is_dangerous.choose(R::ONE, between))
 }
 
 impl<R: Real> Fsm<R> {
     /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
     #[inline(always)]
-    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> Fuzzy<R> {
+    pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
         let reaction = v_ego * self.tau;
         let lead_stop = v_other * v_other * self.half_inverse_lead;
         let d_safe = reaction + v_ego * v_ego * self.half_inverse_comf - lead_stop + self.margin;
@@ -136,7 +121,7 @@ impl<R: Real> Fsm<R> {
 
     /// Critical fuzzy surrogate of the present closing, 0…1.
     #[inline(always)]
-    pub fn cfs(&self, v_ego: R, v_other: R, gap: R, a_ego: R) -> Fuzzy<R> {
+    pub fn cfs(&self, v_ego: R, v_other: R, gap: R, a_ego: R) -> R {
         let a_limited = a_ego.larger(-self.b_comf);
         let v_new = v_ego + self.tau * a_limited;
         let dv = v_ego - v_other;
@@ -147,14 +132,10 @@ impl<R: Real> Fsm<R> {
         let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
         // g < dv²/(2|a|), multiplied out.
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
-        let slower_then = Fuzzy { short: is_short.choose(R::ONE, R::ZERO), way: R::ZERO };
+        let slower_then = is_short.choose(R::ONE, R::ZERO);
         let faster_then = fuzzy(gap, d_safe, d_unsafe);
         let closes = v_ego.is_above(v_other);
-        let is_slower = v_new.is_below(v_other);
-        Fuzzy {
-            short: closes.choose(is_slower.choose(slower_then.short, faster_then.short), R::ZERO),
-            way: is_slower.choose(slower_then.way, faster_then.way),
-        }
+        closes.choose(v_new.is_below(v_other).choose(slower_then, faster_then), R::ZERO)
     }
 
     /// Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or
@@ -198,12 +179,9 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);
         let cfs = self.cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
-        let is_critical = cfs.short.is_positive();
-        let braked_for =
-            Fuzzy { short: is_critical.choose(cfs.short, pfs.short), way: is_critical.choose(cfs.way, pfs.way) };
-        let surrogate = braked_for.value();
-        let demand = is_critical.choose(surrogate * self.b_span + self.b_comf, surrogate * self.b_comf);
-        Hazard { is_unsafe: !view.is_behind() & surrogate.is_positive() & self.gate_is_open(view), demand }
+        let surrogate = pfs.is_positive() | cfs.is_positive();
+        let demand = cfs.is_positive().choose(cfs * self.b_span + self.b_comf, pfs * self.b_comf);
+        Hazard { is_unsafe: !view.is_behind() & surrogate & self.gate_is_open(view), demand }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {
@@ -236,29 +214,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
 mod tests {
     use super::*;
 
-    /// The definition, with its three cases: 0 beyond the safe distance, 1 below the dangerous one, the quotient between
-    /// them. To the bit, also where both distances are the same, or the dangerous one is the larger.
-    #[test]
-    fn a_share_is_what_the_definition_says() {
-        let numbers: Vec<f32> = (0..60).map(|k| (k as f32 * 0.37 - 9.0) * (1.0 + (k % 7) as f32 * 1e-6)).collect();
-        for &distance in &numbers {
-            for &safe in &numbers {
-                for &dangerous in &numbers {
-                    let expected = if distance >= safe {
-                        0.0
-                    } else if distance <= dangerous {
-                        1.0
-                    } else {
-                        (distance - safe) / (dangerous - safe)
-                    };
-                    assert_eq!(fuzzy(distance, safe, dangerous).value(), expected, "{distance} {safe} {dangerous}");
-                }
-            }
-        }
-    }
-
-    /// PFS and CFS both brake, and the critical one decides; or one alone does; and in none of them is anything braked
-    /// for.
+    /// Where CFS brakes, it decides, whatever PFS says; without it PFS does; and where both are 0 all is safe.
     #[test]
     fn the_critical_surrogate_decides_before_the_proactive_one() {
         let profile = crate::profile::Profile::load("paper").unwrap().fsm;
@@ -269,7 +225,7 @@ mod tests {
             let (v_ego, v_other) = (f64::from(k % 40), f64::from(k / 40 % 10) * 4.0);
             let (gap, a_ego) = (f64::from(k / 400) * 12.0 + 0.5, -f64::from(k % 3));
             let view = View { v_ego, a_ego, v_other, gap, lateral_gap: -1.0, lateral_towards: 0.0, half_lengths: 4.5 };
-            let (pfs, cfs) = (fsm.pfs(v_ego, v_other, gap).value(), fsm.cfs(v_ego, v_other, gap, a_ego).value());
+            let (pfs, cfs) = (fsm.pfs(v_ego, v_other, gap), fsm.cfs(v_ego, v_other, gap, a_ego));
             let hazard = fsm.check(&view);
             let demand = if cfs > 0.0 { cfs * span + comfort } else { pfs * comfort };
             assert_eq!((hazard.is_unsafe.holds(), hazard.demand), (cfs > 0.0 || pfs > 0.0, demand), "{view:?}");

@@ -203,8 +203,8 @@ fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> 
         lateral_gap_m: view.lateral_gap,
         ttc_s: if closing > 0.0 { gap_m.max(0.0) / closing } else { f64::INFINITY },
         btn: measures.criteria.btn.at(gap_m, closing),
-        pfs: measures.fsm.pfs(view.v_ego, view.v_other, gap_m).value(),
-        cfs: measures.fsm.cfs(view.v_ego, view.v_other, gap_m, view.a_ego).value(),
+        pfs: measures.fsm.pfs(view.v_ego, view.v_other, gap_m),
+        cfs: measures.fsm.cfs(view.v_ego, view.v_other, gap_m, view.a_ego),
         is_present: seen.present.holds(),
         is_judged: seen.judged.holds(),
     }

@@ -155,13 +155,13 @@ impl Scenes {
                 signed(draw, dv.abs() * ttc)
             }
             Threshold::RssLongitudinal => constants.rss.longitudinal_distance(s.v_ego, s.v_other),
-            Threshold::PfsSafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap).value() > 0.0)?.1,
-            Threshold::PfsUnsafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap).value() >= 1.0)?.0,
-            Threshold::CfsSafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0).value() > 0.0)?.1,
-            Threshold::CfsUnsafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0).value() >= 1.0)?.0,
+            Threshold::PfsSafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.1,
+            Threshold::PfsUnsafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) >= 1.0)?.0,
+            Threshold::CfsSafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) > 0.0)?.1,
+            Threshold::CfsUnsafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) >= 1.0)?.0,
             Threshold::FsmGate => {
                 // A gap well inside PFS, then the width that closes the gate about there.
-                let reach = turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap).value() > 0.0)?.0;
+                let reach = turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.0;
                 let about = rounded(draw.between(0.1, 0.8)) * reach;
                 let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
                 let h = lateral.towards * (about + 2.0 * s.half_lengths + 0.1 * dv) / dv;
