@@ -6,8 +6,8 @@
 //! all lanes, one thread. `cargo bench --bench simd -- cut_in FSM AVX-512`, `-- study`, or `-- threads`, does no more
 //! than what is named. Batches leave out calm steps; they are timed with every step made as well, and that is what shares
 //! of the roof are worked out from: steps that are not made have no operations. The operations are those that batches do
-//! for verdicts: what only smallest and largest values need, or what is known of a case beforehand, is not counted. The roof is what independent additions,
-//! multiplications, or both in turn reach on values in registers; the best of them counts.
+//! for verdicts: what only smallest and largest values need, or what is known of a case beforehand, is not counted. The
+//! roof is what independent additions, multiplications, or both in turn reach on values in registers; the best counts.
 
 #![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
 
@@ -139,19 +139,22 @@ fn threads(scenarios: &[Scenario]) {
     // Per work and number of threads: wall time and CPU time of every repetition.
     let mut times = vec![[Vec::new(), Vec::new()]; works.len()];
     for repetition in 0..THREADS_REPETITIONS {
-        for (&(name, amount, unit, work), times) in works.iter().zip(&mut times) {
+        // The roof has no loop where lanes run one by one.
+        for (&(name, amount, unit, work), times) in works.iter().zip(&mut times).filter(|(work, _)| work.1 > 0) {
             for (pool, times) in pools.iter().zip(times) {
                 let before = cpu_seconds().unwrap_or(f64::NAN);
                 let seconds = pool.install(|| time(work));
                 let cpu = cpu_seconds().unwrap_or(f64::NAN) - before;
                 let threads = pool.current_num_threads();
                 println!("{name} on {threads} threads,,,{set},{repetition},{amount},{unit},{seconds}");
-                println!("{name} on {threads} threads: CPU time,,,{set},{repetition},{amount},{unit},{cpu}");
+                if cpu.is_finite() {
+                    println!("{name} on {threads} threads: CPU time,,,{set},{repetition},{amount},{unit},{cpu}");
+                }
                 times.push((seconds, cpu));
             }
         }
     }
-    for ((name, amount, unit, _), [one, two]) in works.iter().zip(&times) {
+    for ((name, amount, unit, _), [one, two]) in works.iter().zip(&times).filter(|(work, _)| work.1 > 0) {
         let best = |times: &[(f64, f64)]| times.iter().fold(f64::INFINITY, |best, time| best.min(time.0));
         let (of_one, of_two) = (best(one), best(two));
         let rate = |seconds: f64| *amount as f64 / seconds / 1e6;
@@ -161,8 +164,11 @@ fn threads(scenarios: &[Scenario]) {
             rate(of_two)
         );
         let mut ratios: Vec<f64> = one.iter().zip(two).map(|(one, two)| two.1 / one.1).collect();
+        if ratios.iter().any(|ratio| !ratio.is_finite()) {
+            continue;
+        }
         ratios.sort_by(f64::total_cmp);
-        let quartile = |k: usize| ratios[k * (ratios.len() - 1) / 4];
+        let quartile = |k: usize| ratios[(k * (ratios.len() - 1) + 2) / 4];
         let (low, middle, high) = (quartile(1), quartile(2), quartile(3));
         eprintln!("    CPU time on two threads over that on one: median {middle:.3}, quartiles {low:.3} and {high:.3}");
     }

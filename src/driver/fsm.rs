@@ -219,7 +219,8 @@ mod tests {
     fn the_critical_surrogate_decides_before_the_proactive_one() {
         let profile = crate::profile::Profile::load("paper").unwrap().fsm;
         let fsm: Fsm<f64> = profile.resolve(0.1, Category::CutIn);
-        let (comfort, span) = (profile.comfortable_deceleration_mps2, 2.0);
+        let comfort = profile.comfortable_deceleration_mps2;
+        let span = profile.max_surrogate_deceleration_mps2 - comfort;
         let mut seen = [0; 4];
         for k in 0..4000 {
             let (v_ego, v_other) = (f64::from(k % 40), f64::from(k / 40 % 10) * 4.0);

@@ -150,8 +150,8 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
         R::INFINITY
     }
 
-    /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap
-    /// and at all speeds. To be decided by the comparisons of the check itself, which is not asked again, and without
+    /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap,
+    /// at all speeds and whatever the ego's acceleration. To be decided by the comparisons of the check itself, which is not asked again, and without
     /// the lateral speed where the check does not see it.
     #[inline(always)]
     fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
@@ -230,7 +230,8 @@ mod tests {
             } else if is_unsafe && view.gap > 0.9 * safe_gap {
                 unsafe_below += 1;
             }
-            let beside = View { lateral_gap: between(0.0, 4.0), gap: between(-20.0, 50.0), ..view };
+            let (lateral_gap, gap, a_ego) = (between(0.0, 4.0), between(-20.0, 50.0), between(-10.0, 0.0));
+            let beside = View { lateral_gap, gap, a_ego, ..view };
             let is_unsafe = model.check(&beside).is_unsafe.holds();
             if model.ignores(beside.lateral_gap, beside.lateral_towards).holds() {
                 assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");

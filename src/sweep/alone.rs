@@ -17,7 +17,7 @@ use super::series::{Track, VehicleTracks};
 pub(super) const NEVER_ALONE: u32 = Flag::LATEST_STEP;
 
 /// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
-/// [`NEVER_ALONE`] where there is none, or where the second one may go as well. `tracks` lie in `entries`.
+/// [`NEVER_ALONE`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in `entries`.
 pub(super) fn alone_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -25,7 +25,7 @@ pub(super) fn alone_from<M: DriverModel<f32>>(
     entries: &[f32],
 ) -> u32 {
     let [principal, second] = &lane.others;
-    if second.present_until < NEVER_ALONE || !second.judged.holds() {
+    if second.present_until < Flag::LATEST_STEP || !second.judged.holds() {
         return NEVER_ALONE;
     }
     let VehicleTracks { position, towards, .. } = tracks[0];
@@ -43,7 +43,7 @@ pub(super) fn alone_from<M: DriverModel<f32>>(
         }
         is_out.holds()
     };
-    let gone_from = if principal.present_from == NEVER_ALONE { 0 } else { principal.present_until };
+    let gone_from = if principal.present_from == Flag::LATEST_STEP { 0 } else { principal.present_until };
     // From the end, where it stays: back to the last step at which it is in the way.
     let mut from = position.last.max(towards.last).min(gone_from);
     if from < gone_from && !is_out(from, 1) {

@@ -115,7 +115,7 @@ impl Batch {
             finished |= u16::from(is_finished.holds()) << k;
             let index = moving.index[k];
             let is_worth_a_look = index > ego.restless_until[k];
-            let is_still = index > ego.steady_from[k] && moving.gap[k] == self.gaps[k];
+            let is_still = index > ego.still_from[k] && moving.gap[k] == self.gaps[k];
             calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
             alone |= u16::from(index >= ego.alone_from[k]) << k;
         }
@@ -136,7 +136,13 @@ impl Batch {
                 arrays.ahead.gap[k] = calm.gaps[1];
                 *restless_until = arrays.moving.index[k];
             }
-            None => *restless_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE),
+            None => {
+                // One that stood still was looked at for that, and may be due later for the other reason.
+                if state.index > *restless_until {
+                    *restless_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
+                }
+                fixed.ego.still_from[k] = state.index + LOOK_AGAIN;
+            }
         }
     }
 

@@ -53,8 +53,8 @@ pub(super) struct EgoArrays<const N: usize> {
     horizon: [u32; N],
     /// Up to this step it is not worth looking for calm ones.
     pub restless_until: [u32; N],
-    /// From this step on the other vehicles keep speed and lateral position.
-    pub steady_from: [u32; N],
+    /// From this step on a lane may stand still: the other vehicles keep speed and lateral position.
+    pub still_from: [u32; N],
     /// From this step on only the second vehicle matters.
     pub alone_from: [u32; N],
 }
@@ -209,7 +209,7 @@ impl<const N: usize> LaneArrays<N> {
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
         let steady_from = tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0);
         fill(&mut self.fixed.ego.restless_until, from, steady_from);
-        fill(&mut self.fixed.ego.steady_from, from, steady_from);
+        fill(&mut self.fixed.ego.still_from, from, steady_from);
         fill(&mut self.fixed.ego.alone_from, from, alone_from);
         let moving = &mut self.state.moving;
         fill(&mut moving.index, from, state.index);
@@ -240,7 +240,11 @@ impl<const N: usize> LaneArrays<N> {
         copy(self.fixed.others[0].rows_mut(), to, fixed.others[1].rows(), k);
         copy(self.state.moving.rows_mut(), to, state.moving.rows(), k);
         self.state.moving.gap[to] = state.ahead.gap[k];
-        self.fixed.ego.alone_from[to] = NEVER_ALONE;
+        let ends = self.fixed.others[0].tracks.map(|track| track.last[to]);
+        let steady_from = ends.into_iter().max().unwrap_or(0);
+        let ego = &mut self.fixed.ego;
+        (ego.restless_until[to], ego.still_from[to]) = (steady_from, steady_from);
+        ego.alone_from[to] = NEVER_ALONE;
     }
 
     /// Says which lane of the stream stands here, and how far the other vehicles are from it.
@@ -395,6 +399,23 @@ mod tests {
         lanes.start(31, 23, state.gaps);
         assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
         assert_eq!(lanes.state.at(31), state);
+
+        // One that goes on with the second vehicle alone has it first, and its gap.
+        let mut batch = LaneArrays::<LANES>::idle();
+        let second = Track { first: 31, last: 32 };
+        let second = VehicleTracks { speed: second, position: second, towards: second };
+        let ahead = OtherConstants { half_lengths: 33.0, attend_from: 34, ..other };
+        let pair = LaneConstants { others: [other, ahead], ..constants };
+        batch.fill(0, &pair, &[tracks[0], second], &state, 24, false);
+        batch.start(5, 23, state.gaps);
+        let mut waiting = LaneArrays::<32>::idle();
+        waiting.set_alone(31, &batch, 5);
+        let alone = waiting.fixed.at(31);
+        assert_eq!((alone.others[0].half_lengths, alone.others[0].attend_from, alone.horizon), (33.0, 34, 7));
+        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.alone_from[31]), (23, NEVER_ALONE));
+        assert!(waiting.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
+        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
+        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;
         let everything = Rules::from_bits(1);

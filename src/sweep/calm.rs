@@ -8,7 +8,8 @@
 //! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Without a promise go
 //! steps that change no bit of a lane: all that follow change none either.
 
-use crate::driver::DriverModel;
+use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::driver::{DriverModel, DriverState};
 use crate::flag::Flag;
 use crate::scalar::Real;
 
@@ -107,12 +108,17 @@ fn is_still<M: DriverModel<f32>>(
     if state.gaps[0] + change != state.gaps[0] {
         return false;
     }
+    // All that a lane has, by name: what is new has to be looked at here, or left out as what verdicts do not ask for.
     let bits = |state: &LaneState<f32>| {
-        // What a step does not look at may not be kept: see `StateArrays::set`.
-        let v_before = if M::SEES_OWN_ACCELERATION { state.v_before } else { 0.0 };
-        let numbers = [state.v_ego, v_before, state.gaps[0], state.gaps[1], state.driver.deceleration];
-        let flags = [state.record.ttc.failed, state.record.btn.failed, state.over];
-        (numbers.map(f32::to_bits), state.driver.delay_steps, flags.map(Flag::to_bits))
+        let &LaneState { index: _, v_ego, v_before, gaps, driver, reaction_step: _, record, over } = state;
+        let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _ }) = (driver, record);
+        let TtcMinimum { failed: ttc_failed, gap: _, closing: _ } = ttc;
+        let BrakeThreatMaximum { failed: btn_failed, numerator: _, denominator: _ } = btn;
+        // What a model does not look at is not kept: see `StateArrays::set`.
+        let v_before = if M::SEES_OWN_ACCELERATION { v_before } else { 0.0 };
+        let deceleration = if M::KEEPS_DECELERATION { deceleration } else { 0.0 };
+        let numbers = [v_ego, v_before, gaps[0], gaps[1], deceleration];
+        (numbers.map(f32::to_bits), delay_steps, [ttc_failed, btn_failed, over].map(Flag::to_bits))
     };
     bits(&advance(simulation, lane, state, places).state) == bits(state)
 }
@@ -215,7 +221,7 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
+    use crate::criterion::Criteria;
     use crate::profile::Profile;
     use crate::scenario::Category;
     use crate::sweep::drivers::Constants;
@@ -313,7 +319,7 @@ mod tests {
             v_ego,
             v_before: v_ego,
             gaps: [first, first + between(5.0, 60.0)],
-            driver: crate::driver::DriverState { deceleration: 0.0, delay_steps: between(0.0, 5.0) as u32 },
+            driver: DriverState { deceleration: 0.0, delay_steps: between(0.0, 5.0) as u32 },
             reaction_step: 0,
             record: Record {
                 ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },

@@ -1,6 +1,6 @@
 //! A stream of lanes through the slots of the batches: where a lane is over, its slot takes the next one after the
 //! burst, so no lane waits for another and nothing is allocated per lane. A lane that goes on with the second vehicle
-//! alone is set apart, and runs in batches of such lanes as soon as there are enough to fill them.
+//! alone is set apart; when many of them wait, or no others are left, they run in batches of such lanes.
 
 use crate::driver::DriverModel;
 
@@ -37,7 +37,7 @@ pub(super) fn run_stream<M: DriverModel<f32>, E: Ending>(
         first.waiting.have(FLEET, simulation, stream, sets_apart.then_some(entries));
         let is_over = first.is_idle();
         if !is_over {
-            first.burst(&mut each);
+            first.advance(&mut each);
         }
         let Some(alone) = &mut alone else {
             if is_over {
@@ -51,7 +51,7 @@ pub(super) fn run_stream<M: DriverModel<f32>, E: Ending>(
         // Many bursts of one kind in a row: what they work with then lies near.
         if is_over || alone.waiting.count() > MOST - FLEET {
             while alone.waiting.count() >= FLEET || is_over && !alone.is_idle() {
-                alone.burst(&mut each);
+                alone.advance(&mut each);
             }
         }
         if is_over {
@@ -98,7 +98,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
     }
 
     /// A burst, and what comes of it.
-    fn burst<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
+    fn advance<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
         let Stage { simulation, fleet, .. } = self;
         self.burst.run(simulation, fleet, &mut self.waiting);
         for batch in &mut fleet.batches {

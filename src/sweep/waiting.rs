@@ -11,7 +11,7 @@ use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState};
 use super::series::VehicleTracks;
 
-/// Lanes that wait at most: 27 KB with one other vehicle and verdicts alone, 48 KB with all there is.
+/// Lanes that wait at most: 29 KiB with one other vehicle and verdicts alone, 49 KiB with all there is, their room included.
 pub(super) const MOST: usize = 256;
 
 /// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
@@ -73,8 +73,9 @@ impl Waiting {
     }
 
     /// Sees to it that at least so many lanes wait, if there are more.
-    #[inline]
+    ///
     /// `sets_apart`: the series, where lanes are set apart that go on with the second vehicle alone.
+    #[inline]
     pub fn have<M: DriverModel<f32>>(
         &mut self,
         least: usize,

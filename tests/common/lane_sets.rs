@@ -3,7 +3,7 @@
 
 use lanesweep::criterion::{BtnContact, BtnForm, LateralGate};
 use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::profile::Profile;
+use lanesweep::profile::{CutOutJudged, CutOutTarget, Profile};
 use lanesweep::sweep::{LanePlan, StudyOptions, plan_study};
 use lanesweep::trajectory::generator::GeneratorOptions;
 use lanesweep::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
@@ -24,6 +24,12 @@ pub fn forms() -> Vec<Profile> {
             }
         }
     }
+    let mut ahead_only = paper.clone();
+    ahead_only.frame.cut_out_judged = CutOutJudged::Ahead;
+    profiles.push(ahead_only);
+    let mut exposed = paper.clone();
+    exposed.frame.cut_out_target = CutOutTarget::Exposed;
+    profiles.push(exposed);
     let mut unsettled = paper.clone();
     unsettled.frame.end_when_settled = !paper.frame.end_when_settled;
     unsettled.frame.start_shift = !paper.frame.start_shift;
