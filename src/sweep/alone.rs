@@ -17,7 +17,8 @@ use super::series::{Track, VehicleTracks};
 pub(super) const NEVER_ALONE: u32 = Flag::LATEST_STEP;
 
 /// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
-/// [`NEVER_ALONE`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in `entries`.
+/// [`NEVER_ALONE`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
+/// `entries`.
 pub(super) fn alone_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
