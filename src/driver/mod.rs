@@ -151,8 +151,8 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     }
 
     /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap,
-    /// at all speeds and whatever the ego's acceleration. To be decided by the comparisons of the check itself, which is not asked again, and without
-    /// the lateral speed where the check does not see it.
+    /// at all speeds and whatever the ego's acceleration. To be decided by the comparisons of the check itself, which is
+    /// not asked again, and without the lateral speed where the check does not see it.
     #[inline(always)]
     fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
         Flag::FALSE

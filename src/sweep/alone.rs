@@ -7,14 +7,11 @@
 use crate::driver::DriverModel;
 use crate::flag::Flag;
 
-use super::batch_arrays::ROWS;
+use super::batch_arrays::{NEVER_ALONE, ROWS};
 use super::calm::is_out_of_the_way;
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, Whereabouts};
 use super::series::{Track, VehicleTracks};
-
-/// At no step.
-pub(super) const NEVER_ALONE: u32 = Flag::LATEST_STEP;
 
 /// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
 /// [`NEVER_ALONE`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in

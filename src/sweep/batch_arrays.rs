@@ -9,7 +9,6 @@ use crate::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::driver::{DriverModel, DriverState};
 use crate::flag::Flag;
 
-use super::alone::NEVER_ALONE;
 use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use super::rules::Rules;
 use super::series::{Track, VehicleTracks};
@@ -18,6 +17,9 @@ use super::series::{Track, VehicleTracks};
 pub(super) const LANES: usize = 16;
 /// Steps of a burst: a square of lanes and rows is turned in registers.
 pub(super) const ROWS: usize = 16;
+
+/// Where a lane's second vehicle is at no step alone.
+pub(super) const NEVER_ALONE: u32 = Flag::LATEST_STEP;
 
 /// Parts of [`LaneArrays`].
 const PARTS: usize = 6;

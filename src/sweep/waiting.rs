@@ -3,9 +3,9 @@
 
 use crate::driver::DriverModel;
 
-use super::alone::{NEVER_ALONE, alone_from};
+use super::alone::alone_from;
 use super::batch::Slots;
-use super::batch_arrays::{LANES, LaneArrays, Words};
+use super::batch_arrays::{LANES, LaneArrays, NEVER_ALONE, Words};
 use super::frame::{Simulation, Start};
 use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState};
