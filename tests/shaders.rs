@@ -340,8 +340,18 @@ fn in_crate(path: &str) -> PathBuf {
 #[test]
 fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order() {
     // What only the host does, or batches of lanes alone; and `shader_constants` is what joins the two.
-    let no_twin =
-        ["default", "resolve", "bounds", "attention", "abort_above_ttc_s", "safe_gap", "ignores", "shader_constants"];
+    let no_twin = [
+        "default",
+        "resolve",
+        "bounds",
+        "attention",
+        "abort_above_ttc_s",
+        "safe_gap",
+        "ignores",
+        "ease_gap",
+        "check_at_ease",
+        "shader_constants",
+    ];
     for model in ModelId::ALL {
         let (file, shader) = driver_shader(model);
         let twin = in_crate("src/driver").join(file).with_extension("rs");

@@ -158,6 +158,24 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
         Flag::FALSE
     }
 
+    /// [`DriverModel::ease_gap`] and [`DriverModel::check_at_ease`] are there.
+    const KNOWS_EASE: bool = false;
+
+    /// Distance, m ≥ 0, beyond which the driver is at ease with a vehicle that overlaps with the ego across the road
+    /// and keeps its speed: [`DriverModel::check_at_ease`] says what the check says, whatever the ego's deceleration.
+    /// Not larger at a smaller speed of the ego, m/s. Rounding may be left to the caller.
+    #[inline(always)]
+    fn ease_gap(&self, _v_ego: R, _v_other: R) -> R {
+        R::INFINITY
+    }
+
+    /// The part of the check that is left at ease: the same words where they say that it is unsafe, with less work. The
+    /// reaction never accelerates the ego.
+    #[inline(always)]
+    fn check_at_ease(&self, view: &View<R>) -> Hazard<R> {
+        self.check(view)
+    }
+
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
@@ -211,6 +229,7 @@ mod tests {
             least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
         };
         let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
+        let (mut at_ease, mut uneasy_below) = (0, 0);
         for _ in 0..200_000 {
             let (v_ego, v_other) = (between(0.0, 45.0), between(0.0, 45.0));
             let view = View {
@@ -237,7 +256,29 @@ mod tests {
                 assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");
                 ignored += 1;
             }
+            if !M::KNOWS_EASE {
+                assert_eq!(model.ease_gap(v_ego, v_other), f32::INFINITY, "{name}");
+                continue;
+            }
+            let (ease_gap, slowing) = (model.ease_gap(v_ego, v_other), View { a_ego: between(-10.0, 0.0), ..view });
+            let said =
+                |hazard: Hazard<f32>| (hazard.is_unsafe.holds(), hazard.is_unsafe.holds().then_some(hazard.demand));
+            let hazard = model.check(&slowing);
+            let is_same = said(hazard) == said(model.check_at_ease(&slowing));
+            if view.gap > 1.001 * ease_gap + 0.001 {
+                assert!(is_same, "{name}: {slowing:?} is not all at ease beyond {ease_gap} m");
+                let state = DriverState { deceleration: -slowing.a_ego, delay_steps: 0 };
+                assert!(
+                    !hazard.is_unsafe.holds() || model.react(state, &hazard, v_ego).1 <= v_ego,
+                    "{name}: {slowing:?}"
+                );
+                assert!(model.ease_gap(v_ego - between(0.0, 1.0) * v_ego, v_other) <= ease_gap, "{name}: {slowing:?}");
+                at_ease += 1;
+            } else if !is_same && view.gap > 0.9 * ease_gap {
+                uneasy_below += 1;
+            }
         }
+        assert!(!M::KNOWS_EASE || at_ease > 1000 && uneasy_below > 100, "{name}: {at_ease}, {uneasy_below}");
         assert!(safe > 1000 && ignored > 1000, "{name}: {safe} safe, {ignored} ignored");
         assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
     }

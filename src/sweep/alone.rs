@@ -7,14 +7,14 @@
 use crate::driver::DriverModel;
 use crate::flag::Flag;
 
-use super::batch_arrays::{NEVER_ALONE, ROWS};
+use super::batch_arrays::{NEVER_LEAVES, ROWS};
 use super::calm::is_out_of_the_way;
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, Whereabouts};
 use super::series::{Track, VehicleTracks};
 
 /// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
-/// [`NEVER_ALONE`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
+/// [`NEVER_LEAVES`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
 /// `entries`.
 pub(super) fn alone_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
@@ -24,7 +24,7 @@ pub(super) fn alone_from<M: DriverModel<f32>>(
 ) -> u32 {
     let [principal, second] = &lane.others;
     if second.present_until < Flag::LATEST_STEP || !second.judged.holds() {
-        return NEVER_ALONE;
+        return NEVER_LEAVES;
     }
     let VehicleTracks { position, towards, .. } = tracks[0];
     // So many entries of a series from a step on; its last one is repeated.
@@ -115,14 +115,14 @@ mod tests {
             }
         }
         // The step before it may matter: the first vehicle is in the way, or the second not there or not attended to.
-        if from != NEVER_ALONE && from > second.present_from.max(second.attend_from) {
+        if from != NEVER_LEAVES && from > second.present_from.max(second.attend_from) {
             let first = Whereabouts::of(&case.others[0].motion, tables, from - 1);
             let present = from - 1 < constants.others[0].present_until;
             let is_out = is_out_of_the_way(pair, &constants, &constants.others[0], &first).holds();
             assert!(present && !is_out, "{name}");
         }
         let ignores = pair.model.ignores(10.0, 0.0).holds();
-        let comes = constants.others[0].present_from < NEVER_ALONE;
+        let comes = constants.others[0].present_from < NEVER_LEAVES;
         assert!(ignores || !comes || other.is_none(), "{name}");
         saved
     }

@@ -8,9 +8,11 @@
 
 use crate::driver::DriverModel;
 use crate::flag::Flag;
+use crate::scalar::Real;
 
 use super::batch_arrays::{FixedArrays, Floats, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
 use super::calm::calm_steps;
+use super::ease::ease_steps;
 use super::frame::Simulation;
 use super::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
 use super::rules::Rules;
@@ -23,6 +25,9 @@ pub(super) const BATCHES: usize = 3;
 /// Steps before calm ones are looked for again where none were found: at least so many, and a share of those behind.
 const LOOK_AGAIN: u32 = 4 * ROWS as u32;
 const LOOK_AGAIN_SHARE: u32 = 4;
+
+/// Fewer steps at ease are sooner made where the lane is.
+const FEWEST_AT_EASE: u32 = 6 * ROWS as u32;
 
 /// Slots of a batch: one bit each.
 pub(super) type Slots = u16;
@@ -48,8 +53,8 @@ pub(super) struct Batch {
     pub finished: Slots,
     /// Slots whose lane may have come to calm steps: nothing around it changes any more, nor did its speed.
     pub calm: Slots,
-    /// Slots whose lane goes on with the second vehicle alone.
-    pub alone: Slots,
+    /// Slots whose lane may belong into batches of another kind.
+    pub leaving: Slots,
     /// Speeds of the egos at the first row, and the gaps before it.
     speeds: Floats,
     gaps: Floats,
@@ -71,7 +76,7 @@ impl<'c> Fleet<'c> {
             free: !0,
             finished: 0,
             calm: 0,
-            alone: 0,
+            leaving: 0,
             speeds: [0.0; LANES],
             gaps: [0.0; LANES],
         };
@@ -109,7 +114,7 @@ impl Batch {
     fn find_finished(&mut self, step_cap: u32) {
         let moving = &self.lanes.state.moving;
         let ego = &self.lanes.fixed.ego;
-        let (mut finished, mut calm, mut alone) = (0, 0, 0);
+        let (mut finished, mut calm, mut leaving) = (0, 0, 0);
         for k in 0..LANES {
             let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
@@ -117,11 +122,27 @@ impl Batch {
             let is_worth_a_look = index > ego.restless_until[k];
             let is_still = index > ego.still_from[k] && moving.gap[k] == self.gaps[k];
             calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
-            alone |= u16::from(index >= ego.alone_from[k]) << k;
+            leaving |= u16::from(index >= ego.leaves_from[k]) << k;
         }
         self.finished = finished & !self.free;
         self.calm = calm & !finished & !self.free;
-        self.alone = alone & !finished & !self.free;
+        self.leaving = leaving & !finished & !self.free;
+    }
+
+    /// After a burst at ease, which moved only what [`StateArrays::set_at_ease`] says.
+    #[inline(always)]
+    fn end_at_ease(&mut self) {
+        let LaneArrays { fixed, state } = &mut self.lanes;
+        let moving = &mut state.moving;
+        // The state before the last step stands where that step read it.
+        moving.v_before = self.after.moving.v_ego;
+        for k in 0..LANES {
+            let last = moving.index[k] + ROWS as u32 - 1;
+            moving.index[k] = last + 1;
+            // The first such step ended the lane; nothing that counts has changed since.
+            let settled = !(moving.v_before[k] - self.windows[0][0].rows[ROWS - 1][k]).is_positive();
+            moving.over[k] = (Flag::reached(last, fixed.ego.horizon[k]) & settled).to_bits();
+        }
     }
 
     /// Leaves out calm steps of a lane where it pays, else looks again later.
@@ -153,10 +174,52 @@ impl Batch {
 
     /// Lets the lanes go that go on with the second vehicle alone.
     pub fn set_apart(&mut self, apart: &mut Waiting) {
-        self.free |= self.alone;
-        while self.alone != 0 {
-            apart.add_alone(&self.lanes, self.alone.trailing_zeros() as usize);
-            self.alone &= self.alone - 1;
+        self.free |= self.leaving;
+        while self.leaving != 0 {
+            apart.add_alone(&self.lanes, self.leaving.trailing_zeros() as usize);
+            self.leaving &= self.leaving - 1;
+        }
+    }
+
+    /// Lets lanes go that are at ease for long enough; the others are asked again later.
+    pub fn set_at_ease<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, apart: &mut Waiting) {
+        while self.leaving != 0 {
+            let k = self.leaving.trailing_zeros() as usize;
+            self.leaving &= self.leaving - 1;
+            if self.lanes.state.moving.index[k] - self.from[k] > ROWS as u32 {
+                // It has been set ahead, to a step that this burst has not seen.
+                continue;
+            }
+            let (constants, state, places) = self.last_step(k);
+            let steps = ease_steps(simulation, &constants, &state, &places[0]);
+            if steps < FEWEST_AT_EASE {
+                self.lanes.fixed.ego.leaves_from[k] = state.index + LOOK_AGAIN;
+            } else if apart.has_room(1) {
+                apart.add_lane(&self.lanes, k, state.index + steps - (ROWS as u32 - 1));
+                self.free |= 1 << k;
+            }
+        }
+    }
+
+    /// Lanes whose steps at ease are used up: those that are no longer go back.
+    pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Waiting) {
+        let ego = &self.lanes.fixed.ego;
+        let mut used_up = 0;
+        for k in 0..LANES {
+            used_up |= u16::from(self.lanes.state.moving.index[k] >= ego.leaves_from[k]) << k;
+        }
+        used_up &= !self.free;
+        while used_up != 0 {
+            let k = used_up.trailing_zeros() as usize;
+            used_up &= used_up - 1;
+            let (constants, state) = (self.lanes.fixed.at(k), self.lanes.state.at(k));
+            let steps = ease_steps(simulation, &constants, &state, &places(&self.windows, ROWS - 1, k)[0]);
+            if steps < ROWS as u32 {
+                back.add_lane(&self.lanes, k, state.index + LOOK_AGAIN);
+                self.free |= 1 << k;
+            } else {
+                self.lanes.fixed.ego.leaves_from[k] = state.index + steps - (ROWS as u32 - 1);
+            }
         }
     }
 }
@@ -196,7 +259,8 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
         for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
             *furthest = index.max(*furthest);
         }
-        let is_seen = [true, true, M::SEES_LATERAL_SPEED];
+        let at_ease = rules.scene.at_ease;
+        let is_seen = [true, !at_ease, M::SEES_LATERAL_SPEED && !at_ease];
         let Batch { lanes, windows, from, .. } = batch;
         for (windows, other) in windows.iter_mut().zip(&lanes.fixed.others).take(1 + usize::from(rules.scene.is_pair)) {
             for ((window, tracks), is_seen) in windows.iter_mut().zip(&other.tracks).zip(is_seen) {
@@ -207,8 +271,9 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
             }
         }
     }
-    // No lane steps beyond the cap, so no step asks for it.
-    let rows = (frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize).min(ROWS);
+    // No lane steps beyond the cap, so no step asks for it; one at ease is far from it.
+    let left = frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize;
+    let rows = if rules.scene.at_ease { ROWS } else { left.min(ROWS) };
     for row in 0..rows {
         for batch in batches.iter_mut() {
             let Batch { lanes, after, windows, .. } = batch;
@@ -222,6 +287,9 @@ pub(super) fn burst<M: DriverModel<f32>, const RULES: u32>(
     for batch in batches.iter_mut() {
         if rows % 2 == 1 {
             batch.lanes.state = batch.after;
+        }
+        if rules.scene.at_ease {
+            batch.end_at_ease();
         }
         batch.find_finished(frame.step_cap);
     }
@@ -239,8 +307,13 @@ fn step<M: DriverModel<f32>>(
     after: &mut StateArrays<LANES>,
 ) {
     for k in 0..LANES {
-        let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
-        after.set::<M>(k, &moved.state, rules);
+        if rules.scene.at_ease {
+            let moved = advance(simulation, &fixed.at(k), &before.at_ease(k), &places(windows, row, k));
+            after.set_at_ease::<M>(k, &moved.state);
+        } else {
+            let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
+            after.set::<M>(k, &moved.state, rules);
+        }
     }
 }
 

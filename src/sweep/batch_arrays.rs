@@ -10,6 +10,7 @@ use crate::driver::{DriverModel, DriverState};
 use crate::flag::Flag;
 
 use super::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
+use super::outcome::NO_STEP;
 use super::rules::Rules;
 use super::series::{Track, VehicleTracks};
 
@@ -18,8 +19,8 @@ pub(super) const LANES: usize = 16;
 /// Steps of a burst: a square of lanes and rows is turned in registers.
 pub(super) const ROWS: usize = 16;
 
-/// Where a lane's second vehicle is at no step alone.
-pub(super) const NEVER_ALONE: u32 = Flag::LATEST_STEP;
+/// Where a lane leaves its batch at no step.
+pub(super) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
 
 /// Parts of [`LaneArrays`].
 const PARTS: usize = 6;
@@ -52,13 +53,13 @@ pub(super) struct EgoArrays<const N: usize> {
     /// Which of the stream's lanes it is.
     pub lane: [u32; N],
     width: [f32; N],
-    horizon: [u32; N],
+    pub horizon: [u32; N],
     /// Up to this step it is not worth looking for calm ones.
     pub restless_until: [u32; N],
     /// From this step on a lane may stand still: the other vehicles keep speed and lateral position.
     pub still_from: [u32; N],
-    /// From this step on only the second vehicle matters.
-    pub alone_from: [u32; N],
+    /// From this step on it may belong into batches of another kind.
+    pub leaves_from: [u32; N],
 }
 
 /// What is constant within the lanes for another vehicle.
@@ -100,7 +101,7 @@ pub(super) struct StateArrays<const N: usize> {
 pub(super) struct MovingArrays<const N: usize> {
     pub index: [u32; N],
     pub v_ego: [f32; N],
-    v_before: [f32; N],
+    pub v_before: [f32; N],
     pub gap: [f32; N],
     deceleration: [f32; N],
     delay_steps: [u32; N],
@@ -192,7 +193,7 @@ impl<const N: usize> LaneArrays<N> {
         constants: &LaneConstants<f32>,
         tracks: &[VehicleTracks],
         state: &LaneState<f32>,
-        alone_from: u32,
+        leaves_from: u32,
         values: bool,
     ) {
         for ((other, constants), tracks) in self.fixed.others.iter_mut().zip(&constants.others).zip(tracks) {
@@ -209,10 +210,10 @@ impl<const N: usize> LaneArrays<N> {
         }
         fill(&mut self.fixed.ego.width, from, constants.ego_width);
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
-        let steady_from = tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0);
+        let steady_from = steady_from(tracks);
         fill(&mut self.fixed.ego.restless_until, from, steady_from);
         fill(&mut self.fixed.ego.still_from, from, steady_from);
-        fill(&mut self.fixed.ego.alone_from, from, alone_from);
+        fill(&mut self.fixed.ego.leaves_from, from, leaves_from);
         let moving = &mut self.state.moving;
         fill(&mut moving.index, from, state.index);
         fill(&mut moving.v_ego, from, state.v_ego);
@@ -233,20 +234,27 @@ impl<const N: usize> LaneArrays<N> {
         }
     }
 
-    /// Puts one of these lanes into place `to`, as it goes on with the second vehicle alone; where only verdicts are
+    /// Puts one of these lanes into place `to`, as it goes on with one of its vehicles alone; where only verdicts are
     /// wanted.
     #[inline]
-    pub fn set_alone(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize) {
+    pub fn set_single(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
         let (fixed, state) = (&lanes.fixed, &lanes.state);
         copy(self.fixed.ego.rows_mut(), to, fixed.ego.rows(), k);
-        copy(self.fixed.others[0].rows_mut(), to, fixed.others[1].rows(), k);
+        copy(self.fixed.others[0].rows_mut(), to, fixed.others[vehicle].rows(), k);
         copy(self.state.moving.rows_mut(), to, state.moving.rows(), k);
-        self.state.moving.gap[to] = state.ahead.gap[k];
-        let ends = self.fixed.others[0].tracks.map(|track| track.last[to]);
-        let steady_from = ends.into_iter().max().unwrap_or(0);
-        let ego = &mut self.fixed.ego;
-        (ego.restless_until[to], ego.still_from[to]) = (steady_from, steady_from);
-        ego.alone_from[to] = NEVER_ALONE;
+        self.fixed.ego.leaves_from[to] = leaves_from;
+        if vehicle == 1 {
+            self.state.moving.gap[to] = state.ahead.gap[k];
+            let steady_from = lanes.steady_from(k, 1);
+            (self.fixed.ego.restless_until[to], self.fixed.ego.still_from[to]) = (steady_from, steady_from);
+        }
+    }
+
+    /// The step from which on a vehicle keeps speed and lateral position.
+    #[inline]
+    pub fn steady_from(&self, k: usize, vehicle: usize) -> u32 {
+        let [speed, position, towards] = &self.fixed.others[vehicle].tracks;
+        speed.last[k].max(position.last[k]).max(towards.last[k])
     }
 
     /// Says which lane of the stream stands here, and how far the other vehicles are from it.
@@ -275,6 +283,11 @@ impl<const N: usize> FixedArrays<N> {
         };
         LaneConstants { others: [other(0), other(1)], ego_width: self.ego.width[k], horizon: self.ego.horizon[k] }
     }
+}
+
+/// The step from which on these vehicles keep speed and lateral position.
+pub(super) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
+    tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0)
 }
 
 /// Puts entry `k` of every row into place `to`.
@@ -317,6 +330,34 @@ impl<const N: usize> StateArrays<N> {
                 min_gap: values.min_gap[k],
             },
             over: Flag::from_bits(moving.over[k]),
+        }
+    }
+
+    /// Of one lane at ease, as far as its steps look at it: they are not the first, the reaction time is over, and
+    /// nothing is judged.
+    #[inline(always)]
+    pub fn at_ease(&self, k: usize) -> LaneState<f32> {
+        let moving = &self.moving;
+        let record = Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: f32::INFINITY };
+        LaneState {
+            index: 1,
+            v_ego: moving.v_ego[k],
+            v_before: moving.v_ego[k],
+            gaps: [moving.gap[k]; 2],
+            driver: DriverState { deceleration: moving.deceleration[k], delay_steps: 0 },
+            reaction_step: NO_STEP,
+            record,
+            over: Flag::FALSE,
+        }
+    }
+
+    /// What moves in a step at ease.
+    #[inline(always)]
+    pub fn set_at_ease<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
+        self.moving.v_ego[k] = lane.v_ego;
+        self.moving.gap[k] = lane.gaps[0];
+        if M::KEEPS_DECELERATION {
+            self.moving.deceleration[k] = lane.driver.deceleration;
         }
     }
 
@@ -411,12 +452,20 @@ mod tests {
         batch.fill(0, &pair, &[tracks[0], second], &state, 24, false);
         batch.start(5, 23, state.gaps);
         let mut waiting = LaneArrays::<32>::idle();
-        waiting.set_alone(31, &batch, 5);
+        waiting.set_single(31, &batch, 5, 1, NEVER_LEAVES);
         let alone = waiting.fixed.at(31);
         assert_eq!((alone.others[0].half_lengths, alone.others[0].attend_from, alone.horizon), (33.0, 34, 7));
-        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.alone_from[31]), (23, NEVER_ALONE));
+        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
         assert!(waiting.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
         assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
+        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
+
+        // One that goes on with its first vehicle keeps all it has but the step at which it leaves.
+        let mut waiting = LaneArrays::<32>::idle();
+        waiting.set_single(31, &batch, 5, 0, 25);
+        assert_eq!(waiting.fixed.at(31).others[0].half_lengths, 1.0);
+        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, 25));
+        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[0]));
         assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;

@@ -118,7 +118,7 @@ fn is_still<M: DriverModel<f32>>(
         let v_before = if M::SEES_OWN_ACCELERATION { v_before } else { 0.0 };
         let deceleration = if M::KEEPS_DECELERATION { deceleration } else { 0.0 };
         let numbers = [v_ego, v_before, gaps[0], gaps[1], deceleration];
-        (numbers.map(f32::to_bits), delay_steps, [ttc_failed, btn_failed, over].map(Flag::to_bits))
+        (numbers.map(f32::to_bits), delay_steps, [ttc_failed, btn_failed, over].map(Flag::holds))
     };
     bits(&advance(simulation, lane, state, places).state) == bits(state)
 }
@@ -382,7 +382,7 @@ mod tests {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
         let frame = &Frame { step_cap: 6000, ..constants.frames[0] };
         let criteria = &Criteria { keeps_values: false, ..constants.criteria };
-        let scene = Scene { is_pair: false, always_there: true, in_lane: true };
+        let scene = Scene::in_lane();
         let simulation = Simulation { frame, criteria, model: &constants.fsm, model_index: 0, scene };
         let mut stood_still = 0;
         for number in 0..200 {

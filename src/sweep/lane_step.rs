@@ -294,7 +294,8 @@ pub(super) fn check<R: Real, M: DriverModel<R>>(
     other: &OtherConstants<R>,
     index: u32,
 ) -> Hazard<R> {
-    let hazard = simulation.model.check(&seen.view);
+    let model = simulation.model;
+    let hazard = if simulation.scene.at_ease { model.check_at_ease(&seen.view) } else { model.check(&seen.view) };
     let attends = if simulation.scene.in_lane { Flag::TRUE } else { Flag::reached(index, other.attend_from) };
     let attentive = seen.present & attends;
     Hazard { is_unsafe: hazard.is_unsafe & attentive, demand: hazard.demand }

@@ -11,6 +11,7 @@ mod batch_arrays;
 mod calm;
 mod cpu;
 mod drivers;
+mod ease;
 mod ending;
 mod forecast;
 mod frame;

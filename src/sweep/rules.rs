@@ -19,9 +19,10 @@ pub(super) struct Rules {
 
 impl Rules {
     /// Number of sets.
-    pub(super) const SETS: u32 = 21;
+    pub(super) const SETS: u32 = 22;
 
     const IN_LANE: u32 = 20;
+    const AT_EASE: u32 = 21;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: continuous ones are wanted, not verdicts alone.
@@ -39,8 +40,16 @@ impl Rules {
         Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
     }
 
+    /// Of the steps at ease of lanes with a single vehicle, where only verdicts are wanted.
+    pub(super) fn at_ease() -> Rules {
+        Rules::from_bits(Rules::AT_EASE)
+    }
+
     /// As a number below [`Rules::SETS`].
     pub(super) const fn bits(self) -> u32 {
+        if self.scene.at_ease {
+            return Rules::AT_EASE;
+        }
         if self.scene.in_lane {
             // Nothing is seen across the road, so there is no gate.
             return Rules::IN_LANE;
@@ -51,14 +60,15 @@ impl Rules {
 
     /// From that number.
     pub(super) const fn from_bits(bits: u32) -> Rules {
-        if bits == Rules::IN_LANE {
-            let scene = Scene { is_pair: false, always_there: true, in_lane: true };
+        if bits >= Rules::IN_LANE {
+            let at_ease = bits == Rules::AT_EASE;
+            let scene = Scene { is_pair: false, always_there: true, in_lane: true, at_ease };
             return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
         }
         let seldom = bits >> 2;
         let is_pair = bits & 1 != 0;
         Rules {
-            scene: Scene { is_pair, always_there: !is_pair, in_lane: false },
+            scene: Scene { is_pair, always_there: !is_pair, in_lane: false, at_ease: false },
             sees_overlap: bits & 2 != 0,
             is_ratio: seldom & 1 != 0,
             aborts: seldom & 2 != 0,

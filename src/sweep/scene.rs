@@ -14,12 +14,19 @@ pub struct Scene {
     pub always_there: bool,
     /// It also stays in the middle of the ego's lane, and the driver attends to it from the first step on.
     pub in_lane: bool,
+    /// Neither contact nor a criterion comes near, and the driver is at ease with it.
+    pub at_ease: bool,
 }
 
 impl Scene {
     /// One or two other vehicles of which nothing is known.
     pub fn unknown(is_pair: bool) -> Scene {
-        Scene { is_pair, always_there: false, in_lane: false }
+        Scene { is_pair, always_there: false, in_lane: false, at_ease: false }
+    }
+
+    /// One other vehicle, in the ego's lane from the first step to the last.
+    pub(super) fn in_lane() -> Scene {
+        Scene { is_pair: false, always_there: true, in_lane: true, at_ease: false }
     }
 
     /// What holds for all of these cases under a model. Where one vehicle comes or goes, there is a second one as
@@ -27,14 +34,14 @@ impl Scene {
     pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize) -> Scene {
         let always_there = cases.iter().all(is_always_there);
         let in_lane = always_there && cases.iter().all(|case| is_in_lane(case, model_index));
-        Scene { is_pair: !always_there, always_there, in_lane }
+        Scene { is_pair: !always_there, always_there, in_lane, at_ease: false }
     }
 
     /// What holds for lanes of these cases [once only their second vehicles matter](super::alone): they are there,
     /// judged and attended to.
     pub(super) fn of_second_alone<R: Real>(cases: &[LaneCase<R>]) -> Scene {
         let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
-        Scene { is_pair: false, always_there: true, in_lane }
+        Scene { is_pair: false, always_there: true, in_lane, at_ease: false }
     }
 }
 
@@ -85,7 +92,8 @@ mod tests {
         let change = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
         let cut_in = case(Category::CutIn, change, false);
         let cut_out = case(Category::CutOut, Lateral::Centred, true);
-        let known = |always_there: bool, in_lane| Scene { is_pair: !always_there, always_there, in_lane };
+        let known =
+            |always_there: bool, in_lane| Scene { is_pair: !always_there, always_there, in_lane, at_ease: false };
         assert_eq!(Scene::of(&[leader, leader], 0), known(true, true));
         assert_eq!(Scene::of(&[leader, cut_in], 0), known(true, false));
         assert_eq!(Scene::of(&[cut_in], 0), known(true, false));

@@ -62,6 +62,7 @@ macro_rules! for_rules {
             18 => $burst::<$model, 18>,
             19 => $burst::<$model, 19>,
             20 => $burst::<$model, 20>,
+            21 => $burst::<$model, 21>,
             Rules::SETS.. => return None,
         }
     };

@@ -68,6 +68,8 @@ struct Stage<'s, M> {
     waiting: Waiting,
     /// Steps in which nothing can happen are not made.
     leaves_out: bool,
+    /// Where its lanes are while they are at ease.
+    at_ease: Option<Box<Stage<'s, M>>>,
 }
 
 impl<'s, M: DriverModel<f32>> Stage<'s, M> {
@@ -83,22 +85,46 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, E::HAS_VALUES).expect(RUNS);
         // Some rules have no loop for verdicts alone.
         let values = !rules.is_verdict_only;
-        Stage {
+        let leaves_out = !values && !stream.every_step;
+        let asks_ease = leaves_out && M::KNOWS_EASE && !simulation.scene.is_pair;
+        let stage = |simulation, rules, asks_ease| Stage {
             simulation,
             burst: burst_for(instructions, rules).expect(RUNS),
             fleet: Fleet::new(stream, entries, vehicles),
-            waiting: Waiting::new(values),
-            leaves_out: !values && !stream.every_step,
-        }
+            waiting: Waiting::new(values, asks_ease),
+            leaves_out,
+            at_ease: None,
+        };
+        let in_lane = Simulation { scene: Scene::in_lane(), ..simulation };
+        let at_ease = asks_ease.then(|| Box::new(stage(in_lane, Rules::at_ease(), false)));
+        Stage { at_ease, ..stage(simulation, rules, asks_ease) }
     }
 
     /// No lane waits or runs here.
     fn is_idle(&self) -> bool {
-        self.waiting.count() == 0 && self.fleet.batches.iter().all(|batch| batch.free == !0)
+        has_no_lane(&self.fleet, &self.waiting) && self.at_ease.as_ref().is_none_or(|at_ease| at_ease.is_idle())
     }
 
-    /// A burst, and what comes of it.
+    /// A burst, or some of lanes at ease, and what comes of it.
     fn advance<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
+        self.burst(each);
+        let Stage { simulation, fleet, waiting, at_ease: Some(at_ease), .. } = self else { return };
+        for batch in &mut fleet.batches {
+            batch.set_at_ease(simulation, &mut at_ease.waiting);
+        }
+        let are_alone = has_no_lane(fleet, waiting);
+        if are_alone || !at_ease.waiting.has_room(FLEET) {
+            while (at_ease.waiting.count() >= FLEET || are_alone && !at_ease.is_idle()) && waiting.has_room(FLEET) {
+                at_ease.burst(each);
+                for batch in &mut at_ease.fleet.batches {
+                    batch.set_back(&at_ease.simulation, waiting);
+                }
+            }
+        }
+    }
+
+    /// A burst, and what comes of it for lanes that stay here.
+    fn burst<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
         let Stage { simulation, fleet, .. } = self;
         self.burst.run(simulation, fleet, &mut self.waiting);
         for batch in &mut fleet.batches {
@@ -117,4 +143,9 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
             }
         }
     }
+}
+
+/// No lane waits or runs here.
+fn has_no_lane(fleet: &Fleet<'_>, waiting: &Waiting) -> bool {
+    waiting.count() == 0 && fleet.batches.iter().all(|batch| batch.free == !0)
 }

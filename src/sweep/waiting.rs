@@ -5,7 +5,7 @@ use crate::driver::DriverModel;
 
 use super::alone::alone_from;
 use super::batch::Slots;
-use super::batch_arrays::{LANES, LaneArrays, NEVER_ALONE, Words};
+use super::batch_arrays::{LANES, LaneArrays, NEVER_LEAVES, Words, steady_from};
 use super::frame::{Simulation, Start};
 use super::lane_case::LaneCase;
 use super::lane_step::{LaneConstants, LaneState};
@@ -35,6 +35,8 @@ pub(super) struct Waiting {
     lanes: Box<LaneArrays<ROOM>>,
     /// Continuous values are wanted, not verdicts alone.
     values: bool,
+    /// Lanes with a single vehicle are asked whether they are at ease.
+    asks_ease: bool,
     /// The first that waits.
     first: usize,
     /// The end of them.
@@ -48,8 +50,8 @@ pub(super) struct Waiting {
 
 impl Waiting {
     /// At the beginning of a stream.
-    pub fn new(values: bool) -> Self {
-        Waiting { lanes: Box::new(LaneArrays::idle()), values, first: 0, end: 0, case: 0, start: 0, lane: 0 }
+    pub fn new(values: bool, asks_ease: bool) -> Self {
+        Waiting { lanes: Box::new(LaneArrays::idle()), values, asks_ease, first: 0, end: 0, case: 0, start: 0, lane: 0 }
     }
 
     /// How many wait.
@@ -92,12 +94,28 @@ impl Waiting {
         }
     }
 
+    /// So many more may wait.
+    #[inline(always)]
+    pub fn has_room(&self, count: usize) -> bool {
+        self.count() + count <= MOST
+    }
+
     /// Adds a lane that goes on with the second vehicle alone.
     pub fn add_alone(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
+        let leaves_from = if self.asks_ease { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
+        self.add_single(lanes, k, 1, leaves_from);
+    }
+
+    /// Adds a lane as it is, with a single vehicle.
+    pub fn add_lane(&mut self, lanes: &LaneArrays<LANES>, k: usize, leaves_from: u32) {
+        self.add_single(lanes, k, 0, leaves_from);
+    }
+
+    fn add_single(&mut self, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
         if self.end == MOST {
             self.close_up(false);
         }
-        self.lanes.set_alone(self.end, lanes, k);
+        self.lanes.set_single(self.end, lanes, k, vehicle, leaves_from);
         self.end += 1;
     }
 
@@ -121,16 +139,17 @@ impl Waiting {
         let case = &stream.cases[self.case];
         let tracks = &stream.tracks[self.case];
         let constants = LaneConstants::new(simulation, case);
-        let alone_from = match sets_apart {
+        let leaves_from = match sets_apart {
             Some(entries) => alone_from(simulation, &constants, tracks, entries),
-            None => NEVER_ALONE,
+            None if self.asks_ease => steady_from(&tracks[..1]) + 1,
+            None => NEVER_LEAVES,
         };
         let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
         let starts = &stream.starts[self.start..];
         let starts = &starts[..starts.len().min(MOST - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
-            self.lanes.fill(self.end, &constants, tracks, &state, alone_from, self.values);
+            self.lanes.fill(self.end, &constants, tracks, &state, leaves_from, self.values);
             for &start in starts {
                 self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
                 self.end += 1;
