@@ -180,39 +180,32 @@ fn calm_gap<M: DriverModel<f32>>(
 /// tie the even one is taken, which settles it after one sum. So only the sums next to a power of two are worked out.
 fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
     const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
-    let (mut gap, mut made, mut in_binade) = (gap, 0, 0);
+    let (mut gap, mut made) = (gap, 0);
     while made < most {
         let next = gap + change;
         if next < lowest || next <= 0.0 {
             break;
         }
-        if next.to_bits() == gap.to_bits() {
+        // This sum settles ties; the one after it tells how far every sum goes on.
+        let (before, bits, after) = (gap.to_bits(), next.to_bits(), (next + change).to_bits());
+        if bits == before || bits == after {
             // Lost in rounding, for good.
-            return (most, gap);
+            return (most, next);
         }
-        let (bits, next_bits) = (gap.to_bits(), next.to_bits());
-        let is_same = bits / BINADE == next_bits / BINADE;
-        // The sum before has settled ties.
-        let settled = is_same && in_binade > 0;
-        in_binade = if is_same { in_binade + 1 } else { 0 };
-        if !settled {
-            (gap, made) = (next, made + 1);
+        (gap, made) = (next, made + 1);
+        let binade = bits / BINADE;
+        if before / BINADE != binade || after / BINADE != binade {
             continue;
         }
         // One number short of both powers of two the sum itself lies between them, rounded or not.
-        let first = bits / BINADE * BINADE;
-        let times = if next_bits > bits {
-            (first + BINADE - 1 - bits) / (next_bits - bits)
+        let way = if after > bits {
+            (binade + 1) * BINADE - 1 - bits
         } else {
-            (bits - (first + 1).max(lowest.to_bits()).min(bits)) / (bits - next_bits)
+            bits - (binade * BINADE + 1).max(lowest.to_bits()).min(bits)
         };
-        let times = times.min(most - made);
-        if times == 0 {
-            (gap, made) = (next, made + 1);
-            continue;
-        }
-        let way = times * bits.abs_diff(next_bits);
-        gap = f32::from_bits(if next_bits > bits { bits + way } else { bits - way });
+        let by = after.abs_diff(bits);
+        let times = (way / by).min(most - made);
+        gap = f32::from_bits(if after > bits { bits + times * by } else { bits - times * by });
         made += times;
     }
     (made, gap)
