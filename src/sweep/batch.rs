@@ -3,7 +3,8 @@
 //!
 //! A burst is [`ROWS`] steps of some batches in turn. One step of a batch needs the step before it, and so does its
 //! next one; the batches need nothing of one another, which keeps the machine busy while results are on their way.
-//! A lane that is over stays as it is until the burst ends. Nothing here depends on the instruction set;
+//! A lane that is over stays as it is until the burst ends; one at ease goes on to its end, which changes no verdict.
+//! Nothing here depends on the instruction set;
 //! [`super::simd`] chooses it.
 
 use crate::driver::DriverModel;
@@ -22,7 +23,8 @@ use super::window::Window;
 /// Batches of a burst.
 pub(super) const BATCHES: usize = 3;
 
-/// Steps before calm ones are looked for again where none were found: at least so many, and a share of those behind.
+/// Steps before a lane is asked again where the answer was no: at least so many. Before calm ones are looked for again,
+/// also a share of those behind.
 const LOOK_AGAIN: u32 = 4 * ROWS as u32;
 const LOOK_AGAIN_SHARE: u32 = 4;
 
@@ -139,7 +141,8 @@ impl Batch {
         for k in 0..LANES {
             let last = moving.index[k] + ROWS as u32 - 1;
             moving.index[k] = last + 1;
-            // The first such step ended the lane; nothing that counts has changed since.
+            // The first such step ended the lane, and no verdict has changed since. At rest it is settled as well:
+            // nobody ahead of a lane at ease drives backwards.
             let settled = !(moving.v_before[k] - self.windows[0][0].rows[ROWS - 1][k]).is_positive();
             moving.over[k] = (Flag::reached(last, fixed.ego.horizon[k]) & settled).to_bits();
         }
@@ -173,16 +176,17 @@ impl Batch {
     }
 
     /// Lets the lanes go that go on with the second vehicle alone.
-    pub fn set_apart(&mut self, apart: &mut Waiting) {
-        self.free |= self.leaving;
-        while self.leaving != 0 {
-            apart.add_alone(&self.lanes, self.leaving.trailing_zeros() as usize);
+    pub fn set_apart_alone(&mut self, apart: &mut Waiting) {
+        while self.leaving != 0 && apart.has_room(1) {
+            let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
+            apart.add_alone(&self.lanes, k);
+            self.free |= 1 << k;
         }
     }
 
     /// Lets lanes go that are at ease for long enough; the others are asked again later.
-    pub fn set_at_ease<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, apart: &mut Waiting) {
+    pub fn set_apart_at_ease<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, apart: &mut Waiting) {
         while self.leaving != 0 {
             let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
@@ -201,7 +205,7 @@ impl Batch {
         }
     }
 
-    /// Lanes whose steps at ease are used up: those that are no longer go back.
+    /// Lanes whose steps at ease are used up: those no longer at ease go back.
     pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Waiting) {
         let ego = &self.lanes.fixed.ego;
         let mut used_up = 0;

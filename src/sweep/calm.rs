@@ -16,7 +16,7 @@ use crate::scalar::Real;
 use super::batch_arrays::ROWS;
 use super::frame::Simulation;
 use super::lane_step::{
-    Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, judge, see,
+    Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, criteria_safe_gap, judge, see,
 };
 
 /// Fewer steps are sooner made than counted.
@@ -149,14 +149,8 @@ fn calm_gap<M: DriverModel<f32>>(
     if place.position.abs() - other.half_widths >= 0.0 {
         return None;
     }
-    let mut safe = simulation.model.safe_gap(state.v_ego, place.speed);
-    let closing = state.v_ego - place.speed;
-    if closing > 0.0 && !record.ttc.failed.holds() {
-        safe = safe.larger(criteria.ttc.safe_gap(closing));
-    }
-    if closing > 0.0 && !record.btn.failed.holds() {
-        safe = safe.larger(criteria.btn.safe_gap(closing));
-    }
+    let of_criteria = criteria_safe_gap(criteria, record, state.v_ego - place.speed);
+    let safe = simulation.model.safe_gap(state.v_ego, place.speed).larger(of_criteria);
     // Enough for what rounding does to it; at a gap that does not grow smaller all is well if it is well now.
     let lowest = 1.001 * safe + 0.001;
     if lowest.is_nan() || lowest > state.gaps[vehicle] {
@@ -165,7 +159,7 @@ fn calm_gap<M: DriverModel<f32>>(
     // The safe distances are an advice; what counts is what the step itself would say.
     let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
-    // Every criterion that a record keeps has its say here and its safe distance above.
+    // Every criterion that a record keeps has its say here.
     let Record { ttc, btn, min_gap: _ } = judge(criteria, record, &seen);
     let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
     // The driver may not yet attend to it: then less is calm than could be.
@@ -177,7 +171,7 @@ fn calm_gap<M: DriverModel<f32>>(
 /// long as it does not fall below `lowest`: how many times, and what comes out.
 ///
 /// Between two powers of two the numbers have one distance, so each sum goes on by the same whole number of them; at a
-/// tie the even one is taken, which settles it after one sum. So only the sums next to a power of two are worked out.
+/// tie the even one is taken, which settles it after one sum. So only a few sums between two powers of two are worked out.
 fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
     const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
     let (mut gap, mut made) = (gap, 0);

@@ -21,7 +21,7 @@ const FULL_TASK: u64 = 8192;
 /// Lanes per model below which tasks are not cut for the sake of more of them.
 const SMALL_TASK: u64 = 2048;
 /// Tasks that every thread should have, so that none is left waiting for long.
-const TASKS_PER_THREAD: u64 = 8;
+const TASKS_PER_THREAD: u64 = 4;
 /// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
 const TASK_ENTRIES: u64 = 1 << 24;
 
@@ -52,9 +52,8 @@ impl CpuBackend<f32> {
         Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
     }
 
-    /// The same, but it makes every step of every lane, with all its vehicles; without it, where only verdicts are
-    /// wanted, batches leave out steps in which nothing can happen and vehicles that do not matter any more. The verdicts
-    /// are the same. For benchmarks and tests.
+    /// The same, but it makes every step of every lane as a whole, with all its vehicles; without it, where only verdicts
+    /// are wanted, batches leave out what can change none. The verdicts are the same. For benchmarks and tests.
     pub fn every_step(self) -> Self {
         CpuBackend { every_step: true, ..self }
     }

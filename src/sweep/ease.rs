@@ -1,15 +1,15 @@
-//! Lanes in which a driver only follows: nothing is near, but each step the driver brakes a little.
+//! Lanes in which a driver only follows: at ease.
 //!
-//! A driver who keeps a comfortable distance from a vehicle that keeps its speed comes near it ever more slowly, in
-//! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part
-//! is left, [`DriverModel::check_at_ease`]. Where only verdicts are wanted, batches make these steps among lanes at
-//! ease, which work out nothing else. [`ease_steps`] says for how long that is the whole step, to the bit.
+//! A driver who keeps a comfortable distance from a vehicle that keeps its speed often comes near it ever more slowly, in
+//! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part is
+//! left, [`DriverModel::check_at_ease`], however hard it brakes. Where only verdicts are wanted, batches make these steps
+//! among lanes at ease, which work out nothing else. [`ease_steps`] says for how long that is the whole step, to the bit.
 
 use crate::driver::DriverModel;
 
 use super::batch_arrays::ROWS;
 use super::frame::Simulation;
-use super::lane_step::{LaneConstants, LaneState, Record, Whereabouts};
+use super::lane_step::{LaneConstants, LaneState, Whereabouts, criteria_safe_gap};
 
 /// At most so many steps are foreseen at once: few enough for what rounding does to their gaps.
 const MOST: u32 = 1024;
@@ -26,29 +26,20 @@ pub(super) fn ease_steps<M: DriverModel<f32>>(
     let (other, index, gap) = (&lane.others[0], state.index, state.gaps[0]);
     let in_lane = scene.in_lane || place.position.abs() - other.half_widths < 0.0 && index >= other.attend_from;
     let there = scene.always_there || index >= other.present_from && other.present_until >= frame.step_cap;
-    // One that drives backwards is no one to follow.
+    // Behind one that drives backwards a lane can end at rest without being settled, which nobody asks at ease.
     if !in_lane || !there || state.driver.delay_steps > 0 || place.speed < 0.0 {
         return 0;
     }
     // From here on the closing speed grows no more, so what is safe at it is safe at every later one.
     let closing = (state.v_ego - place.speed).max(0.0);
-    let mut safe = model.ease_gap(state.v_ego, place.speed);
-    // Every criterion that a record keeps has its safe distance here.
-    let Record { ttc, btn, min_gap: _ } = &state.record;
-    if closing > 0.0 && !ttc.failed.holds() {
-        safe = safe.max(criteria.ttc.safe_gap(closing));
-    }
-    if closing > 0.0 && !btn.failed.holds() {
-        safe = safe.max(criteria.btn.safe_gap(closing));
-    }
-    // A thousandth for what rounding does to the distances, and one for what it does to the sums.
-    let lowest = 1.001 * safe + 0.001 * gap + 0.001;
-    let (room, by) = (gap - lowest, 1.001 * closing * frame.dt);
-    if room.is_nan() || room <= 0.0 {
-        return 0;
-    }
+    let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
+    let safe = model.ease_gap(state.v_ego, place.speed).max(of_criteria);
+    // Thousandths and a millimetre for what rounding does to the distances and to the sums.
+    let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
+    let by = 1.001 * closing * frame.dt;
     let most = MOST.min(frame.step_cap.saturating_sub(index + ROWS as u32));
-    if by * most as f32 <= room { most } else { (room / by) as u32 }
+    // None where there is no room or no number.
+    ((room / by) as u32).min(most)
 }
 
 #[cfg(test)]
@@ -61,7 +52,7 @@ mod tests {
     use crate::random::{philox4x32_10, unit_uniform};
     use crate::scenario::Category;
     use crate::sweep::drivers::Constants;
-    use crate::sweep::lane_step::{OtherConstants, advance};
+    use crate::sweep::lane_step::{OtherConstants, Record, advance};
     use crate::sweep::outcome::NO_STEP;
     use crate::sweep::scene::Scene;
 

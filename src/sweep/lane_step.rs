@@ -130,7 +130,7 @@ pub struct LaneState<R> {
     /// What the steps have gathered.
     pub record: Record<R>,
     /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Steps change
-    /// nothing more, but for `v_before` where only verdicts are wanted, which do not look at it.
+    /// nothing more, where only verdicts are wanted nothing that these look at.
     pub over: Flag,
 }
 
@@ -285,6 +285,21 @@ pub(super) fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &
     let btn = criteria.btn.update(record.btn, seen.judged, gap, closing, keeps_values);
     let smaller = if keeps_values { gap.smaller(record.min_gap) } else { record.min_gap };
     Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
+}
+
+/// The gap, m ≥ 0, beyond which no criterion that a record keeps begins to fail at this closing speed, m/s, or a smaller
+/// one, but for rounding.
+#[inline(always)]
+pub(super) fn criteria_safe_gap<R: Real>(criteria: &Criteria<R>, record: &Record<R>, closing: R) -> R {
+    let Record { ttc, btn, min_gap: _ } = record;
+    let mut safe = R::ZERO;
+    if closing > R::ZERO && !ttc.failed.holds() {
+        safe = safe.larger(criteria.ttc.safe_gap(closing));
+    }
+    if closing > R::ZERO && !btn.failed.holds() {
+        safe = safe.larger(criteria.btn.safe_gap(closing));
+    }
+    safe
 }
 
 #[inline(always)]

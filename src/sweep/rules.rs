@@ -61,8 +61,7 @@ impl Rules {
     /// From that number.
     pub(super) const fn from_bits(bits: u32) -> Rules {
         if bits >= Rules::IN_LANE {
-            let at_ease = bits == Rules::AT_EASE;
-            let scene = Scene { is_pair: false, always_there: true, in_lane: true, at_ease };
+            let scene = Scene { at_ease: bits == Rules::AT_EASE, ..Scene::in_lane() };
             return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
         }
         let seldom = bits >> 2;

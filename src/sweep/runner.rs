@@ -56,8 +56,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self
     }
 
-    /// The same, but batches make every step with all vehicles; without it, where only verdicts are wanted, they leave
-    /// out steps in which nothing can happen and vehicles that do not matter any more. The verdicts are the same.
+    /// The same, but batches make every step as a whole, with all vehicles; without it, where only verdicts are wanted,
+    /// they leave out what can change none. The verdicts are the same.
     pub fn every_step(mut self, every_step: bool) -> Self {
         self.every_step = every_step;
         self

@@ -25,7 +25,7 @@ impl Scene {
     }
 
     /// One other vehicle, in the ego's lane from the first step to the last.
-    pub(super) fn in_lane() -> Scene {
+    pub(super) const fn in_lane() -> Scene {
         Scene { is_pair: false, always_there: true, in_lane: true, at_ease: false }
     }
 

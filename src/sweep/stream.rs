@@ -1,6 +1,7 @@
 //! A stream of lanes through the slots of the batches: where a lane is over, its slot takes the next one after the
-//! burst, so no lane waits for another and nothing is allocated per lane. A lane that goes on with the second vehicle
-//! alone is set apart; when many of them wait, or no others are left, they run in batches of such lanes.
+//! burst, so no lane waits for another and nothing is allocated per lane. A lane of which less is to be asked is set
+//! apart: one that goes on with the second vehicle alone, and one whose driver is at ease, as long as he is. When many of
+//! them wait, or no others are left, they run in batches of their own.
 
 use crate::driver::DriverModel;
 
@@ -12,7 +13,7 @@ use super::instructions::Instructions;
 use super::rules::Rules;
 use super::scene::Scene;
 use super::simd::{Burst, burst_for};
-use super::waiting::{Lanes, MOST, Waiting};
+use super::waiting::{Lanes, Waiting};
 
 /// Lanes of a fleet.
 const FLEET: usize = BATCHES * LANES;
@@ -27,36 +28,14 @@ pub(super) fn run_stream<M: DriverModel<f32>, E: Ending>(
     entries: &[f32],
     mut each: impl FnMut(usize, E),
 ) {
-    let mut first = Stage::new::<E>(*simulation, [0, 1], instructions, stream, entries);
-    let sets_apart = simulation.scene.is_pair && first.leaves_out;
-    let mut alone = sets_apart.then(|| {
-        let simulation = Simulation { scene: Scene::of_second_alone(stream.cases), ..*simulation };
-        Stage::new::<E>(simulation, [1, 1], instructions, stream, entries)
-    });
+    let mut lanes = Stage::new::<E>(*simulation, instructions, stream, entries);
+    let sets_apart = (simulation.scene.is_pair && lanes.apart.is_some()).then_some(entries);
     loop {
-        first.waiting.have(FLEET, simulation, stream, sets_apart.then_some(entries));
-        let is_over = first.is_idle();
-        if !is_over {
-            first.advance(&mut each);
-        }
-        let Some(alone) = &mut alone else {
-            if is_over {
-                return;
-            }
-            continue;
-        };
-        for batch in &mut first.fleet.batches {
-            batch.set_apart(&mut alone.waiting);
-        }
-        // Many bursts of one kind in a row: what they work with then lies near.
-        if is_over || alone.waiting.count() > MOST - FLEET {
-            while alone.waiting.count() >= FLEET || is_over && !alone.is_idle() {
-                alone.advance(&mut each);
-            }
-        }
-        if is_over {
+        lanes.waiting.have(FLEET, simulation, stream, sets_apart);
+        if lanes.is_idle() {
             return;
         }
+        lanes.advance(&mut each);
     }
 }
 
@@ -68,63 +47,83 @@ struct Stage<'s, M> {
     waiting: Waiting,
     /// Steps in which nothing can happen are not made.
     leaves_out: bool,
-    /// Where its lanes are while they are at ease.
-    at_ease: Option<Box<Stage<'s, M>>>,
+    /// Where lanes go of which less is to be asked.
+    apart: Option<Box<Stage<'s, M>>>,
 }
 
 impl<'s, M: DriverModel<f32>> Stage<'s, M> {
-    /// Without a lane yet. `vehicles` are those that its lanes look at.
+    /// Without a lane yet, and with the stages that its lanes may need later.
     fn new<E: Ending>(
         simulation: Simulation<'s, f32, M>,
-        vehicles: [usize; 2],
         instructions: Instructions,
         stream: &Lanes<'_>,
         entries: &'s [f32],
     ) -> Self {
         const RUNS: &str = "these lanes do not run in batches";
-        let rules = Rules::of(simulation.frame, simulation.criteria, simulation.scene, E::HAS_VALUES).expect(RUNS);
+        let rules_of = |scene| Rules::of(simulation.frame, simulation.criteria, scene, E::HAS_VALUES).expect(RUNS);
         // Some rules have no loop for verdicts alone.
-        let values = !rules.is_verdict_only;
+        let values = !rules_of(simulation.scene).is_verdict_only;
         let leaves_out = !values && !stream.every_step;
-        let asks_ease = leaves_out && M::KNOWS_EASE && !simulation.scene.is_pair;
-        let stage = |simulation, rules, asks_ease| Stage {
-            simulation,
+        let knows_ease = leaves_out && M::KNOWS_EASE;
+        // Its lanes look at these vehicles.
+        let stage = |scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
+            simulation: Simulation { scene, ..simulation },
             burst: burst_for(instructions, rules).expect(RUNS),
             fleet: Fleet::new(stream, entries, vehicles),
-            waiting: Waiting::new(values, asks_ease),
+            waiting: Waiting::new(values, knows_ease && apart.is_some()),
             leaves_out,
-            at_ease: None,
+            apart: apart.map(Box::new),
         };
-        let in_lane = Simulation { scene: Scene::in_lane(), ..simulation };
-        let at_ease = asks_ease.then(|| Box::new(stage(in_lane, Rules::at_ease(), false)));
-        Stage { at_ease, ..stage(simulation, rules, asks_ease) }
+        let single = |scene, vehicles| {
+            let at_ease = knows_ease.then(|| stage(Scene::in_lane(), Rules::at_ease(), vehicles, None));
+            stage(scene, rules_of(scene), vehicles, at_ease)
+        };
+        let scene = simulation.scene;
+        if !scene.is_pair {
+            return single(scene, [0, 0]);
+        }
+        let alone = leaves_out.then(|| single(Scene::of_second_alone(stream.cases), [1, 1]));
+        stage(scene, rules_of(scene), [0, 1], alone)
     }
 
     /// No lane waits or runs here.
     fn is_idle(&self) -> bool {
-        has_no_lane(&self.fleet, &self.waiting) && self.at_ease.as_ref().is_none_or(|at_ease| at_ease.is_idle())
+        has_no_lane(&self.fleet, &self.waiting) && self.apart.as_ref().is_none_or(|apart| apart.is_idle())
     }
 
-    /// A burst, or some of lanes at ease, and what comes of it.
+    /// A burst, then some of the lanes that are set apart, and what comes of it.
     fn advance<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
-        self.burst(each);
-        let Stage { simulation, fleet, waiting, at_ease: Some(at_ease), .. } = self else { return };
+        self.run_burst(each);
+        let Stage { simulation, fleet, waiting, apart: Some(apart), .. } = self else { return };
+        let is_pair = simulation.scene.is_pair;
         for batch in &mut fleet.batches {
-            batch.set_at_ease(simulation, &mut at_ease.waiting);
+            if is_pair {
+                batch.set_apart_alone(&mut apart.waiting);
+            } else {
+                batch.set_apart_at_ease(simulation, &mut apart.waiting);
+            }
         }
-        let are_alone = has_no_lane(fleet, waiting);
-        if are_alone || !at_ease.waiting.has_room(FLEET) {
-            while (at_ease.waiting.count() >= FLEET || are_alone && !at_ease.is_idle()) && waiting.has_room(FLEET) {
-                at_ease.burst(each);
-                for batch in &mut at_ease.fleet.batches {
-                    batch.set_back(&at_ease.simulation, waiting);
+        let no_others = has_no_lane(fleet, waiting);
+        if !no_others && apart.waiting.has_room(FLEET) {
+            return;
+        }
+        // Many bursts of one kind in a row: what they work with then lies near.
+        while apart.waiting.count() >= FLEET || no_others && !apart.is_idle() {
+            if is_pair {
+                apart.advance(each);
+            } else if waiting.has_room(FLEET) {
+                apart.run_burst(each);
+                for batch in &mut apart.fleet.batches {
+                    batch.set_back(&apart.simulation, waiting);
                 }
+            } else {
+                return;
             }
         }
     }
 
     /// A burst, and what comes of it for lanes that stay here.
-    fn burst<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
+    fn run_burst<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
         let Stage { simulation, fleet, .. } = self;
         self.burst.run(simulation, fleet, &mut self.waiting);
         for batch in &mut fleet.batches {

@@ -26,11 +26,11 @@ pub(super) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
-    /// Calm steps are made as well, and no vehicle is let go.
+    /// Calm steps are made as well, and no lane is set apart.
     pub every_step: bool,
 }
 
-/// The next lanes of a stream.
+/// Lanes that wait for slots of one kind of batches: the next ones of a stream, and those set apart.
 pub(super) struct Waiting {
     lanes: Box<LaneArrays<ROOM>>,
     /// Continuous values are wanted, not verdicts alone.
