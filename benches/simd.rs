@@ -15,6 +15,7 @@ mod common;
 
 use std::time::Instant;
 
+use common::worker::{WORKER, Worker, cpu_seconds, serve};
 use common::{lane_steps, paper_size_scenarios, peak_memory_bytes};
 use lanesweep::driver::ModelId;
 use lanesweep::profile::Profile;
@@ -37,10 +38,14 @@ fn main() {
     if !std::env::args().any(|arg| arg == "--bench") {
         return;
     }
-    println!("part,category,model,instructions,repetition,amount,unit,seconds");
     let scenarios = paper_size_scenarios();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let named: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect();
+    if named == [WORKER] {
+        let plan = plan(&scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
+        return serve(|| one.install(|| run(&plan, &CpuBackend::lane_arithmetic())));
+    }
+    println!("part,category,model,instructions,repetition,amount,unit,seconds");
     if named != ["threads"] {
         one.install(|| speeds(&scenarios));
     }
@@ -123,7 +128,8 @@ fn is_wanted(name: &str, kind: &[&str]) -> bool {
 }
 
 /// Work on one and on two threads, in turn, so that all of it sees the same machine: the whole study, as it is swept and
-/// with every step made, and the roof's loop, which needs no memory. What that loop loses is the machine's.
+/// with every step made, and the roof's loop, which needs no memory; and the study in one process of one thread, and in
+/// two of them at once. What that loop or two processes lose is the machine's.
 fn threads(scenarios: &[Scenario]) {
     let plan = &plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
     let (swept, every_step) = (CpuBackend::lane_arithmetic(), CpuBackend::lane_arithmetic().every_step());
@@ -136,6 +142,8 @@ fn threads(scenarios: &[Scenario]) {
         ("roof both in turn", operations, "operations", &|| assert_eq!(roof(), operations)),
     ];
     let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
+    let mut workers = [Worker::start(), Worker::start()];
+    let mut of_processes = [Vec::new(), Vec::new()];
     // Per work and number of threads: wall time and CPU time of every repetition.
     let mut times = vec![[Vec::new(), Vec::new()]; works.len()];
     for repetition in 0..THREADS_REPETITIONS {
@@ -153,6 +161,12 @@ fn threads(scenarios: &[Scenario]) {
                 times.push((seconds, cpu));
             }
         }
+        for (count, of_processes) in [1, 2].into_iter().zip(&mut of_processes) {
+            workers[..count].iter_mut().for_each(Worker::ask);
+            let cpu: f64 = workers[..count].iter_mut().map(|worker| worker.answer() / count as f64).sum();
+            println!("study in {count} processes: CPU time each,,,{set},{repetition},{steps},lane-steps,{cpu}");
+            of_processes.push(cpu);
+        }
     }
     for ((name, amount, unit, _), [one, two]) in works.iter().zip(&times).filter(|(work, _)| work.1 > 0) {
         let best = |times: &[(f64, f64)]| times.iter().fold(f64::INFINITY, |best, time| best.min(time.0));
@@ -163,25 +177,26 @@ fn threads(scenarios: &[Scenario]) {
             rate(of_one),
             rate(of_two)
         );
-        let mut ratios: Vec<f64> = one.iter().zip(two).map(|(one, two)| two.1 / one.1).collect();
-        if ratios.iter().any(|ratio| !ratio.is_finite()) {
-            continue;
-        }
-        ratios.sort_by(f64::total_cmp);
-        let quartile = |k: usize| ratios[(k * (ratios.len() - 1) + 2) / 4];
-        let (low, middle, high) = (quartile(1), quartile(2), quartile(3));
-        eprintln!("    CPU time on two threads over that on one: median {middle:.3}, quartiles {low:.3} and {high:.3}");
+        let cpu = |times: &[(f64, f64)]| times.iter().map(|time| time.1).collect::<Vec<f64>>();
+        print_ratios("two threads over that on one", &cpu(one), &cpu(two));
     }
+    print_ratios("one of two processes over that of one alone", &of_processes[0], &of_processes[1]);
 }
 
-/// Linux: CPU time of all threads of the process so far, s.
-fn cpu_seconds() -> Option<f64> {
-    let threads = std::fs::read_dir("/proc/self/task").ok()?.flatten();
-    let nanoseconds = |thread: std::fs::DirEntry| {
-        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse::<f64>().ok()
-    };
-    Some(threads.filter_map(nanoseconds).sum::<f64>() * 1e-9)
+/// CPU times side by side: their ratios, repetition by repetition, and the ratio of the least of each.
+fn print_ratios(what: &str, one: &[f64], two: &[f64]) {
+    let mut ratios: Vec<f64> = one.iter().zip(two).map(|(one, two)| two / one).collect();
+    if ratios.iter().any(|ratio| !ratio.is_finite()) {
+        return;
+    }
+    ratios.sort_by(f64::total_cmp);
+    let quartile = |k: usize| ratios[(k * (ratios.len() - 1) + 2) / 4];
+    let (low, middle, high) = (quartile(1), quartile(2), quartile(3));
+    let least = |times: &[f64]| times.iter().fold(f64::INFINITY, |least, &time| least.min(time));
+    let of_least = least(two) / least(one);
+    eprintln!(
+        "    CPU time on {what}: median {middle:.3}, quartiles {low:.3} and {high:.3}; least over least {of_least:.3}"
+    );
 }
 
 /// Memory while 10^5, 10^6 and 10^7 lanes run: more headways of the same cases.

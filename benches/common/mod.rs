@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // every benchmark uses its own part
 
+pub mod worker;
+
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::sweep::{Backend, LanePlan, Partial, SweepOptions, Wanted, sweep};
