@@ -129,7 +129,7 @@ fn is_wanted(name: &str, kind: &[&str]) -> bool {
 
 /// Work on one and on two threads, in turn, so that all of it sees the same machine: the whole study, as it is swept and
 /// with every step made, and the roof's loop, which needs no memory; and the study in one process of one thread, and in
-/// two of them at once. What that loop or two processes lose is the machine's.
+/// two of them at once. What that loop or two processes lose, threads lose as well.
 fn threads(scenarios: &[Scenario]) {
     let plan = &plan(scenarios, Category::ALL.to_vec(), ModelId::ALL.to_vec(), Headway::paper());
     let (swept, every_step) = (CpuBackend::lane_arithmetic(), CpuBackend::lane_arithmetic().every_step());
@@ -161,10 +161,17 @@ fn threads(scenarios: &[Scenario]) {
                 times.push((seconds, cpu));
             }
         }
-        for (count, of_processes) in [1, 2].into_iter().zip(&mut of_processes) {
-            workers[..count].iter_mut().for_each(Worker::ask);
-            let cpu: f64 = workers[..count].iter_mut().map(|worker| worker.answer() / count as f64).sum();
-            println!("study in {count} processes: CPU time each,,,{set},{repetition},{steps},lane-steps,{cpu}");
+        // Each of them in turn is the one that works alone.
+        let alone = repetition % 2;
+        let alone = alone..=alone;
+        for (which, of_processes) in [alone, 0..=1].into_iter().zip(&mut of_processes) {
+            let workers = &mut workers[which];
+            let count = workers.len();
+            workers.iter_mut().for_each(Worker::ask);
+            let cpu: f64 = workers.iter_mut().map(|worker| worker.answer() / count as f64).sum();
+            if cpu.is_finite() {
+                println!("study in {count} processes: CPU time each,,,{set},{repetition},{steps},lane-steps,{cpu}");
+            }
             of_processes.push(cpu);
         }
     }

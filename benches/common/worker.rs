@@ -1,5 +1,5 @@
 //! A second process of a benchmark: it does a piece of work whenever it is asked, and says what CPU time that took.
-//! What two of them lose beside one another, threads of one process cannot be expected to keep.
+//! Threads of one process cannot be expected to lose less than two such processes do.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};

@@ -150,7 +150,8 @@ fn calm_gap<M: DriverModel<f32>>(
         return None;
     }
     let of_criteria = criteria_safe_gap(criteria, record, state.v_ego - place.speed);
-    let safe = simulation.model.safe_gap(state.v_ego, place.speed).larger(of_criteria);
+    // What is no number stays none: the larger of two takes that of its second.
+    let safe = of_criteria.larger(simulation.model.safe_gap(state.v_ego, place.speed));
     // Enough for what rounding does to it; at a gap that does not grow smaller all is well if it is well now.
     let lowest = 1.001 * safe + 0.001;
     if lowest.is_nan() || lowest > state.gaps[vehicle] {

@@ -2,10 +2,11 @@
 //!
 //! A driver who keeps a comfortable distance from a vehicle that keeps its speed often comes near it ever more slowly, in
 //! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part is
-//! left, [`DriverModel::check_at_ease`], however hard it brakes. Where only verdicts are wanted, batches make these steps
+//! left, [`DriverModel::check_at_ease`], however hard the driver brakes by it. Where only verdicts are wanted, batches make these steps
 //! among lanes at ease, which work out nothing else. [`ease_steps`] says for how long that is the whole step, to the bit.
 
 use crate::driver::DriverModel;
+use crate::scalar::Real;
 
 use super::batch_arrays::ROWS;
 use super::frame::Simulation;
@@ -33,7 +34,8 @@ pub(super) fn ease_steps<M: DriverModel<f32>>(
     // From here on the closing speed grows no more, so what is safe at it is safe at every later one.
     let closing = (state.v_ego - place.speed).max(0.0);
     let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
-    let safe = model.ease_gap(state.v_ego, place.speed).max(of_criteria);
+    // What is no number stays none: the larger of two takes that of its second.
+    let safe = of_criteria.larger(model.ease_gap(state.v_ego, place.speed));
     // Thousandths and a millimetre for what rounding does to the distances and to the sums.
     let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
     let by = 1.001 * closing * frame.dt;
@@ -46,7 +48,7 @@ pub(super) fn ease_steps<M: DriverModel<f32>>(
 mod tests {
     use super::*;
     use crate::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
-    use crate::driver::DriverState;
+    use crate::driver::{DriverProfile, DriverState};
     use crate::flag::Flag;
     use crate::profile::Profile;
     use crate::random::{philox4x32_10, unit_uniform};
@@ -173,6 +175,13 @@ mod tests {
         let faster = LaneState { v_ego: 25.0, ..state };
         let near = (steps(&lane, &nearer, &place), steps(&lane, &faster, &place));
         assert!(near.0 > 10 && near.0 < 250 && near.1 > 100 && near.1 < 500, "{near:?}");
+        // A model whose distance is no number promises nothing.
+        let mut profile = Profile::load("paper").unwrap().fsm;
+        profile.comfortable_deceleration_mps2 = 0.0;
+        let model = &profile.resolve::<f32>(0.04, Category::Lvd);
+        let place = Whereabouts { speed: state.v_ego, ..place };
+        assert!(model.ease_gap(state.v_ego, place.speed).is_nan());
+        assert_eq!(ease_steps(&Simulation { model, ..simulation }, &lane, &state, &place), 0);
         for gap in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert_eq!(steps(&lane, &LaneState { gaps: [gap; 2], ..state }, &place), 0, "{gap}");
         }

@@ -129,8 +129,8 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Steps change
-    /// nothing more, where only verdicts are wanted nothing that these look at.
+    /// The last step has been made, even if the time cap is far: its [ending](super::ending) says why. Later steps
+    /// change nothing; where only verdicts are wanted, nothing that verdicts look at.
     pub over: Flag,
 }
 

@@ -65,12 +65,12 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         let values = !rules_of(simulation.scene).is_verdict_only;
         let leaves_out = !values && !stream.every_step;
         let knows_ease = leaves_out && M::KNOWS_EASE;
-        // Its lanes look at these vehicles.
-        let stage = |scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
+        // A stage whose lanes look at these vehicles.
+        let stage = |scene: Scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
             simulation: Simulation { scene, ..simulation },
             burst: burst_for(instructions, rules).expect(RUNS),
             fleet: Fleet::new(stream, entries, vehicles),
-            waiting: Waiting::new(values, knows_ease && apart.is_some()),
+            waiting: Waiting::new(values, apart.is_some() && !scene.is_pair),
             leaves_out,
             apart: apart.map(Box::new),
         };
@@ -103,6 +103,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
                 batch.set_apart_at_ease(simulation, &mut apart.waiting);
             }
         }
+        // Seldom before the stream's end: this stage has run dry, and is given more lanes when this one returns.
         let no_others = has_no_lane(fleet, waiting);
         if !no_others && apart.waiting.has_room(FLEET) {
             return;
