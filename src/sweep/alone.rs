@@ -122,7 +122,7 @@ mod tests {
             assert!(present && !is_out, "{name}");
         }
         let ignores = pair.model.ignores(10.0, 0.0).holds();
-        let comes = constants.others[0].present_from < NEVER_LEAVES;
+        let comes = constants.others[0].present_from < Flag::LATEST_STEP;
         assert!(ignores || !comes || other.is_none(), "{name}");
         saved
     }
