@@ -16,7 +16,7 @@ use lanesweep::driver::ModelId;
 use lanesweep::estimate::{BinomialInterval, StopRule};
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
-use lanesweep::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed, seal, write_part};
+use lanesweep::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::profile::Profile;
 use lanesweep::sampling::{
     CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
@@ -24,7 +24,7 @@ use lanesweep::sampling::{
 };
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::sweep::{
-    CpuBackend, Headway, LanePlan, Partial, PlanContent, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
+    CpuBackend, Headway, Partial, Study, StudyHead, StudyOptions, SweepOptions, Wanted, outline_study, sweep,
 };
 use lanesweep::trajectory::generator::GeneratorOptions;
 
@@ -78,7 +78,8 @@ fn study(folder: &Path) {
         })
     });
     let scenarios: Vec<Scenario> = many.collect();
-    let plan = plan_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan;
+    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().study;
+    let plan = study.window(0..study.outline().unit_count()).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
         let units = ledger.units();
@@ -87,7 +88,7 @@ fn study(folder: &Path) {
         })
         .unwrap();
     });
-    plan_file(folder, &plan);
+    plan_file(folder, &study);
 }
 
 /// Runs with and without a journal in turn; what is counted last is written as a part and read again.
@@ -140,24 +141,26 @@ fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run:
     );
 }
 
-/// What a shard that is given the plan pays for it.
-fn plan_file(folder: &Path, plan: &LanePlan) {
+/// What a shard that is given the plan pays for it, should it compute all of it.
+fn plan_file(folder: &Path, study: &Study) {
     let path = folder.join("plan.json");
     let start = Instant::now();
-    let (text, _) = seal("plan", &PlanContent::of(plan).unwrap()).unwrap();
-    std::fs::write(&path, &text).unwrap();
+    let (head, _) = seal("plan", study.head()).unwrap();
+    let bytes = [&head, study.records().unwrap()].concat();
+    std::fs::write(&path, &bytes).unwrap();
     let written = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let (content, _): (PlanContent, _) = read_sealed("plan", &path, 4 << 30, "again").unwrap();
+    let (head, _, mut records) = read_sealed_line::<StudyHead>("plan", &path, 1 << 30, "again").unwrap();
     let parsed = start.elapsed().as_secs_f64();
-    let again = content.into_plan(&lanesweep::Place::file(&path)).unwrap();
+    let again = head.read(&mut records, &lanesweep::Place::file(&path), |units| 0..units).unwrap();
     let read = start.elapsed().as_secs_f64();
-    assert_eq!(again.hash(), plan.hash());
-    println!("plan file of {} lanes and {} bytes,0,{written},{read},{parsed},,", plan.lane_count(), text.len());
+    let plan = study.outline();
+    assert_eq!(again.outline().hash(), plan.hash());
+    println!("plan file of {} lanes and {} bytes,0,{written},{read},{parsed},,", plan.lane_count(), bytes.len());
     eprintln!(
         "plan file: {} lanes, {:.1} MB, written in {written:.2} s, read and checked in {read:.2} s",
         plan.lane_count(),
-        text.len() as f64 / 1e6
+        bytes.len() as f64 / 1e6
     );
 }
 

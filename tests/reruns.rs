@@ -10,11 +10,12 @@ use lanesweep::density::{DataFacts, DensityModel, FitOptions};
 use lanesweep::driver::{MODELS, ModelId};
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
+use lanesweep::parts::read_sealed_line;
 use lanesweep::profile::Profile;
 use lanesweep::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, PlanContent, StudyOptions, Wanted, plan_study, words,
+    Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, StudyHead, StudyOptions, Wanted, plan_study, words,
 };
 use lanesweep::trajectory::generator::GeneratorOptions;
 
@@ -56,10 +57,13 @@ fn scenarios() -> &'static [Scenario] {
 
 /// The plan that a study left in its folder, read as a process does that recomputes nothing.
 fn left_plan(path: &Path) -> LanePlan {
-    let text = std::fs::read(path).unwrap();
-    let file: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    let content: PlanContent = serde_json::from_value(file["content"]["plan"].clone()).unwrap();
-    content.into_plan(&Place::file(path)).unwrap()
+    #[derive(serde::Deserialize)]
+    struct File {
+        plan: StudyHead,
+    }
+    let (file, _, mut records) = read_sealed_line::<File>("study plan", path, 1 << 26, "").unwrap();
+    let study = file.plan.read(&mut records, &Place::file(path), |units| 0..units).unwrap();
+    study.window(0..study.outline().unit_count()).unwrap()
 }
 
 fn rows(path: &Path) -> Vec<Row> {

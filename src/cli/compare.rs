@@ -162,8 +162,8 @@ impl Compare {
         }
         make_folder(&self.out)?;
         tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
-        let recheck = opened.device().map(|_| Recheck::new(plan, self.seed, ONE_IN));
-        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+        let recheck = opened.device().map(|_| self.seed);
+        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck };
         let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
 
         let run = Run {

@@ -75,14 +75,17 @@ pub(super) fn of_run(
     let first = source.keys.first().map_or("", String::as_str);
     match find_run(dir, first)? {
         Run::Study(study) => {
-            let (plan, facts) = (&study.plan, &study.facts);
+            let (whole, facts) = (study.plan(), &study.facts);
             let mined = scenarios.map(read_scenarios).transpose()?.unwrap_or_default();
             let keys = match worst {
                 Some((count, variants)) => {
-                    worst_of_study(plan, facts.reference, count, criterion, variants, source.models.as_deref())?
+                    worst_of_study(&study.study, facts.reference, count, criterion, variants, source.models.as_deref())?
                 }
-                None => named(plan, source)?,
+                None => named(whole, source)?,
             };
+            let units = keys.iter().map(|key| whole.blocks[key.block].first_unit + key.unit);
+            let span = units.clone().min().unwrap_or(0)..units.max().map_or(0, |last| last + 1);
+            let plan = &study.study.window(span)?;
             let about = About {
                 data: &facts.data,
                 is_synthetic: facts.synthetic,

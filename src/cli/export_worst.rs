@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::simulate_lanes::{find, model};
+use super::study_run::WINDOW;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::sampling::limit_state;
-use crate::sweep::{Backend, CpuBackend, LaneKey, LanePlan, SweepOptions, Wanted, sweep};
+use crate::sweep::{Backend, Chunk, CpuBackend, LaneKey, LanePlan, Study, SweepOptions, Wanted, sweep};
 use crate::{Error, Place, Result, input_file};
 
 /// Lanes that one export writes at most.
@@ -19,13 +20,14 @@ const MOST_LANES: usize = 10_000;
 /// # Errors
 /// [`Error::Usage`] for variants or models that the run does not have, and for too many lanes.
 pub(super) fn worst_of_study(
-    plan: &LanePlan,
+    study: &Study,
     is_reference: bool,
     count: usize,
     criterion: Criterion,
     variants: &[String],
     models: Option<&[ModelId]>,
 ) -> Result<Vec<LaneKey>> {
+    let plan = study.outline();
     let models = wanted_models(plan, models, count)?;
     for name in variants {
         if !plan.blocks.iter().any(|b| b.variants.iter().any(|v| v == name.trim())) {
@@ -40,7 +42,7 @@ pub(super) fn worst_of_study(
     let backend: &dyn Backend = if is_reference { &wide } else { &narrow };
     let options = SweepOptions { wanted: Wanted::Outcomes, fallback: None, recheck: None };
     let mut worst: Vec<Vec<(f64, u64)>> = vec![Vec::new(); plan.models.len()];
-    sweep(plan, 0..plan.unit_count(), backend, &options, |chunk| {
+    let mut each = |chunk: Chunk| {
         // The unit whose lanes are looked at, and its worst lane so far, per model.
         let mut unit: Option<(usize, u64)> = None;
         let mut of_unit: Vec<Option<(f64, u64)>> = vec![None; plan.models.len()];
@@ -63,6 +65,9 @@ pub(super) fn worst_of_study(
         }
         keep(&mut worst, &mut of_unit, count);
         Ok(())
+    };
+    study.in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
+        sweep(plan, units, backend, &options, &mut each).map(drop)
     })?;
     let lanes = models.iter().flat_map(|model| worst[*model].iter());
     Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())

@@ -18,7 +18,7 @@ use crate::profile::Profile;
 use crate::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
 use crate::scenario::Category;
 use crate::score::ScoreOptions;
-use crate::sweep::{Headway, StudyOptions, plan_study};
+use crate::sweep::{Headway, StudyOptions, outline_study};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::{Error, Result};
 
@@ -64,7 +64,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let weighted = PlannedWeighted::new(density, proposal, weighted).unwrap().facts;
     let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
     let study = PlannedStudy {
-        plan: plan_study(&few, &profile, &StudyOptions::default()).unwrap().plan,
+        study: outline_study(&few, &profile, &StudyOptions::default()).unwrap().study,
         facts: study_plan::StudyFacts {
             data: "synthetic".into(),
             synthetic: true,
@@ -82,20 +82,21 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     };
     let text = |facts: serde_json::Result<String>| facts.unwrap();
     let crude = text(serde_json::to_string(&crude));
-    try_all(sample_plan::KIND, &crude, &|path| PlannedSample::read(path).map(drop));
+    try_all(sample_plan::KIND, &crude, &[], &|path| PlannedSample::read(path).map(drop));
     let weighted = text(serde_json::to_string(&weighted));
-    try_all(weighted_plan::KIND, &weighted, &|path| PlannedWeighted::read(path).map(drop));
+    try_all(weighted_plan::KIND, &weighted, &[], &|path| PlannedWeighted::read(path).map(drop));
+    let records = study.study.records().unwrap().to_vec();
     let study: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
-    try_all(study_plan::KIND, &study["content"].to_string(), &|path| PlannedStudy::read(path).map(drop));
+    try_all(study_plan::KIND, &study["content"].to_string(), &records, &|path| PlannedStudy::read(path).map(drop));
 }
 
-/// Content as it is and changed, each with a checksum that fits.
-fn try_all(kind: &str, content: &str, read: &dyn Fn(&Path) -> Result<()>) {
+/// Content as it is and changed, each with a checksum that fits and followed by the same bytes.
+fn try_all(kind: &str, content: &str, rest: &[u8], read: &dyn Fn(&Path) -> Result<()>) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("plan.json");
     let read_sealed = |content: &str| {
         let content: Box<RawValue> = serde_json::from_str(content).ok()?;
-        std::fs::write(&path, seal(kind, &content).unwrap().0).unwrap();
+        std::fs::write(&path, [&seal(kind, &content).unwrap().0, rest].concat()).unwrap();
         Some(read(&path))
     };
     let seeds = [content.as_bytes().to_vec()];

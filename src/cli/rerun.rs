@@ -9,13 +9,15 @@ use crate::driver::ModelId;
 use crate::profile::Profile;
 use crate::report::sampling::RunFacts;
 use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
-use crate::sweep::{Headway, LanePlan};
+use crate::sweep::{ENGINE_VERSION, Headway, LanePlan};
 use crate::{Error, Place, Result, input_file};
 
 /// What `estimate.json` must say of a run.
 #[derive(Deserialize)]
 struct Recorded {
     lanesweep_estimate: u64,
+    /// None before engines were told.
+    engine: Option<u64>,
     estimator: String,
     samples: u64,
     seed: u64,
@@ -37,6 +39,20 @@ pub(super) fn facts_of(dir: &Path) -> Result<(RunFacts, DensityModel, Option<Str
     Ok((facts, read_density(&dir.join("density.json"))?, plan_sha256))
 }
 
+/// Whether a record is of this program's engine.
+///
+/// # Errors
+/// What it is of instead.
+pub(super) fn same_engine(recorded: Option<u64>) -> std::result::Result<(), String> {
+    match recorded {
+        Some(ENGINE_VERSION) => Ok(()),
+        Some(engine) => {
+            Err(format!("it is of engine {engine}, this program has engine {ENGINE_VERSION}: its lanes differ"))
+        }
+        None => Err("it does not tell its engine: an earlier version of lanesweep made it".to_owned()),
+    }
+}
+
 /// The same of a run without a density of ours.
 pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
     let path = dir.join("estimate.json");
@@ -49,6 +65,7 @@ pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
     if run.lanesweep_estimate != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
     }
+    same_engine(run.engine).map_err(wrong)?;
     let estimator = ["mc", "is", "ce", "subset"].into_iter().find(|known| *known == run.estimator);
     let facts = RunFacts {
         estimator: estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?,

@@ -14,7 +14,7 @@ use super::sample_checks;
 use super::sample_crude;
 use super::sample_distribution;
 use super::sample_lanes;
-use super::sample_plan::{self, PlannedSample, SampleFacts};
+use super::sample_plan::{PlannedSample, SampleFacts};
 use super::sample_weighted;
 use super::shard_flags::ShardFlags;
 use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
@@ -221,7 +221,7 @@ impl Sample {
 
     /// Runs what a plan file says: of crude Monte Carlo or over a given proposal.
     fn run_plan(&self, path: &PathBuf, started: Instant, verbosity: Verbosity) -> Result<Exit> {
-        if kind_of(path, sample_plan::LARGEST_PLAN_BYTES)? == weighted_plan::KIND {
+        if kind_of(path)? == weighted_plan::KIND {
             if self.rows.is_some() {
                 return Err(sample_checks::only_crude("--rows"));
             }

@@ -21,7 +21,7 @@ use crate::{Error, Place, Result};
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "sampling plan";
 /// Largest plan that is read: a density, mostly.
-pub(super) const LARGEST_PLAN_BYTES: u64 = 1 << 30;
+const LARGEST_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` of this version";
 
 /// A run of crude Monte Carlo.

@@ -42,7 +42,7 @@ pub(super) fn run(
     }
     let (text, run_sha256) = planned.seal()?;
     if flags.shards.plan_only || shard.is_some() {
-        leave_plan(out, &text)?;
+        leave_plan(out, &text, std::io::empty())?;
     }
     if flags.shards.plan_only {
         let lanes = samples.saturating_mul(planned.facts.models.len() as u64);

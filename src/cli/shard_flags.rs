@@ -1,5 +1,6 @@
 //! Flags of verbs that can be split and continued, and the files that parts keep in a run's folder.
 
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -106,9 +107,14 @@ pub struct Desk<'a> {
     pub unit_count: u64,
 }
 
+/// The units of a shard, or of the whole run.
+pub fn units_of(shard: Option<Shard>, count: u64) -> Range<u64> {
+    shard.map_or(0..count, |shard| shard.units(count))
+}
+
 impl Desk<'_> {
     fn units(&self) -> Range<u64> {
-        self.shard.map_or(0..self.unit_count, |shard| shard.units(self.unit_count))
+        units_of(self.shard, self.unit_count)
     }
 
     /// The part's file.
@@ -206,15 +212,17 @@ impl<T: Countable> Work<T> {
     }
 }
 
-/// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once.
+/// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once. A plan is told by its
+/// first line, which holds the checksums of all that follows.
 ///
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
-pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
+pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
     make_folder(out)?;
     let path = out.join(PLAN_FILE);
-    match crate::input_file::read(&path, super::study_plan::LARGEST_PLAN_BYTES) {
-        Ok(there) if there == text => Ok(()),
+    let mut there = vec![0; line.len()];
+    match crate::input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {
+        Ok(Ok(())) if there == line => Ok(()),
         Ok(_) => {
             let problem = "this folder holds the plan of another run";
             let help =
@@ -222,7 +230,10 @@ pub fn leave_plan(out: &Path, text: &[u8]) -> Result<()> {
             Err(Error::input(Place::file(path), problem, help))
         }
         Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
-            crate::report::files::write_atomically(&path, text)
+            crate::report::files::write_atomically_with(&path, |file| {
+                file.write_all(line)?;
+                std::io::copy(&mut rest, file).map(drop)
+            })
         }
         Err(e) => Err(e),
     }

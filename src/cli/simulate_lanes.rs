@@ -54,13 +54,13 @@ pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
     match find_run(dir, asked.key)? {
         Run::Study(study) => {
             let facts = &study.facts;
-            let traced = if facts.reference {
-                traced::<f64>(&study.plan, asked, false)?
-            } else {
-                traced::<f32>(&study.plan, asked, true)?
-            };
+            let key = find(study.plan(), asked.key)?;
+            let unit = study.plan().blocks[key.block].first_unit + key.unit;
+            let plan = study.study.window(unit..unit + 1)?;
+            let traced =
+                if facts.reference { traced::<f64>(&plan, asked, false)? } else { traced::<f32>(&plan, asked, true)? };
             let arithmetic = if facts.reference { "f64" } else { "f32" };
-            let origin = format!("profile {}, {arithmetic}, {}", study.plan.profile.name, facts.data);
+            let origin = format!("profile {}, {arithmetic}, {}", plan.profile.name, facts.data);
             Ok(Lanes { traced, origin, synthetic: facts.synthetic })
         }
         Run::Sample(plan, density) => {
@@ -123,7 +123,7 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
         let help = "give the folder (--out) of a `lanesweep study` or `lanesweep sample`";
         return Err(Error::input(Place::file(dir), "there is no run here", help));
     }
-    match kind_of(&plan, study_plan::LARGEST_PLAN_BYTES)?.as_str() {
+    match kind_of(&plan)?.as_str() {
         sample_plan::KIND => {
             let sample = PlannedSample::read(&plan)?.0;
             Ok(Run::Sample(Box::new(sample.plan), Box::new(sample.density)))
@@ -138,6 +138,7 @@ fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
     #[derive(Deserialize)]
     struct Recorded {
         plan_sha256: String,
+        engine: Option<u64>,
     }
     let wrong = |problem: String| {
         Error::input(
@@ -150,13 +151,14 @@ fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
     let text = input_file::read(run, input_file::LARGEST_TABLE_BYTES)?;
     let recorded: Recorded =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no record of a study: {e}")))?;
+    super::rerun::same_engine(recorded.engine).map_err(wrong)?;
     let plans: Vec<PathBuf> =
         [RUN_PLAN_FILE, PLAN_FILE].iter().map(|name| dir.join(name)).filter(|path| path.exists()).collect();
     for path in &plans {
         // Another verb's plan may stand in the same folder.
-        if kind_of(path, study_plan::LARGEST_PLAN_BYTES)? == study_plan::KIND {
+        if kind_of(path)? == study_plan::KIND {
             let study = PlannedStudy::read(path)?.0;
-            if study.plan.hash() == recorded.plan_sha256 {
+            if study.plan().hash() == recorded.plan_sha256 {
                 return Ok(study);
             }
         }

@@ -1,5 +1,6 @@
 //! `lanesweep study`: trajectories in, F1 out.
 
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -10,10 +11,10 @@ use super::configured::Configured;
 use super::console::Verbosity;
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
-use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan};
+use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan, units_of};
 use super::source::{self, Source};
-use super::study_plan::{CategoryFacts, LARGEST_PLAN_BYTES, PlannedStudy, StudyFacts};
-use super::study_run::{Host, How, compare_reference, finish_study, lane_format, run_units, write_lanes};
+use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
+use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
@@ -25,8 +26,7 @@ use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::scenario::{Category, Scenario};
 use crate::sweep::{
-    Backend, Block, Confusion, CpuBackend, ONE_IN, Partial, Recheck, StudyOptions, StudyPlan, Wanted, forecast,
-    plan_study,
+    Backend, Block, Confusion, CpuBackend, Partial, StudyOptions, StudyOutline, Wanted, forecast, outline_study,
 };
 use crate::{Error, Place, Result, input_file};
 
@@ -70,7 +70,7 @@ pub struct Study {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Leave the plan in --out (run-plan.json), so that `simulate --from` can run each lane again: auto (up to 256 MiB,
-    /// some 12,000 scenarios), always, never
+    /// some 150,000 scenarios), always, never
     #[arg(long, value_name = "WHEN", value_enum, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
@@ -107,7 +107,7 @@ impl KeepPlan {
     fn most_bytes(self) -> Option<u64> {
         match self {
             KeepPlan::Auto => Some(256 << 20),
-            KeepPlan::Always => Some(LARGEST_PLAN_BYTES),
+            KeepPlan::Always => Some(u64::MAX),
             KeepPlan::Never => None,
         }
     }
@@ -122,7 +122,8 @@ impl Study {
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
             let opened = self.backend.open()?;
-            let (study, run_sha256) = PlannedStudy::read(path)?;
+            let shard = self.shards.shard;
+            let (study, run_sha256) = PlannedStudy::read_some(path, |count| units_of(shard, count))?;
             if study.facts.reference {
                 self.backend.none_but("--reference")?;
             }
@@ -130,10 +131,20 @@ impl Study {
                 return self.forecast(&study, &opened, None);
             }
             if self.shards.is_part() {
-                let text = input_file::read(path, LARGEST_PLAN_BYTES)?;
-                leave_plan(&self.out, &text)?;
+                let (mut file, mut line) = (BufReader::new(input_file::open(path)?), Vec::new());
+                file.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+                leave_plan(&self.out, &line, file)?;
             }
             return self.sweep(&study, &opened, run_sha256, configured, Timings::default(), verbosity);
+        }
+        if self.shards.plan_only {
+            if self.reference {
+                self.backend.none_but("--reference")?;
+            }
+            let (study, _) = self.prepare(configured, verbosity)?;
+            leave_plan(&self.out, &study.seal()?.0, study.study.records()?)?;
+            self.format.print_plan(study.plan().lane_count(), &self.out.join(PLAN_FILE))?;
+            return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
@@ -141,19 +152,13 @@ impl Study {
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
         }
-        if self.shards.plan_only || self.shards.is_part() {
-            let (text, run_sha256) = study.seal()?;
-            leave_plan(&self.out, &text)?;
-            if self.shards.plan_only {
-                let path = self.out.join(PLAN_FILE);
-                let lanes = study.plan.lane_count();
-                self.format.print_plan(lanes, &path)?;
-                return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
-            }
+        if self.shards.is_part() {
+            let (line, run_sha256) = study.seal()?;
+            leave_plan(&self.out, &line, study.study.records()?)?;
             return self.sweep(&study, &opened, run_sha256, configured, timings, verbosity);
         }
         // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.
-        let run_sha256 = crate::sweep::sha256(&format!("{} reference {}", study.plan.hash(), study.facts.reference));
+        let run_sha256 = crate::sweep::sha256(&format!("{} reference {}", study.plan().hash(), study.facts.reference));
         self.sweep(&study, &opened, run_sha256, configured, timings, verbosity)
     }
 
@@ -176,11 +181,11 @@ impl Study {
         let mut timings = Timings::default();
         let collection = timed(&mut timings.mine_s, || source.load(&config.mining, verbosity))?;
         tracing::info!("{}", source::counts(&collection.scenarios));
-        let planned = timed(&mut timings.plan_s, || plan_study(&collection.scenarios, &profile, &options))?;
+        let planned = timed(&mut timings.plan_s, || outline_study(&collection.scenarios, &profile, &options))?;
         for left_out in &planned.left_out {
             tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
         }
-        if planned.plan.unit_count() == 0 {
+        if planned.study.outline().unit_count() == 0 {
             return Err(Error::input(
                 Place::item(source.describe()),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
@@ -201,16 +206,19 @@ impl Study {
             parameterization: config.parameterization,
             score: config.score,
         };
-        Ok((PlannedStudy { plan: planned.plan, facts }, timings))
+        Ok((PlannedStudy { study: planned.study, facts }, timings))
     }
 
     /// What the run would be.
     fn forecast(&self, study: &PlannedStudy, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
-        let plan = &study.plan;
+        let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let forecast =
-            forecast(plan, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(plan, &chunk).map(drop))?;
+        let some = study.study.thinned(WINDOW)?;
+        let mut forecast =
+            forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
+        forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
+        forecast.lanes = plan.lane_count();
         // The counts of every unit, in the ledger and joined; every draw's counts of every cell.
         let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
         let cell = size_of::<Confusion>() as u64;
@@ -242,11 +250,11 @@ impl Study {
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        let plan = &study.plan;
+        let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let recheck = opened.device().map(|_| Recheck::new(plan, study.facts.score.seed, ONE_IN));
-        let how = How { backend, fallback: opened.fallback(), recheck: recheck.as_ref() };
+        let recheck = opened.device().map(|_| study.facts.score.seed);
+        let how = How { backend, fallback: opened.fallback(), recheck };
         let desk =
             Desk { out: &self.out, run_sha256: &run_sha256, shard: self.shards.shard, unit_count: plan.unit_count() };
         if desk.is_done::<Partial>()? {
@@ -257,17 +265,17 @@ impl Study {
         let mut work = desk.begin::<Partial>(&[], true)?;
         let lanes = plan.first_lane_of(work.units.end) - plan.first_lane_of(work.units.start);
         tracing::info!("{lanes} lanes on {}", backend.describe());
-        let mut swept = timed(&mut timings.sweep_s, || run_units(plan, &mut work, &how, verbosity))?;
+        let mut swept = timed(&mut timings.sweep_s, || run_units(&study.study, &mut work, &how, verbosity))?;
         if self.shards.is_part() {
             desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;
             return Ok(Exit::Ok);
         }
-        let partial = work.ledger.counts(0..plan.unit_count())?.unwrap_or_else(|| Partial::empty(plan));
+        let partial = work.ledger.take()?.unwrap_or_else(|| Partial::empty(plan));
         if let Some(path) = &self.lanes {
             let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-            swept.add(&write_lanes(path, plan, &how, digits, study.facts.synthetic)?);
+            swept.add(&write_lanes(path, &study.study, &how, digits, study.facts.synthetic)?);
         }
-        let comparison = self.compare_reference.then(|| compare_reference(plan)).transpose()?;
+        let comparison = self.compare_reference.then(|| compare_reference(&study.study)).transpose()?;
         let host = Host {
             backend: match (how.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
@@ -287,7 +295,7 @@ impl Study {
     /// For `simulate --from`. Under the run's lock.
     fn leave_plan(&self, study: &PlannedStudy) -> Result<()> {
         let Some(most_bytes) = self.keep_plan.most_bytes() else { return Ok(()) };
-        if study.keep(&self.out.join(RUN_PLAN_FILE), most_bytes)?.is_none() {
+        if !study.keep(&self.out.join(RUN_PLAN_FILE), most_bytes)? {
             tracing::info!(
                 "the plan is not left in {}: it has more than {} MiB; --keep-plan always leaves it, for `simulate --from`",
                 self.out.display(),
@@ -325,7 +333,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 
 fn category_facts(
     collection: &Collection,
-    planned: &StudyPlan,
+    planned: &StudyOutline,
     options: &ParameterizationOptions,
 ) -> Result<Vec<CategoryFacts>> {
     let facts = |block: &crate::sweep::Block| {
@@ -338,5 +346,5 @@ fn category_facts(
         let parameters = parameter_histograms(block.category, &kept, options)?;
         Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes })
     };
-    planned.plan.blocks.iter().map(facts).collect()
+    planned.study.outline().blocks.iter().map(facts).collect()
 }

@@ -1,21 +1,22 @@
 //! What a study is once its data are mined: the plan, and what its report says beside the lanes' outcomes. Made from
 //! data or read from a plan file.
 
+use std::ops::Range;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::mining::{MiningOptions, RecordingSummary};
 use crate::parameterization::{ModeShape, ParameterizationOptions};
-use crate::parts::{read_sealed, seal, sealed_size, write_sealed};
+use crate::parts::{read_sealed_line, seal};
 use crate::report::distributions::ParameterHistogram;
 use crate::report::files::write_atomically_with;
 use crate::score::ScoreOptions;
-use crate::sweep::{LanePlan, PlanContent};
+use crate::sweep::{LanePlan, Study, StudyHead};
 use crate::{Place, Result};
 
-/// Largest plan that is read.
-pub(super) const LARGEST_PLAN_BYTES: u64 = 8 << 30;
+/// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
+const LARGEST_HEAD_BYTES: u64 = 1 << 30;
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "study plan";
 
@@ -50,54 +51,67 @@ pub(super) struct StudyFacts {
     pub score: ScoreOptions,
 }
 
+/// The first line of the file. The records of the scenarios follow it.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyPlanFile {
     facts: StudyFacts,
-    plan: PlanContent,
+    plan: StudyHead,
 }
 
 /// A study ready to be swept.
 pub(super) struct PlannedStudy {
-    pub plan: LanePlan,
+    pub study: Study,
     pub facts: StudyFacts,
 }
 
 impl PlannedStudy {
-    /// As the text of a plan file, with the hash of the run.
-    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
-        seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? })
+    /// The plan without cases: counts, keys, hash.
+    pub fn plan(&self) -> &LanePlan {
+        self.study.outline()
     }
 
-    /// Writes the plan file, unless it would be larger; gives its size where it was written.
+    /// The first line of the plan file, with the hash of the run. The line holds the checksums of all that follows.
+    pub fn seal(&self) -> Result<(Vec<u8>, String)> {
+        seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.study.head().clone() })
+    }
+
+    /// Writes the plan file, unless it would be larger than so many bytes; tells whether it did.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn keep(&self, path: &Path, most_bytes: u64) -> Result<Option<u64>> {
-        let content = StudyPlanFile { facts: self.facts.clone(), plan: PlanContent::of(&self.plan)? };
-        let Some((bytes, sha256)) = sealed_size(KIND, &content, most_bytes)? else { return Ok(None) };
-        write_atomically_with(path, |out| write_sealed(out, KIND, &content, &sha256))?;
-        Ok(Some(bytes))
+    pub fn keep(&self, path: &Path, most_bytes: u64) -> Result<bool> {
+        let (head, records) = (self.seal()?.0, self.study.records()?);
+        if (head.len() + records.len()) as u64 > most_bytes {
+            return Ok(false);
+        }
+        write_atomically_with(path, |out| out.write_all(&head).and_then(|()| out.write_all(records)))?;
+        Ok(true)
     }
 
     /// From a plan file, with the hash of the run.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; [`crate::Error::Input`] for anything but a whole plan of this version.
+    /// [`crate::Error::Io`]; [`crate::Error::Input`] for anything but a whole plan of this version and engine.
     pub fn read(path: &Path) -> Result<(PlannedStudy, String)> {
-        let (file, run_sha256) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
-        Ok((PlannedStudy::of(file, &Place::file(path))?, run_sha256))
+        PlannedStudy::read_some(path, |count| 0..count)
     }
 
-    fn of(file: StudyPlanFile, place: &Place) -> Result<PlannedStudy> {
+    /// The same with some of its scenarios only, of so many: nothing else of the file is read.
+    ///
+    /// # Errors
+    /// As [`PlannedStudy::read`].
+    pub fn read_some(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<(PlannedStudy, String)> {
+        let (file, run_sha256, mut records) = read_sealed_line(KIND, path, LARGEST_HEAD_BYTES, AGAIN)?;
         let StudyPlanFile { facts, plan } = file;
+        let place = Place::file(path);
         facts.score.validate()?;
-        let plan = plan.into_plan(place)?;
-        if facts.categories.len() != plan.blocks.len() {
+        let study = plan.read(&mut records, &place, wanted)?;
+        if facts.categories.len() != study.outline().blocks.len() {
             let problem = "it does not have the facts of every category";
-            return Err(crate::Error::input(place.clone(), problem, AGAIN));
+            return Err(crate::Error::input(place, problem, AGAIN));
         }
-        Ok(PlannedStudy { plan, facts })
+        Ok((PlannedStudy { study, facts }, run_sha256))
     }
 }
 

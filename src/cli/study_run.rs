@@ -1,5 +1,6 @@
 //! The lanes of a study: swept, checked, counted; then the report.
 
+use std::ops::Range;
 use std::path::Path;
 
 use super::Exit;
@@ -15,21 +16,46 @@ use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
 use crate::score::{ScoreTable, f1, judge_claims, score};
 use crate::sweep::{
-    Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Wanted, chunks, sweep,
+    Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, Study, SweepOptions, SweepSummary,
+    Wanted, chunks, sweep,
 };
 use crate::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Result, interrupt};
+
+/// Scenarios whose cases are held at once, with some 25 kB each.
+pub(super) const WINDOW: u64 = 2048;
+/// The same for a device, which wants many lanes at once.
+const DEVICE_WINDOW: u64 = 16_384;
 
 /// Who computes the lanes, who stands in, who checks.
 pub(super) struct How<'a> {
     pub backend: &'a dyn Backend,
     pub fallback: Option<&'a dyn Backend>,
-    pub recheck: Option<&'a Recheck<'a>>,
+    /// Seed of the lanes that are checked.
+    pub recheck: Option<u64>,
 }
 
 impl How<'_> {
-    fn options(&self, wanted: Wanted) -> SweepOptions<'_> {
-        SweepOptions { wanted, fallback: self.fallback, recheck: self.recheck }
+    fn window(&self) -> u64 {
+        if self.recheck.is_some() { DEVICE_WINDOW } else { WINDOW }
+    }
+
+    /// Sweeps an interval, window by window; chunks come with the plan of their window.
+    fn sweep(
+        &self,
+        study: &Study,
+        units: Range<u64>,
+        wanted: Wanted,
+        mut each: impl FnMut(&LanePlan, Chunk) -> Result<()>,
+    ) -> Result<SweepSummary> {
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        study.in_windows(units, self.window(), |plan, units| {
+            let recheck = self.recheck.map(|seed| Recheck::new(plan, seed, ONE_IN));
+            let options = SweepOptions { wanted, fallback: self.fallback, recheck: recheck.as_ref() };
+            summary.add(&sweep(plan, units, self.backend, &options, |chunk| each(plan, chunk))?);
+            Ok(())
+        })?;
+        Ok(summary)
     }
 }
 
@@ -37,7 +63,9 @@ impl How<'_> {
 pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
-    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &how.options(Wanted::Verdicts), |chunk| {
+    let recheck = how.recheck.map(|seed| Recheck::new(plan, seed, ONE_IN));
+    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
+    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
@@ -48,7 +76,7 @@ pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Resu
 
 /// The lanes of an interval of units that are not counted yet.
 pub(super) fn run_units(
-    plan: &LanePlan,
+    study: &Study,
     work: &mut Work<Partial>,
     how: &How,
     verbosity: Verbosity,
@@ -59,7 +87,7 @@ pub(super) fn run_units(
     let bar = console::progress(verbosity, left, "sweeping");
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     for range in missing {
-        let part = sweep(plan, range, how.backend, &how.options(Wanted::Verdicts), |chunk| {
+        let part = how.sweep(study, range, Wanted::Verdicts, |plan, chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             work.ledger.add(Partial::from_chunk(plan, &chunk)?)
         })?;
@@ -70,21 +98,24 @@ pub(super) fn run_units(
 }
 
 /// Every lane in f32 and in f64, chunk by chunk.
-pub(super) fn compare_reference(plan: &LanePlan) -> Result<ReferenceComparison> {
+pub(super) fn compare_reference(study: &Study) -> Result<ReferenceComparison> {
     let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
-    let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
     let mut comparison = ReferenceComparison::default();
-    for units in chunks(plan, 0..plan.unit_count()) {
-        let reference = wide.run(units.clone(), Wanted::Outcomes)?;
-        comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
-    }
+    study.in_windows(0..study.outline().unit_count(), WINDOW, |plan, window| {
+        let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
+        for units in chunks(plan, window) {
+            let reference = wide.run(units.clone(), Wanted::Outcomes)?;
+            comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
+        }
+        Ok(())
+    })?;
     Ok(comparison)
 }
 
 /// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
 pub(super) fn write_lanes(
     path: &Path,
-    plan: &LanePlan,
+    study: &Study,
     how: &How,
     digits: Digits,
     synthetic: bool,
@@ -92,6 +123,7 @@ pub(super) fn write_lanes(
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         make_folder(dir)?;
     }
+    let plan = study.outline();
     let facts = TableFacts {
         table: "lanes",
         profile: Some(plan.profile.name.clone()),
@@ -99,9 +131,9 @@ pub(super) fn write_lanes(
         synthetic,
     };
     let mut table = TableWriter::create(path, lane_format(path)?, lanes::columns(digits), &facts)?;
-    let options = how.options(Wanted::Outcomes);
-    let swept =
-        sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| lanes::write_chunk(&mut table, plan, &chunk))?;
+    let swept = how.sweep(study, 0..plan.unit_count(), Wanted::Outcomes, |plan, chunk| {
+        lanes::write_chunk(&mut table, plan, &chunk)
+    })?;
     table.finish()?;
     Ok(swept)
 }
@@ -130,12 +162,13 @@ pub(super) fn finish_study(
     out: &Path,
     format: FormatFlag,
 ) -> Result<Exit> {
-    let (plan, facts) = (&study.plan, study.facts.clone());
+    let (plan, facts) = (study.plan(), study.facts.clone());
     let started = std::time::Instant::now();
     let scores = score(plan, partial, &facts.score)?;
     host.timings.score_s = started.elapsed().as_secs_f64();
     let run = RunRecord {
         program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        engine: ENGINE_VERSION,
         data: facts.data,
         synthetic: facts.synthetic,
         backend: host.backend,
@@ -177,7 +210,7 @@ pub(super) fn finish_study(
 }
 
 fn category_records(study: &PlannedStudy, scores: &ScoreTable) -> Vec<CategoryRecord> {
-    let plan = &study.plan;
+    let plan = study.plan();
     let record = |(block, of): (&crate::sweep::Block, &super::study_plan::CategoryFacts)| {
         let scored = scores.categories.iter().find(|c| c.category == block.category);
         let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);

@@ -86,7 +86,7 @@ impl<'p> GpuSession<'p> {
         let mut cases = None;
         if !inside {
             let room = self.prepared.most_cases / variants;
-            let end = (units.start + room).min(plan.blocks[block].units.len());
+            let end = (units.start + room).min(plan.blocks[block].units.held().end);
             // Not beyond what is asked for: a generator's samples have no natural end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };
             let is_cut_out = plan.blocks[block].category == Category::CutOut;

@@ -11,7 +11,8 @@ use crate::vector_state::clear_upper_halves;
 use crate::{Error, Place, Result};
 
 /// A fitted decomposition.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SvdBasis {
     /// Weight of each column of z; > 0.
     pub weights: Vec<f64>,

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::lock::is_named;
-use crate::sweep::hex;
+use crate::sweep::{ENGINE_VERSION, hex};
 use crate::{Error, Place, Result};
 
 /// Records are not written more often.
@@ -29,6 +29,7 @@ const CHECKSUM: usize = 64;
 #[serde(deny_unknown_fields)]
 struct Head {
     lanesweep_journal: u64,
+    engine: u64,
     run_sha256: String,
     units: Range<u64>,
 }
@@ -57,7 +58,8 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] where the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
-        let head = Head { lanesweep_journal: 1, run_sha256: run_sha256.to_owned(), units };
+        let engine = ENGINE_VERSION;
+        let head = Head { lanesweep_journal: 2, engine, run_sha256: run_sha256.to_owned(), units };
         let due = Instant::now() + SHORTEST_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
@@ -92,9 +94,20 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         for line in text.split_inclusive(|&byte| byte == b'\n') {
             let Some(body) = checked(line) else { break };
             if whole == 0 {
-                let Ok(head) = serde_json::from_slice::<Head>(body) else { break };
+                let help = "move it away, or finish that run first: give the command that it was begun with";
+                let Ok(head) = serde_json::from_slice::<Head>(body) else {
+                    let problem = "this journal is of another version of lanesweep";
+                    return Err(Error::input(Place::file(&self.path), problem, help));
+                };
+                if head.engine != self.head.engine {
+                    let problem = format!(
+                        "this journal is of engine {}, this program has engine {ENGINE_VERSION}: their lanes differ, \
+                         and are never mixed",
+                        head.engine
+                    );
+                    return Err(Error::input(Place::file(&self.path), problem, help));
+                }
                 if head != self.head {
-                    let help = "move it away, or finish that run first: give the command that it was begun with";
                     let problem = "this journal belongs to another run or another interval of it";
                     return Err(Error::input(Place::file(&self.path), problem, help));
                 }

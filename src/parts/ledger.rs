@@ -53,17 +53,22 @@ impl<T: Countable> Ledger<T> {
     /// Takes over what a journal holds and writes on in it. Returns the number of units that need not be computed.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the records do not fit the interval: they have whole checksums.
+    /// [`Error::Input`] where a record's counts cannot be, or fit no segment of the interval: its checksum is whole all
+    /// the same.
     pub fn resume(&mut self, journal: Journal<T>, found: Records<T>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
         }
         for record in found.records {
-            let refused = |problem| {
+            let refused = |problem: String| {
                 let help = "move the journal away; what it holds is then computed again";
                 Error::input(Place::file(journal.path()), format!("its counts cannot be: {problem}"), help)
             };
             record.check().map_err(refused)?;
+            let covered = record.covered();
+            if !covered.is_empty() && self.segment_holding(&covered).is_none() {
+                return Err(refused(format!("units {covered:?} fit no segment of {:?}", self.units)));
+            }
             self.place(record)?;
         }
         self.journal = Some(journal);
@@ -74,13 +79,21 @@ impl<T: Countable> Ledger<T> {
         self.ends.partition_point(|end| *end <= unit)
     }
 
+    /// The one segment that holds all of these intervals.
+    fn segment_holding(&self, covered: &[Range<u64>]) -> Option<usize> {
+        let (first, last) = (covered.first()?, covered.last()?);
+        let segment = self.segment_of(first.start);
+        (first.start >= self.units.start && last.end <= *self.ends.get(segment)?).then_some(segment)
+    }
+
     fn place(&mut self, counts: T) -> Result<()> {
         let covered = counts.covered();
-        let (Some(first), Some(last)) = (covered.first(), covered.last()) else { return Ok(()) };
-        let segment = self.segment_of(first.start);
-        if first.start < self.units.start || self.ends.get(segment).is_none_or(|end| last.end > *end) {
-            return Err(Error::Internal(format!("units {covered:?} do not fit a segment of {:?}", self.units)));
+        if covered.is_empty() {
+            return Ok(());
         }
+        let Some(segment) = self.segment_holding(&covered) else {
+            return Err(Error::Internal(format!("units {covered:?} do not fit a segment of {:?}", self.units)));
+        };
         let slot = &mut self.segments[segment];
         *slot = Some(match slot.take() {
             Some(before) => before.join(counts)?,
@@ -201,6 +214,18 @@ impl<T: Countable> Ledger<T> {
         Ok(joined)
     }
 
+    /// The counts of all segments, joined; nothing is counted afterwards, so that no count is held twice.
+    ///
+    /// # Errors
+    /// Of [`Countable::join`].
+    pub fn take(&mut self) -> Result<Option<T>> {
+        self.settle()?;
+        self.unwritten.clear();
+        let mut all = self.segments.iter_mut().filter_map(Option::take);
+        let Some(first) = all.next() else { return Ok(None) };
+        all.try_fold(first, T::join).map(Some)
+    }
+
     /// Everything counted, segment by segment, and the journal, to be removed once the result stands.
     ///
     /// # Errors
@@ -265,6 +290,16 @@ mod tests {
             ledger.add(units(range)).unwrap();
         }
         assert_eq!(ledger.counts(10..40).unwrap(), Some(units(10..40)));
+        // A record that is whole but of other units, or of two segments: the file's fault.
+        for strange in [units(15..25), units(0..11), units(99..101)] {
+            let path = dir.path().join("strange");
+            let (mut journal, _) = Journal::open(&path, "run", 10..100).unwrap();
+            journal.append(&[strange]).unwrap();
+            let (journal, found) = Journal::open(&path, "run", 10..100).unwrap();
+            let error = Ledger::new(10..100, &[20, 40]).resume(journal, found).unwrap_err();
+            assert!(matches!(error, Error::Input { .. }) && error.to_string().contains("no segment"), "{error}");
+            std::fs::remove_file(path).unwrap();
+        }
         let (segments, journal) = ledger.finish().unwrap();
         assert_eq!(segments, [units(10..20), units(20..40), units(40..100)]);
         journal.unwrap().remove().unwrap();

@@ -16,5 +16,5 @@ pub use folder::{Found, collect};
 pub use journal::{Journal, Records};
 pub use ledger::{Countable, Ledger};
 pub use part::{Part, read_part, write_part};
-pub use sealed::{ContentSha256, kind_of, read_sealed, seal, sealed_size, unseal, write_sealed};
+pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};
 pub use shard::Shard;

@@ -1,6 +1,7 @@
 //! JSON with kind, version and checksum around it: whole and unchanged, or refused.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -8,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
 
-use crate::sweep::hex;
+use crate::sweep::{ENGINE_VERSION, hex};
 use crate::{Error, Place, Result};
 
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,10 +20,18 @@ struct Sealed<'a> {
     /// What the content is: `part`, `plan`.
     lanesweep: String,
     version: u64,
-    /// SHA-256 of the content's bytes, in hexadecimal.
+    /// [`ENGINE_VERSION`] of the program that wrote it.
+    engine: u64,
+    /// SHA-256 of kind, version, engine and the content's bytes, in hexadecimal.
     sha256: String,
     #[serde(borrow)]
     content: &'a RawValue,
+}
+
+/// A checksum detects damage. It is no signature: whoever changes a file can make its checksum anew.
+fn checksum(kind: &str, content: &RawValue) -> String {
+    let digest = Sha256::new().chain_update(format!("{kind} {VERSION} {ENGINE_VERSION}\n"));
+    hex(&digest.chain_update(content.get()).finalize())
 }
 
 /// The text of a sealed file, with its content's hash.
@@ -32,79 +41,16 @@ struct Sealed<'a> {
 pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> {
     let unwritable = |e: serde_json::Error| unwritable(kind, &e);
     let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
-    let sha256 = hex(&Sha256::digest(content.get()));
-    let sealed = Sealed { lanesweep: kind.to_owned(), version: VERSION, sha256, content: &content };
+    let sha256 = checksum(kind, &content);
+    let (lanesweep, engine) = (kind.to_owned(), ENGINE_VERSION);
+    let sealed = Sealed { lanesweep, version: VERSION, engine, sha256, content: &content };
     let mut text = serde_json::to_vec(&sealed).map_err(unwritable)?;
     text.push(b'\n');
     Ok((text, sealed.sha256))
 }
 
-/// What a sealed file of this content would be: its size in bytes; `None` above `most_bytes`, which is found out early.
-/// No text is kept: for content too large to be held twice.
-///
-/// # Errors
-/// None for what this program makes.
-pub fn sealed_size<T: Serialize>(kind: &str, content: &T, most_bytes: u64) -> Result<Option<(u64, ContentSha256)>> {
-    let mut measure = Measure { digest: Sha256::new(), bytes: 0, most_bytes };
-    match serde_json::to_writer(&mut measure, content) {
-        Ok(()) => {
-            let sha256 = hex(&measure.digest.finalize());
-            let around = head(kind, &sha256)?.len() + TAIL.len();
-            let bytes = measure.bytes + around as u64;
-            Ok((bytes <= most_bytes).then_some((bytes, ContentSha256(sha256))))
-        }
-        Err(_) if measure.bytes > most_bytes => Ok(None),
-        Err(e) => Err(unwritable(kind, &e)),
-    }
-}
-
-/// Writes the same bytes as [`seal`] gives, content whose checksum [`sealed_size`] has found.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write_sealed<T: Serialize>(
-    out: &mut dyn Write,
-    kind: &str,
-    content: &T,
-    sha256: &ContentSha256,
-) -> std::io::Result<()> {
-    out.write_all(head(kind, &sha256.0).map_err(std::io::Error::other)?.as_bytes())?;
-    serde_json::to_writer(&mut *out, content)?;
-    out.write_all(TAIL)
-}
-
-/// Checksum of a sealed file's content, in hexadecimal.
-pub struct ContentSha256(String);
-
-const TAIL: &[u8] = b"}\n";
-
-/// A sealed file up to its content.
-fn head(kind: &str, sha256: &str) -> Result<String> {
-    let kind = serde_json::to_string(kind).map_err(|e| unwritable(kind, &e))?;
-    Ok(format!("{{\"lanesweep\":{kind},\"version\":{VERSION},\"sha256\":\"{sha256}\",\"content\":"))
-}
-
 fn unwritable(kind: &str, e: &serde_json::Error) -> Error {
     Error::Internal(format!("a {kind} cannot be written: {e}"))
-}
-
-/// Hashes and counts what is written, up to a limit.
-struct Measure {
-    digest: Sha256,
-    bytes: u64,
-    most_bytes: u64,
-}
-
-impl Write for Measure {
-    fn write(&mut self, part: &[u8]) -> std::io::Result<usize> {
-        self.digest.update(part);
-        self.bytes += part.len() as u64;
-        if self.bytes > self.most_bytes { Err(std::io::Error::other("too large")) } else { Ok(part.len()) }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
 }
 
 /// The content of a sealed text with its checksum. `again` says how such a file is made.
@@ -113,14 +59,16 @@ impl Write for Measure {
 /// [`Error::Input`] for another kind or version, or anything but the bytes that were written.
 pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again: &str) -> Result<(T, String)> {
     let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    if let Some(head) = head_of(text).filter(|head| head.kind == kind) {
+        head.check().map_err(wrong)?;
+    }
     let sealed: Sealed = serde_json::from_slice(text).map_err(|e| wrong(format!("this is no whole {kind}: {e}")))?;
     if sealed.lanesweep != kind {
         return Err(wrong(format!("this is a `{}`, where a `{kind}` is needed", sealed.lanesweep)));
     }
-    if sealed.version != VERSION {
-        return Err(wrong(format!("its version is {}, this program reads {VERSION}", sealed.version)));
-    }
-    if hex(&Sha256::digest(sealed.content.get())) != sealed.sha256 {
+    let head = Head { kind: sealed.lanesweep, version: sealed.version, engine: Some(sealed.engine) };
+    head.check().map_err(wrong)?;
+    if checksum(kind, sealed.content) != sealed.sha256 {
         return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
     }
     let content = serde_json::from_str(sealed.content.get())
@@ -136,21 +84,83 @@ pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, most_bytes: u64
     unseal(kind, &crate::input_file::read(path, most_bytes)?, &Place::file(path), again)
 }
 
+/// What a sealed file calls itself before its content.
+struct Head {
+    kind: String,
+    version: u64,
+    /// None before version 2.
+    engine: Option<u64>,
+}
+
+impl Head {
+    /// Whether this program may use the file.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.version != VERSION {
+            return Err(format!("its version is {}, this program reads {VERSION}", self.version));
+        }
+        match self.engine {
+            Some(ENGINE_VERSION) => Ok(()),
+            Some(engine) => Err(format!(
+                "it is of engine {engine}, this program has engine {ENGINE_VERSION}: their lanes differ, and are never \
+                 mixed"
+            )),
+            None => Err("it does not tell its engine".to_owned()),
+        }
+    }
+}
+
+/// The beginning of a sealed file, as [`seal`] writes it.
+fn head_of(text: &[u8]) -> Option<Head> {
+    fn number<'a>(rest: &'a str, before: &str) -> Option<(u64, &'a str)> {
+        let rest = rest.strip_prefix(before)?;
+        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+        Some((rest[..digits].parse().ok()?, &rest[digits..]))
+    }
+    let text = String::from_utf8_lossy(&text[..text.len().min(LONGEST_HEAD)]);
+    let (kind, rest) = text.strip_prefix("{\"lanesweep\":\"")?.split_once('"')?;
+    let (version, rest) = number(rest, ",\"version\":")?;
+    let engine = number(rest, ",\"engine\":").map(|(engine, _)| engine);
+    Some(Head { kind: kind.to_owned(), version, engine })
+}
+
+/// Bytes in which a sealed file tells its kind and versions.
+const LONGEST_HEAD: usize = 256;
+
+/// Reads the first line of a sealed file, behind which more may come: that is left in the reader.
+///
+/// # Errors
+/// [`Error::Io`]; as [`unseal`].
+pub fn read_sealed_line<T: DeserializeOwned>(
+    kind: &str,
+    path: &Path,
+    most_bytes: u64,
+    again: &str,
+) -> Result<(T, String, BufReader<File>)> {
+    let mut file = BufReader::new(crate::input_file::open(path)?);
+    let io = |e| Error::io(path, "read", e);
+    let wrong = |problem: String| Error::input(Place::file(path), problem, again);
+    // Of another version all may be one line.
+    if let Some(head) = head_of(file.fill_buf().map_err(io)?).filter(|head| head.kind == kind) {
+        head.check().map_err(wrong)?;
+    }
+    let mut line = Vec::new();
+    file.by_ref().take(most_bytes).read_until(b'\n', &mut line).map_err(io)?;
+    let (content, sha256) = unseal(kind, &line, &Place::file(path), again)?;
+    Ok((content, sha256, file))
+}
+
 /// The kind of a sealed file, without reading its content.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for what is not sealed.
-pub fn kind_of(path: &Path, most_bytes: u64) -> Result<String> {
-    #[derive(Deserialize)]
-    struct Kind {
-        lanesweep: String,
-    }
-    let wrong = |problem: String| {
-        Error::input(Place::file(path), problem, "give a file or folder that a run in parts has written")
-    };
-    let kind: Kind = serde_json::from_slice(&crate::input_file::read(path, most_bytes)?)
-        .map_err(|e| wrong(format!("this is no whole file of a run in parts: {e}")))?;
-    Ok(kind.lanesweep)
+pub fn kind_of(path: &Path) -> Result<String> {
+    let mut text = Vec::new();
+    let file = crate::input_file::open(path)?;
+    file.take(LONGEST_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
+    head_of(&text).map(|head| head.kind).ok_or_else(|| {
+        let help = "give a file or folder that a run in parts has written";
+        Error::input(Place::file(path), "this is no whole file of a run in parts", help)
+    })
 }
 
 #[cfg(test)]
@@ -158,16 +168,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sealed_file_that_is_written_without_being_held_has_the_same_bytes() {
-        let content = vec![1.5_f64, 0.1, 3.0];
-        let (text, _) = seal("part", &content).unwrap();
-        let (bytes, sha256) = sealed_size("part", &content, text.len() as u64).unwrap().unwrap();
-        let mut written = Vec::new();
-        write_sealed(&mut written, "part", &content, &sha256).unwrap();
-        assert_eq!((written, bytes), (text.clone(), text.len() as u64));
-        for most in [0, 3, text.len() as u64 - 1] {
-            assert!(sealed_size("part", &content, most).unwrap().is_none(), "{most}");
-        }
+    fn a_file_of_another_engine_or_version_is_refused_by_its_number() {
+        let (text, sha256) = seal("part", &vec![1.5_f64]).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let told = |from: &str, to: &str| {
+            assert!(text.contains(from), "{text}");
+            let changed = text.replace(from, to);
+            unseal::<Vec<f64>>("part", changed.as_bytes(), &Place::item("here"), "").unwrap_err().to_string()
+        };
+        let engine = format!("\"engine\":{ENGINE_VERSION}");
+        let other = told(&engine, "\"engine\":999");
+        assert!(other.contains(&format!("of engine 999, this program has engine {ENGINE_VERSION}")), "{other}");
+        assert!(told(&format!("\"version\":{VERSION},{engine}"), "\"version\":1").contains("its version is 1"));
+        // The number alone does not pass for another one: it is in the checksum.
+        let of_other = hex(&Sha256::digest(format!("part {VERSION} {}\n[1.5]", ENGINE_VERSION + 1)));
+        assert!(told(&sha256, &of_other).contains("checksum"));
     }
 
     #[test]

@@ -97,6 +97,8 @@ pub struct SettingRecord {
 pub struct RunRecord {
     /// Program and version.
     pub program: String,
+    /// [`ENGINE_VERSION`](crate::sweep::ENGINE_VERSION) of the program: what the bits of its lanes are.
+    pub engine: u64,
     /// What was swept, in one line.
     pub data: String,
     /// Nothing here was measured on real traffic.

@@ -13,7 +13,7 @@ use crate::profile::Profile;
 use crate::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::sweep::generated::ATTEMPTS;
-use crate::sweep::{Headway, LanePlan};
+use crate::sweep::{ENGINE_VERSION, Headway, LanePlan};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -146,6 +146,8 @@ pub struct EstimateFile {
     pub lanesweep_estimate: u64,
     /// Program and version.
     pub program: String,
+    /// [`ENGINE_VERSION`] of the program: what the bits of its lanes are.
+    pub engine: u64,
     /// Estimator: `mc`, `is`, `ce`, `subset`.
     pub estimator: &'static str,
     /// The density sampled.
@@ -211,6 +213,7 @@ impl EstimateFile {
         EstimateFile {
             lanesweep_estimate: 1,
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            engine: ENGINE_VERSION,
             estimator: facts.estimator,
             density,
             profile: facts.profile,

@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Scenario>> {
         if text.is_empty() {
             continue;
         }
-        let scenario: Scenario = serde_json::from_str(text).map_err(|e| explain(&place, text, &e))?;
+        let mut scenario: Scenario = serde_json::from_str(text).map_err(|e| explain(&place, text, &e))?;
         check(&scenario).map_err(|p| p.at(place.clone().of(name(&scenario.id))))?;
         if let Some(first) = line_of.insert(scenario.id.clone(), row) {
             return Err(Error::input(
@@ -49,6 +49,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<Scenario>> {
                 format!("this id is that of line {first} too, but every scenario needs its own"),
                 "remove one of the two lines or rename one scenario",
             ));
+        }
+        // They grew by doubling, and thousands stay.
+        for other in std::iter::once(&mut scenario.target).chain(&mut scenario.lead) {
+            other.v.shrink_to_fit();
+            other.y.shrink_to_fit();
         }
         scenarios.push(scenario);
     }
@@ -150,6 +155,11 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
         });
     }
     Ok(())
+}
+
+/// What no reader of scenarios would accept, as a sentence.
+pub(crate) fn problem_of(scenario: &Scenario) -> Option<String> {
+    check(scenario).err().map(|p| format!("`{}` {}", p.field, p.problem))
 }
 
 fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result<(), Problem> {

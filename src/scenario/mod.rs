@@ -21,6 +21,7 @@ pub use case::{Ahead, Case, Participant};
 pub use case_parameters::CaseParameters;
 pub(crate) use case_parameters::{at_least, needed};
 pub use file::{check_scenario_file, read_scenarios, write_scenarios, write_scenarios_of};
+pub(crate) use jsonl::problem_of;
 pub use jsonl::write_scenarios_to;
 pub use mined::{Category, Ego, Other, Scenario, Side};
 pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};

@@ -15,6 +15,7 @@ use crate::scenario::{Category, Tables};
 use crate::sweep::frame::Start;
 use crate::{Error, Place, Result};
 
+use super::engine::Canonical;
 use super::generated::Generator;
 use super::lane_case::LaneCase;
 use super::units::Units;
@@ -126,6 +127,20 @@ impl LanePlan {
         profile: Profile,
         models: Vec<ModelId>,
         headways: Vec<Headway>,
+        blocks: Vec<Block>,
+        source: Box<dyn CaseSource>,
+    ) -> Result<LanePlan> {
+        let mut plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks, source)?;
+        plan.hash = plan.content_hash()?;
+        Ok(plan)
+    }
+
+    /// A plan whose hash is that of what its cases follow from.
+    pub(super) fn with_hash(
+        hash: String,
+        profile: Profile,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
         mut blocks: Vec<Block>,
         source: Box<dyn CaseSource>,
     ) -> Result<LanePlan> {
@@ -137,7 +152,7 @@ impl LanePlan {
         for block in &mut blocks {
             block.first_unit = unit;
             block.first_lane = lane;
-            unit += block.units.len();
+            unit = unit.saturating_add(block.units.len());
             let per_unit = (block.variants.len() * headways.len() * models.len()) as u64;
             let lanes = block.units.len().checked_mul(per_unit).and_then(|lanes| lane.checked_add(lanes));
             lane = lanes.filter(|&lanes| lanes < 1 << 63).ok_or_else(|| {
@@ -145,9 +160,20 @@ impl LanePlan {
                 Error::usage(Place::default(), problem, "sweep fewer at once: 2^63 lanes at most")
             })?;
         }
-        let mut plan = LanePlan { profile, models, headways, blocks, source, hash: String::new() };
-        plan.hash = plan.content_hash();
-        Ok(plan)
+        Ok(LanePlan { profile, models, headways, blocks, source, hash })
+    }
+
+    /// The same plan with the cases of some units only: those held of each block, and their cases.
+    pub(super) fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
+        let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
+        LanePlan {
+            profile: self.profile.clone(),
+            models: self.models.clone(),
+            headways: self.headways.clone(),
+            blocks: blocks.collect(),
+            source,
+            hash: self.hash.clone(),
+        }
     }
 
     /// The case of a unit's variant.
@@ -275,36 +301,27 @@ impl LanePlan {
         })
     }
 
-    fn content_hash(&self) -> String {
-        let mut digest = Sha256::new();
-        let mut text = |part: &str| {
-            digest.update((part.len() as u64).to_le_bytes());
-            digest.update(part.as_bytes());
-        };
-        text("lanesweep plan 1");
-        // Debug of f64 is the shortest text that reads back to the same bits.
-        text(&format!("{:?}", self.profile));
-        text(&format!("{:?}", self.models));
-        text(&format!("{:?}", self.headways));
+    fn content_hash(&self) -> Result<String> {
+        let mut canonical = Canonical::new("plan");
+        canonical.value(&(&self.profile, &self.models, &self.headways))?;
         for block in &self.blocks {
-            text(&format!("{block:?}"));
-        }
-        if let Some(generator) = self.generator() {
-            text(&format!("{generator:?}"));
-            return hex(&digest.finalize());
-        }
-        let tables = self.tables();
-        for value in tables.speed.iter().chain(tables.lateral.iter().flatten()) {
-            digest.update(value.to_bits().to_le_bytes());
-        }
-        for (at, block) in self.blocks.iter().enumerate() {
-            for unit in 0..block.units.len() {
-                for variant in 0..block.variants.len() {
-                    digest.update(format!("{:?}", self.case(at, unit, variant)).as_bytes());
-                }
+            canonical.value(&(block.category, &block.variants))?;
+            canonical.word(block.units.len());
+            if !matches!(block.units, Units::Numbered(_)) {
+                (0..block.units.len()).for_each(|unit| canonical.text(&block.units.name(unit)));
             }
         }
-        hex(&digest.finalize())
+        if let Some(generator) = self.generator() {
+            canonical.generator(generator);
+            return Ok(canonical.finish());
+        }
+        canonical.tables(self.tables());
+        for (at, block) in self.blocks.iter().enumerate() {
+            for unit in 0..block.units.len() {
+                (0..block.variants.len()).for_each(|variant| canonical.case(&self.case(at, unit, variant)));
+            }
+        }
+        Ok(canonical.finish())
     }
 }
 

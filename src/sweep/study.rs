@@ -1,11 +1,19 @@
-//! The study's case source: a table of every scenario's S and S', made once on the host.
+//! A study: scenarios and decompositions, from which the host makes every S and S', all at once or window by window.
+
+use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::lane_case::LaneCase;
 use super::plan::{Block, CaseSource, Headway, LanePlan};
+use super::plan_file::{BlockHead, StudyHead};
+use super::unit_record;
+use super::units::Units;
 use crate::driver::ModelId;
-use crate::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdFit, recorded_case};
+use crate::parameterization::{
+    Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdFit, recorded_case, vehicle_ahead,
+};
 use crate::profile::Profile;
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
@@ -36,7 +44,7 @@ impl Default for StudyOptions {
 
 /// A plan with what could not be planned and why (too few scenarios for a decomposition, for instance).
 pub struct StudyPlan {
-    /// The plan.
+    /// The plan, with every case.
     pub plan: LanePlan,
     /// The decompositions, one per category that has one.
     pub reductions: Vec<Reduction>,
@@ -44,16 +52,68 @@ pub struct StudyPlan {
     pub left_out: Vec<Error>,
 }
 
+/// A study as [`StudyPlan`] has it, without its cases.
+pub struct StudyOutline {
+    /// The study.
+    pub study: Study,
+    /// The decompositions, one per category that has one.
+    pub reductions: Vec<Reduction>,
+    /// Parts that were left out, with the reason.
+    pub left_out: Vec<Error>,
+}
+
+/// A study, or an interval of its scenarios: what its cases follow from, in 1 to 2 kB per scenario. Cases, ten times as
+/// large, are made for a window of scenarios at a time.
+pub struct Study {
+    pub(super) head: StudyHead,
+    pub(super) outline: LanePlan,
+    /// One per block.
+    pub(super) reductions: Vec<Option<Reduction>>,
+    pub(super) held: Records,
+}
+
+/// Records of consecutive units.
+#[derive(Default)]
+pub(super) struct Records {
+    /// Unit of the first one.
+    pub first: u64,
+    pub bytes: Vec<u8>,
+    /// Where each one ends.
+    pub ends: Vec<usize>,
+}
+
+impl Records {
+    /// Appends the record of the next unit.
+    pub fn push(&mut self, record: &[u8]) {
+        self.bytes.extend_from_slice(record);
+        self.ends.push(self.bytes.len());
+    }
+
+    pub fn get(&self, unit: u64) -> Option<&[u8]> {
+        let at = usize::try_from(unit.checked_sub(self.first)?).ok()?;
+        let end = *self.ends.get(at)?;
+        Some(&self.bytes[at.checked_sub(1).map_or(0, |before| self.ends[before])..end])
+    }
+
+    /// The units.
+    pub fn units(&self) -> Range<u64> {
+        self.first..self.first + self.ends.len() as u64
+    }
+}
+
+/// Cases of a window of units.
 struct CaseTable {
     tables: Tables<f64>,
     /// Per block: unit-major, variant-minor.
     cases: Vec<Vec<LaneCase<f64>>>,
+    /// Per block: the unit of the first case.
+    first: Vec<u64>,
     variants: Vec<usize>,
 }
 
 impl CaseSource for CaseTable {
     fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.cases[block][unit as usize * self.variants[block] + variant]
+        self.cases[block][(unit - self.first[block]) as usize * self.variants[block] + variant]
     }
 
     fn tables(&self) -> &Tables<f64> {
@@ -61,15 +121,101 @@ impl CaseSource for CaseTable {
     }
 }
 
+/// Scenarios whose cases are held before they are encoded.
+const ENCODED_AT_ONCE: u64 = 256;
+
+impl Study {
+    /// The plan without cases: counts, keys, hash.
+    pub fn outline(&self) -> &LanePlan {
+        &self.outline
+    }
+
+    /// The plan with the cases of these units, which must be held.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for other units.
+    pub fn window(&self, units: Range<u64>) -> Result<LanePlan> {
+        let (plan, profile) = (&self.outline, &self.outline.profile);
+        let none = |block: &Block| Units::Held(block.units.len(), 0, Arc::new([]));
+        let mut held: Vec<Units> = plan.blocks.iter().map(none).collect();
+        let mut table = CaseTable {
+            tables: Tables::default(),
+            cases: vec![Vec::new(); held.len()],
+            first: vec![0; held.len()],
+            variants: plan.blocks.iter().map(|block| block.variants.len()).collect(),
+        };
+        for (at, inside) in plan.segments(units) {
+            let block = &plan.blocks[at];
+            let names: Vec<String> = inside.clone().map(|unit| block.units.name(unit).into_owned()).collect();
+            held[at] = Units::Held(block.units.len(), inside.start, names.into());
+            table.first[at] = inside.start;
+            table.cases[at].reserve_exact((inside.end - inside.start) as usize * block.variants.len());
+            let mut from = inside.start;
+            while from < inside.end {
+                let to = inside.end.min(from + ENCODED_AT_ONCE);
+                // Cases in parallel, records in order: the tables must not depend on the number of threads.
+                let cases: Vec<Vec<Case>> =
+                    (from..to).into_par_iter().map(|unit| self.cases(at, unit)).collect::<Result<_>>()?;
+                let records = cases.iter().flatten().map(|case| LaneCase::encode(case, profile, &mut table.tables));
+                table.cases[at].extend(records);
+                from = to;
+            }
+        }
+        Ok(plan.holding(held, Box::new(table)))
+    }
+
+    /// Gives plans of consecutive windows of an interval, each with at most so many units' cases.
+    ///
+    /// # Errors
+    /// Of `each`, and as [`Study::window`].
+    pub fn in_windows(
+        &self,
+        units: Range<u64>,
+        most: u64,
+        mut each: impl FnMut(&LanePlan, Range<u64>) -> Result<()>,
+    ) -> Result<()> {
+        let mut from = units.start;
+        while from < units.end {
+            let to = units.end.min(from.saturating_add(most.max(1)));
+            each(&self.window(from..to)?, from..to)?;
+            from = to;
+        }
+        Ok(())
+    }
+
+    /// S, then every S', of a unit of a block.
+    fn cases(&self, at: usize, unit: u64) -> Result<Vec<Case>> {
+        let block = &self.outline.blocks[at];
+        let record = self.held.get(block.first_unit + unit);
+        let scenario = record.and_then(|record| unit_record::read(record, block.category));
+        let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
+        let reduction = self.reductions[at].as_ref();
+        let ids: Vec<ParameterizationId> = parameterizations(block.category, reduction.is_some()).collect();
+        cases_of(&scenario, &ids, reduction, self.outline.profile.frame.dt_s, &self.head.parameterization)
+    }
+}
+
+/// Those of a category, with or without a decomposition.
+pub(super) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = ParameterizationId> {
+    ParameterizationId::of(category).filter(move |id| id.kind == Kind::Kinematic || has_reduction)
+}
+
 /// Steps of all series together: the records of lanes point into the tables with 32 bits.
 const MOST_STEPS: f64 = 4e9;
 
-/// Plans a study over mined scenarios: the kept ones are simulated, in the order given; a decomposition
-/// may be fitted on more (see [`SvdFit`]).
+/// Plans a study over mined scenarios with all of its cases: the kept ones are simulated, in the order given; a
+/// decomposition may be fitted on more (see [`SvdFit`]).
 pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyPlan> {
+    let StudyOutline { study, reductions, left_out } = outline_study(scenarios, profile, options)?;
+    Ok(StudyPlan { plan: study.window(0..study.outline.unit_count())?, reductions, left_out })
+}
+
+/// Plans a study as [`plan_study`] does, without making its cases.
+pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyOutline> {
     let dt_s = profile.frame.dt_s;
     let parameterization = &options.parameterization;
-    let mut table = CaseTable { tables: Tables::default(), cases: Vec::new(), variants: Vec::new() };
+    let mut held = Records::default();
+    let mut record = Vec::new();
     let mut steps = 0.0;
     let (mut blocks, mut reductions, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for &category in &options.categories {
@@ -90,8 +236,7 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
             }
             Err(error) => return Err(error),
         };
-        let ids: Vec<ParameterizationId> =
-            ParameterizationId::of(category).filter(|id| id.kind == Kind::Kinematic || reduction.is_some()).collect();
+        let ids: Vec<ParameterizationId> = parameterizations(category, reduction.is_some()).collect();
         steps += kept.iter().map(|s| s.duration_s() / dt_s + 2.0).sum::<f64>() * (1 + ids.len()) as f64;
         if steps > MOST_STEPS {
             return Err(Error::usage(
@@ -102,26 +247,27 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
                 "use a longer time step, or study fewer or shorter scenarios at once",
             ));
         }
-        // Cases in parallel, records in order: the tables must not depend on the number of threads.
-        let cases: Vec<Vec<Case>> = kept
-            .par_iter()
-            .map(|scenario| cases_of(scenario, &ids, reduction.as_ref(), dt_s, parameterization))
-            .collect::<Result<_>>()?;
-        let records = cases.iter().flatten().map(|case| LaneCase::encode(case, profile, &mut table.tables)).collect();
-        table.cases.push(records);
-        table.variants.push(1 + ids.len());
-        blocks.push(Block {
-            category,
-            units: kept.iter().map(|s| s.id.clone()).collect(),
-            variants: std::iter::once("S").chain(ids.iter().map(|id| id.key)).map(str::to_owned).collect(),
-            first_unit: 0,
-            first_lane: 0,
-        });
+        held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::most_bytes(scenario)).sum());
+        for scenario in &kept {
+            if category == Category::CutOut {
+                vehicle_ahead(scenario)?;
+            }
+            record.clear();
+            unit_record::write(scenario, &mut record);
+            held.push(&record);
+        }
+        blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref()));
         reductions.extend(reduction);
     }
-    let plan =
-        LanePlan::new(profile.clone(), options.models.clone(), options.headways.clone(), blocks, Box::new(table))?;
-    Ok(StudyPlan { plan, reductions, left_out })
+    let head = StudyHead::new(
+        profile.clone(),
+        options.models.clone(),
+        options.headways.clone(),
+        parameterization.clone(),
+        blocks,
+        &held,
+    )?;
+    Ok(StudyOutline { study: head.with_records(held)?, reductions, left_out })
 }
 
 /// S, then every S', of one scenario.
@@ -140,4 +286,105 @@ fn cases_of(
         });
     }
     Ok(cases)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Read, Seek, SeekFrom};
+
+    use super::*;
+    use crate::mining::{MiningOptions, mine_generated};
+    use crate::trajectory::generator::GeneratorOptions;
+
+    fn scenarios() -> Vec<Scenario> {
+        let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
+    }
+
+    fn outlined(scenarios: &[Scenario]) -> StudyOutline {
+        outline_study(scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_window_has_the_cases_of_its_scenarios_and_the_hash_of_the_whole() {
+        let scenarios = scenarios();
+        let StudyOutline { study, reductions, .. } = outlined(&scenarios);
+        let (plan, options) = (study.outline(), ParameterizationOptions::default());
+        for (at, block) in plan.blocks.iter().enumerate() {
+            let reduction = &reductions[at];
+            let ids: Vec<ParameterizationId> = parameterizations(block.category, true).collect();
+            let kept = scenarios.iter().filter(|s| s.kept && s.category == block.category);
+            for (unit, scenario) in kept.enumerate().step_by(3) {
+                let window = study.window(block.first_unit + unit as u64..block.first_unit + unit as u64 + 1).unwrap();
+                assert_eq!(window.hash(), plan.hash());
+                assert_eq!(window.blocks[at].units.name(unit as u64), scenario.id);
+                let mut tables = Tables::default();
+                let cases = cases_of(scenario, &ids, Some(reduction), plan.profile.frame.dt_s, &options).unwrap();
+                for (variant, case) in cases.iter().enumerate() {
+                    let expected = LaneCase::encode(case, &plan.profile, &mut tables);
+                    assert_eq!(window.case(at, unit as u64, variant), expected, "{}", scenario.id);
+                }
+                assert_eq!(*window.tables(), tables, "{}", scenario.id);
+            }
+        }
+    }
+
+    /// Counts what is read.
+    struct Counted(Cursor<Vec<u8>>, usize);
+
+    impl Read for Counted {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            let count = self.0.read(buffer)?;
+            self.1 += count;
+            Ok(count)
+        }
+    }
+
+    impl Seek for Counted {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.0.seek(to)
+        }
+    }
+
+    #[test]
+    fn an_interval_is_read_alone_and_damage_in_it_is_found() {
+        // Enough for several pages.
+        let mut many = Vec::new();
+        for copy in 0..4 {
+            let renamed = scenarios().into_iter().map(|s| Scenario { id: format!("{}~{copy}", s.id), ..s });
+            many.extend(renamed);
+        }
+        let StudyOutline { study, .. } = outlined(&many);
+        let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
+        assert!(units > 400, "{units}");
+        let read = |records: Vec<u8>, wanted: Range<u64>| {
+            let mut file = Counted(Cursor::new(records), 0);
+            let study = study.head().clone().read(&mut file, &Place::item("plan"), |_| wanted);
+            (study, file.1)
+        };
+        let (part, bytes) = read(records.clone(), 150..170);
+        let part = part.unwrap();
+        assert!(bytes < records.len() / 4, "{bytes} of {} bytes were read", records.len());
+        let ours = study.window(150..170).unwrap();
+        let theirs = part.window(150..170).unwrap();
+        assert_eq!((ours.hash(), ours.tables()), (theirs.hash(), theirs.tables()));
+        assert_eq!(
+            ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
+            theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
+        );
+        assert!(part.window(149..151).is_err() && part.records().is_err());
+        let told = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
+            Ok(_) => "read".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        for at in [0, records.len() / 2, records.len() - 1] {
+            let mut damaged = records.clone();
+            damaged[at] ^= 1;
+            assert!(told(damaged.clone(), 0..units).contains("are damaged"), "byte {at}");
+            let elsewhere = if at == 0 { units - 1..units } else { 0..1 };
+            assert_eq!(told(damaged, elsewhere), "read", "byte {at}");
+        }
+        assert!(told(records[1..].to_vec(), 0..1).contains("cut off"));
+        assert!(told([&records[..], b"x"].concat(), 0..1).contains("added to"));
+    }
 }

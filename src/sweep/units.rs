@@ -1,12 +1,16 @@
 //! The units of a block: named scenarios, or samples that are told apart by their index alone.
 
 use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Units of one block, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Units {
     /// Scenarios by their keys.
     Named(Vec<String>),
+    /// Scenarios of which this process holds an interval: how many there are, the first one held, the keys of those held.
+    Held(u64, u64, Arc<[String]>),
     /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ of them keeps no names.
     Numbered(u64),
 }
@@ -16,7 +20,15 @@ impl Units {
     pub fn len(&self) -> u64 {
         match self {
             Units::Named(names) => names.len() as u64,
-            Units::Numbered(count) => *count,
+            Units::Held(count, ..) | Units::Numbered(count) => *count,
+        }
+    }
+
+    /// Those whose cases are there: all, but of a study that is read or made in part.
+    pub fn held(&self) -> Range<u64> {
+        match self {
+            Units::Held(_, first, names) => *first..first + names.len() as u64,
+            _ => 0..self.len(),
         }
     }
 
@@ -29,6 +41,10 @@ impl Units {
     pub fn name(&self, unit: u64) -> Cow<'_, str> {
         match self {
             Units::Named(names) => Cow::Borrowed(&names[unit as usize]),
+            Units::Held(_, first, names) => match unit.checked_sub(*first).and_then(|at| names.get(at as usize)) {
+                Some(name) => Cow::Borrowed(name.as_str()),
+                None => Cow::Owned(format!("#{unit}")),
+            },
             Units::Numbered(_) => Cow::Owned(format!("#{unit}")),
         }
     }
@@ -37,6 +53,7 @@ impl Units {
     pub fn find(&self, name: &str) -> Option<u64> {
         match self {
             Units::Named(names) => names.iter().position(|n| n == name).map(|at| at as u64),
+            Units::Held(_, first, names) => names.iter().position(|n| n == name).map(|at| first + at as u64),
             Units::Numbered(count) => name.strip_prefix('#')?.parse().ok().filter(|unit| unit < count),
         }
     }

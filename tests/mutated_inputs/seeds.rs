@@ -12,7 +12,7 @@ use lanesweep::profile::Profile;
 use lanesweep::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::score::ScoreOptions;
-use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, PlanContent, Wanted};
+use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, Wanted, outline_study};
 use lanesweep::trajectory::Recording;
 use lanesweep::trajectory::generator::GeneratorOptions;
 
@@ -201,7 +201,6 @@ impl Seeds {
                     std::fs::read(path).unwrap()
                 })
                 .into(),
-            scenarios: few,
             exposures: vec![{
                 let dir = tempfile::tempdir().unwrap();
                 exposure.write_beside(&dir.path().join("s.jsonl")).unwrap();
@@ -228,7 +227,10 @@ impl Seeds {
             distributions: ["stochastic", "deterministic"].map(distribution).to_vec(),
             proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
             parts: parts.into(),
-            plans: vec![seal("plan", &PlanContent::of(&study).unwrap()).unwrap().0],
+            plans: vec![{
+                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().study;
+                [&seal("plan", outlined.head()).unwrap().0, outlined.records().unwrap()].concat()
+            }],
             journals: journals.into(),
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
             partials: vec![partial.to_json().unwrap().into_bytes()],
@@ -236,6 +238,7 @@ impl Seeds {
             jrc: Profile::load("jrc-2021").unwrap(),
             study,
             density,
+            scenarios: few,
         }
     }
 }
