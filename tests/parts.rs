@@ -177,6 +177,136 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     refused(&["merge", "p"], 3, &["no whole file of a run in parts"]);
 }
 
+/// Replaces the first occurrence of a text in a file.
+fn edit(path: &Path, from: &str, to: &str) {
+    let bytes = std::fs::read(path).unwrap();
+    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
+    std::fs::write(path, [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()).unwrap();
+}
+
+/// Two commands in one folder must be refused with status 3 and these words.
+fn refused(dir: &Path, args: &[&str], said: &str) {
+    let (code, out, err) = lanesweep(dir, args);
+    assert!(code == 3 && out.is_empty() && flat(&err).contains(said), "{args:?} gave {code}: {err}");
+}
+
+#[test]
+fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continued() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
+        let shard = |shard: &str| [run, &["--out", name, "--shard", shard]].concat();
+        ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
+        for file in ["part-00001-of-00002.json", "plan.json"] {
+            let path = dir.join(name).join(file);
+            let whole = std::fs::read(&path).unwrap();
+            edit(&path, "\"engine\":1,", "\"engine\":2,");
+            refused(dir, &["merge", name], "of engine 2, this program has engine 1");
+            if file != "plan.json" {
+                refused(dir, &shard("1/2"), "of engine 2, this program has engine 1");
+            } else {
+                let plan = format!("{name}/plan.json");
+                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], "of engine 2, this program has engine 1");
+            }
+            // As versions before engines wrote it, all in one line.
+            let earlier = r#""version":1,"sha256":"00","content":"#;
+            std::fs::write(&path, &whole).unwrap();
+            edit(&path, "\"version\":2,\"engine\":1,", earlier);
+            refused(dir, &["merge", name], "its version is 1, this program reads 2");
+            std::fs::write(&path, &whole).unwrap();
+        }
+        done(dir, &["-q", "merge", name]);
+    }
+    // The records of whole runs say it too.
+    let record =
+        |name: &str| -> serde_json::Value { serde_json::from_slice(&std::fs::read(dir.join(name)).unwrap()).unwrap() };
+    assert_eq!(
+        (&record("study/run.json")["engine"], &record("sample/estimate.json")["engine"]),
+        (&1.into(), &1.into())
+    );
+    let lane = ["simulate", "--from", "sample", "--lane", "#0/2/0.6s/FSM"];
+    done(dir, &lane);
+    edit(&dir.join("sample/estimate.json"), "\"engine\": 1", "\"engine\": 2");
+    refused(dir, &lane, "of engine 2, this program has engine 1");
+}
+
+#[test]
+fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    done(dir, &[&STUDY[..], &["--plan-only", "--out", "p"]].concat());
+    let path = dir.join("p/plan.json");
+    let whole = std::fs::read(&path).unwrap();
+    let mut damaged = whole.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    std::fs::write(&path, &damaged).unwrap();
+    let shard =
+        |of: &'static str| ["-q", "study", "--plan", "p/plan.json", "--shard", of, "--out", "p", "--backend", "cpu"];
+    done(dir, &shard("0/3"));
+    refused(dir, &shard("2/3"), "are damaged: their checksum does not match");
+    refused(dir, &["-q", "study", "--plan", "p/plan.json", "--out", "x"], "are damaged");
+    // Cut off, or with something behind it: whatever the interval.
+    for wrong in [&whole[..whole.len() - 1], &[&whole[..], b"x"].concat()] {
+        std::fs::write(&path, wrong).unwrap();
+        refused(dir, &shard("1/3"), "cut off or added to");
+    }
+    // Changed and sealed anew: what cannot be is named, the rest has another hash than it tells.
+    let end = whole.iter().position(|byte| *byte == b'\n').unwrap();
+    type Change = fn(&mut serde_json::Value);
+    let changes: [(&str, Change); 5] = [
+        ("a category has no scenario", |plan| plan["blocks"][0]["units"] = 0.into()),
+        ("a category has no scenario", |plan| plan["blocks"] = serde_json::json!([])),
+        ("a category is there twice", |plan| plan["blocks"][1] = plan["blocks"][0].clone()),
+        ("the checksums of all scenarios", |plan| plan["blocks"][0]["units"] = 100_000.into()),
+        ("not that of its hash", |plan| plan["headways"][0]["thw_s"] = 1.9.into()),
+    ];
+    for (said, change) in changes {
+        let mut sealed: serde_json::Value = serde_json::from_slice(&whole[..end]).unwrap();
+        change(&mut sealed["content"]["plan"]);
+        let line = lanesweep::parts::seal("study plan", &sealed["content"]).unwrap().0;
+        std::fs::write(&path, [&line, &whole[end + 1..]].concat()).unwrap();
+        refused(dir, &["merge", "p"], said);
+        refused(dir, &shard("1/3"), said);
+    }
+    std::fs::write(&path, &whole).unwrap();
+    ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
+    done(dir, &["-q", "merge", "p"]);
+}
+
+/// 8,000 scenarios had 22 kB each in a plan: 600 MB to write it, 450 MB to read it.
+#[cfg(unix)]
+#[test]
+fn a_plan_of_many_scenarios_takes_little_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/paper_sumo_01_02_scenarios.jsonl");
+    let rows: Vec<serde_json::Value> = std::fs::read_to_string(golden)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .filter(|row: &serde_json::Value| row["kept"] == true)
+        .collect();
+    let mut text = String::new();
+    for number in 0..8000 {
+        let mut row = rows[number % rows.len()].clone();
+        row["id"] = format!("{}~{number}", row["id"].as_str().unwrap()).into();
+        text += &format!("{row}\n");
+    }
+    std::fs::write(dir.join("many.jsonl"), text).unwrap();
+    // Addresses, not memory that is in use: the limit that a shell can set.
+    let limited = |args: &str| {
+        let script = format!("ulimit -v 400000 && exec \"$0\" -q --threads 1 study --backend cpu --out p {args}");
+        let program = env!("CARGO_BIN_EXE_lanesweep");
+        let run = std::process::Command::new("sh").current_dir(dir).args(["-c", &script, program]).output().unwrap();
+        assert!(run.status.success(), "{args}: {}", String::from_utf8_lossy(&run.stderr));
+    };
+    limited("--scenarios many.jsonl --plan-only");
+    limited("--plan p/plan.json --shard 7/400");
+    let bytes = std::fs::metadata(dir.join("p/plan.json")).unwrap().len();
+    assert!(bytes < 8000 * 3000, "{bytes} bytes");
+}
+
 #[test]
 fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     let dir = tempfile::tempdir().unwrap();

@@ -37,7 +37,7 @@ pub(super) struct How<'a> {
 
 impl How<'_> {
     fn window(&self) -> u64 {
-        if self.recheck.is_some() { DEVICE_WINDOW } else { WINDOW }
+        if self.fallback.is_some() { DEVICE_WINDOW } else { WINDOW }
     }
 
     /// Sweeps an interval, window by window; chunks come with the plan of their window.

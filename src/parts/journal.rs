@@ -299,5 +299,17 @@ mod tests {
             assert!(error.to_string().contains("another run"), "{error}");
         }
         assert_eq!(std::fs::read(&path).unwrap(), before);
+        // Of another engine, whose version is part of the head and its checksum; and as earlier versions began.
+        let units = 0..10;
+        let head = Head { lanesweep_journal: 2, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
+        let earlier =
+            serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
+        for (text, said) in [(line_of(&head), "of engine "), (line_of(&earlier), "another version")] {
+            let text = text.unwrap();
+            std::fs::write(&path, &text).unwrap();
+            let error = Journal::<Vec<u32>>::open(&path, "run", 0..10).err().unwrap();
+            assert!(error.to_string().contains(said), "{error}");
+            assert_eq!(std::fs::read(&path).unwrap(), text);
+        }
     }
 }

@@ -293,9 +293,9 @@ mod tests {
         // A record that is whole but of other units, or of two segments: the file's fault.
         for strange in [units(15..25), units(0..11), units(99..101)] {
             let path = dir.path().join("strange");
-            let (mut journal, _) = Journal::open(&path, "run", 10..100).unwrap();
+            let mut journal = Journal::<Units>::open(&path, "run", 10..100).unwrap().0;
             journal.append(&[strange]).unwrap();
-            let (journal, found) = Journal::open(&path, "run", 10..100).unwrap();
+            let (journal, found) = Journal::<Units>::open(&path, "run", 10..100).unwrap();
             let error = Ledger::new(10..100, &[20, 40]).resume(journal, found).unwrap_err();
             assert!(matches!(error, Error::Input { .. }) && error.to_string().contains("no segment"), "{error}");
             std::fs::remove_file(path).unwrap();

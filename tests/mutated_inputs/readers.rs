@@ -17,9 +17,7 @@ use lanesweep::sampling::{
 };
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::score::ScoreOptions;
-use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, LanePlan, Partial, StudyHead, StudyOptions, Wanted, plan_study,
-};
+use lanesweep::sweep::{Backend, CpuBackend, Headway, LanePlan, Partial, StudyHead, StudyOptions, Wanted, plan_study};
 use lanesweep::{Error, Place, Result};
 use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
