@@ -4,6 +4,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::plain_text::shown_in_line;
+
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -54,16 +56,16 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = Vec::new();
         if let Some(file) = &self.file {
-            parts.push(file.display().to_string());
+            parts.push(shown_in_line(&file.display().to_string()));
         }
         if let Some(row) = self.row {
             parts.push(format!("line {row}"));
         }
         if let Some(column) = &self.column {
-            parts.push(format!("column `{column}`"));
+            parts.push(format!("column `{}`", shown_in_line(column)));
         }
         if let Some(item) = &self.item {
-            parts.push(item.clone());
+            parts.push(shown_in_line(item));
         }
         f.write_str(&parts.join(", "))
     }
@@ -92,12 +94,12 @@ pub enum Error {
         /// What to write instead.
         help: String,
     },
-    /// The system refused to read or write.
-    #[error("{path}: cannot {action}: {source}", path = path.display())]
+    /// The system refused to read or write, or to start a thread.
+    #[error("{path}: cannot {action}: {source}", path = shown_in_line(&path.display().to_string()))]
     Io {
-        /// File or folder.
+        /// File or folder; for threads, whose they are.
         path: PathBuf,
-        /// What was tried, as a verb: `read`, `write`, `create the folder`.
+        /// What was tried, as a verb: `read`, `write`, `create the folder`, `start`.
         action: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -176,6 +178,12 @@ impl Error {
                 std::io::ErrorKind::QuotaExceeded => "your quota is used up: free some space and run again".to_owned(),
                 std::io::ErrorKind::FileTooLarge => {
                     "files may not become that large here: raise the limit (`ulimit -f`) and run again".to_owned()
+                }
+                std::io::ErrorKind::WouldBlock | std::io::ErrorKind::OutOfMemory => {
+                    "the limit of processes or of memory \
+                     is reached: use fewer --threads (more than there are cores serve nothing), or raise the limit \
+                     (`ulimit -u`, `ulimit -v`)"
+                        .to_owned()
                 }
                 std::io::ErrorKind::ReadOnlyFilesystem => {
                     "the disk is mounted read-only: choose another path, or mount it writable and run again".to_owned()

@@ -238,3 +238,100 @@ fn files_beyond_what_their_kind_can_be_are_not_read_to_their_end() {
         assert!(said.contains("huge") && said.contains(why), "{args:?}: {said}");
     }
 }
+
+/// An id that acts on a terminal, forges a line of a message, turns the direction of reading, and is a formula.
+const HOSTILE: &str = "=1+1\u{1b}[2J\u{9b}31m\u{202e}b\rc\u{7f}";
+
+/// Exit code, stdout and stderr as they are.
+fn raw(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    let program = env!("CARGO_BIN_EXE_lanesweep");
+    let ran = Command::new(program).current_dir(dir).env("NO_COLOR", "1").args(args).output().unwrap();
+    let [out, err] = [ran.stdout, ran.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (ran.status.code().unwrap_or(-1), out, err)
+}
+
+/// Golden scenarios, the first with this id.
+fn scenarios_with(dir: &Path, id: &str) {
+    let text = std::fs::read_to_string(common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let at = lines.iter().position(|line| line.contains("\"cut_in\"") && line.contains("\"kept\":true")).unwrap();
+    let mut first: serde_json::Value = serde_json::from_str(&lines[at]).unwrap();
+    first["id"] = id.into();
+    lines[at] = first.to_string();
+    std::fs::write(dir.join("s.jsonl"), lines.join("\n") + "\n").unwrap();
+}
+
+#[test]
+fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    scenarios_with(dir, HOSTILE);
+    std::fs::write(dir.join("key.toml"), "\"\\u001b[2J\\u009b\\u202e\" = 1\n").unwrap();
+    std::fs::write(dir.join("broken.jsonl"), format!("{{\"id\": \"{}\"\n", "\u{9b}\u{202e}")).unwrap();
+    let lane = format!("{HOSTILE}/S/1.2s/FSM");
+    let named = "no\u{1b}[2J\u{202e}\nsuch.jsonl";
+    let runs: [(&[&str], i32); 9] = [
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--compare", "all", "--model", "all"], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--format", "json"], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", "\u{1b}[2J/S/1.2s/FSM"], 2),
+        (&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--compare-reference"], 0),
+        (&["study", "--scenarios", "broken.jsonl"], 3),
+        (&["study", "--scenarios", named], 6),
+        (&["study", "--profile", "key.toml"], 2),
+        (&["study", "--\u{1b}[2J\u{202e}"], 2),
+    ];
+    for (args, expected) in runs {
+        let (code, out, err) = raw(dir, args);
+        assert_eq!(code, expected, "{args:?}: {err}");
+        let acts = |c: char| (c.is_control() && c != '\n') || ('\u{2028}'..='\u{202e}').contains(&c);
+        assert!(!out.chars().chain(err.chars()).any(acts), "{args:?}: {out:?} {err:?}");
+        if args.contains(&"json") {
+            let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+            assert_eq!(document["lanes"][0]["lane"], lane, "JSON reads back the id itself");
+        }
+        if args.contains(&named) {
+            assert!(err.contains("\\u{1b}[2J\\u{202e}\\nsuch.jsonl"), "{err}");
+        }
+    }
+    let page = std::fs::read_to_string(dir.join("lanesweep-out/report.html")).unwrap();
+    assert!(!page.chars().any(|c| c.is_control() && c != '\n') && !page.contains('\u{202e}'));
+}
+
+#[test]
+fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    for id in ["=HYPERLINK(1)", "@a", "-2+3", "+x,y", "'=q"] {
+        scenarios_with(dir, id);
+        let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--lanes", "lanes.csv", "--thw", "1.2"];
+        let (code, _, err) = raw(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
+        assert_eq!(code, 0, "{err}");
+        let table = std::fs::read_to_string(dir.join("lanes.csv")).unwrap();
+        let fields = table.lines().flat_map(|line| line.split(','));
+        let formulas = fields.map(|f| f.trim_start_matches('"')).filter(|f| f.starts_with(['=', '+', '-', '@']));
+        let formulas: Vec<&str> = formulas.filter(|field| field.parse::<f64>().is_err()).collect();
+        assert!(formulas.is_empty() && table.contains(&format!("'{id}")), "{formulas:?}");
+        let mut reader = csv::Reader::from_path(dir.join("lanes.csv")).unwrap();
+        assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
+        // Our readers take the apostrophe away: of lanes, and of scenarios.
+        let (code, _, err) = raw(dir, &["conformance", "--scenarios", "s.jsonl", "--lanes", "lanes.csv"]);
+        assert_eq!(code, 0, "{id}: {err}");
+        let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
+        std::fs::write(dir.join("cases.csv"), row).unwrap();
+        let lane = format!("{id}/S/1.2s/FSM");
+        let (code, _, err) = raw(dir, &["simulate", "--scenarios", "cases.csv", "--lane", &lane]);
+        assert_eq!(code, 0, "{id}: {err}");
+    }
+}
+
+#[test]
+fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
+    let dir = tempfile::tempdir().unwrap();
+    let part = ["-q", "study", "--synth-recordings", "1", "--synth-duration", "120", "--shard", "0/2"];
+    let (code, _, err) = raw(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
+    assert_eq!(code, 0, "{err}");
+    let (code, said) = lanesweep(dir.path(), &["merge", "it's; mine"]);
+    assert_eq!(code, 3, "{said}");
+    assert!(said.contains(r"--plan 'it'\''s; mine/plan.json' --shard 1/2 --out 'it'\''s; mine'"), "{said}");
+}

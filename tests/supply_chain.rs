@@ -225,6 +225,27 @@ fn every_crate_comes_from_crates_io() {
 }
 
 #[test]
+fn an_advisory_that_is_let_be_has_a_reason_and_its_crate_and_ci_asks_for_the_others() {
+    let deny = toml_file("deny.toml");
+    let lock = toml_file("Cargo.lock");
+    let is_here =
+        |name: &str| lock["package"].as_array().expect("packages").iter().any(|p| p["name"].as_str() == Some(name));
+    for entry in deny["advisories"]["ignore"].as_array().expect("advisories.ignore") {
+        let id = entry["id"].as_str().expect("advisories.ignore: id");
+        let reason = entry.get("reason").and_then(toml::Value::as_str).unwrap_or_default();
+        assert!(id.starts_with("RUSTSEC-") && reason.len() > 40, "deny.toml, advisories.ignore: {id} has no reason");
+        let name = reason.split_whitespace().next().expect("words");
+        assert!(is_here(name), "deny.toml lets {id} be for {name}, which is not here");
+    }
+    let run = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
+    assert!(run.lines().any(|line| line == ".ci/deny"), "cargo deny is not run");
+    let check = std::fs::read_to_string(root().join(".ci/deny")).expect(".ci/deny");
+    for what in ["check bans licenses sources", "check advisories"] {
+        assert!(check.contains(what), ".ci/deny leaves out {what}");
+    }
+}
+
+#[test]
 fn duplicates_are_those_that_have_a_reason() {
     let deny = toml_file("deny.toml");
     let mut skipped = BTreeSet::new();
@@ -369,4 +390,19 @@ fn unsafe_code_is_denied_and_every_exception_says_why() {
         wrong.extend(unsafe_without_reason(&text).iter().map(|(line, problem)| format!("{name}:{line}: {problem}")));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_library_leaves_its_process_alone() {
+    let mut files = Vec::new();
+    rust_files(&root().join("src"), &mut files);
+    files.retain(|file| *file != root().join("src/main.rs"));
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("UTF-8");
+        for (at, (code, _)) in text.lines().map(code_and_comment).enumerate() {
+            for global in ["set_hook(", "take_hook(", "set_var(", "remove_var(", "set_current_dir("] {
+                assert!(!code.contains(global), "{}:{}: {global} is the program's", file.display(), at + 1);
+            }
+        }
+    }
 }

@@ -9,6 +9,7 @@ use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, console};
+use crate::cluster::quoted_word;
 use crate::report::files::{make_folder, write_atomically};
 use crate::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
@@ -130,7 +131,8 @@ impl Init {
             make_folder(folder)?;
         }
         write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
-        console::print(&format!("{} written; use it with --config {0}\n", self.file.display()))?;
+        let file = self.file.display().to_string();
+        console::print(&format!("{file} written; use it with --config {}\n", quoted_word(&file)))?;
         Ok(Exit::Ok)
     }
 }

@@ -1,10 +1,13 @@
-//! Data on stdout, everything else on stderr; a reader that goes away is no error.
+//! Data on stdout, everything else on stderr; a reader that goes away is no error. All of it passes here, so that no
+//! foreign text (an id, a file's name) reaches a terminal with characters that act on it.
 
 use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing::Level;
+use tracing_subscriber::fmt::format::debug_fn;
 
+use crate::plain_text::{shown, shown_json};
 use crate::{Error, Result};
 
 /// How much is said on stderr.
@@ -28,6 +31,12 @@ pub fn start_log(verbosity: Verbosity) {
     // A second start (a test in the same process) keeps the first log.
     let _ = tracing_subscriber::fmt()
         .with_writer(io::stderr)
+        // Where stderr is gone or full there is nobody to tell, and telling it there would panic.
+        .log_internal_errors(false)
+        .fmt_fields(debug_fn(|out, field, value| match field.name() {
+            "message" => write!(out, "{}", shown(&format!("{value:?}"))),
+            name => write!(out, "{name}={}", shown(&format!("{value:?}"))),
+        }))
         .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
         .with_max_level(level)
         .with_target(false)
@@ -35,13 +44,28 @@ pub fn start_log(verbosity: Verbosity) {
         .try_init();
 }
 
-/// Writes data to stdout.
+/// Writes a text to stdout.
 pub fn print(text: &str) -> Result<()> {
+    write_out(&shown(text))
+}
+
+/// Writes JSON, or lines of it, to stdout.
+pub fn print_json(json: &str) -> Result<()> {
+    write_out(&shown_json(json))
+}
+
+fn write_out(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(|e| Error::io("standard output", "write", e)),
     }
+}
+
+/// Writes a text to stderr, as it is: what a result says beside the data.
+pub fn say(text: &str) {
+    // Where stderr is gone there is nobody to tell.
+    let _ = write!(io::stderr().lock(), "{}", shown(text));
 }
 
 /// A progress bar on stderr; silent unless stderr is a terminal.
@@ -59,10 +83,22 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
 
 /// Draws an error with its help on stderr.
 pub fn complain(error: &Error) {
-    let report = miette::Report::new(Drawn { text: error.to_string(), help: error.help() });
+    let help = error.help().map(|help| shown(&help).into_owned());
+    let report = miette::Report::new(Drawn { text: shown(&error.to_string()).into_owned(), help });
     let mut stderr = io::stderr().lock();
     // Where stderr is gone there is nobody to tell.
     let _ = writeln!(stderr, "{report:?}");
+}
+
+/// Tells what is wrong with the command line, or the help that was asked for.
+pub fn refuse(error: &clap::Error) {
+    let text = error.to_string();
+    let safe = shown(&text);
+    // A closed pipe on `--help | head` is success.
+    let _ = match &safe {
+        std::borrow::Cow::Borrowed(_) => error.print(),
+        std::borrow::Cow::Owned(safe) => write!(io::stderr().lock(), "{safe}"),
+    };
 }
 
 /// A library error as miette draws it.

@@ -18,7 +18,7 @@ pub enum Exit {
     Incomplete = 4,
     /// A check that was asked for did not pass (conformance).
     VerificationFailed = 5,
-    /// The system refused to read or write.
+    /// The system refused to read or write, or to start a thread.
     Io = 6,
     /// No usable compute device, or the device failed.
     NoDevice = 7,
@@ -55,16 +55,24 @@ impl Exit {
             Exit::BadInput => "the data cannot be used; nothing was written",
             Exit::Incomplete => "a result was written, but parts of the input were left out",
             Exit::VerificationFailed => "a check did not pass",
-            Exit::Io => "the system refused to read or write",
+            Exit::Io => "the system refused to read, to write or to start a thread",
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a defect of the program",
             Exit::Interrupted => "interrupted, or busy elsewhere; what is done is kept, and the same command continues",
         }
     }
 
+    /// Statuses of a process that a signal ended, 128 + the signal's number, with what they mean.
+    pub const BY_SIGNAL: [(u8, &str); 3] = [
+        (129, "ended at once by SIGHUP; a run that keeps a journal ends with 75 instead, and continues"),
+        (130, "the same by SIGINT (Ctrl-C)"),
+        (143, "the same by SIGTERM"),
+    ];
+
     /// The table for `--help`.
     pub fn table() -> String {
-        let lines = Exit::ALL.iter().map(|exit| format!("  {:>2}  {}\n", exit.code(), exit.meaning()));
+        let ends = Exit::ALL.iter().map(|exit| (exit.code(), exit.meaning())).chain(Exit::BY_SIGNAL);
+        let lines = ends.map(|(code, meaning)| format!("  {code:>3}  {meaning}\n"));
         format!("Exit codes:\n{}", lines.collect::<String>())
     }
 }

@@ -8,6 +8,7 @@ use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::sampling::limit_state;
 use crate::sweep::{Backend, Chunk, CpuBackend, LaneKey, LanePlan, Study, SweepOptions, Wanted, sweep};
+use crate::table::text_of_cell;
 use crate::{Error, Place, Result, input_file};
 
 /// Lanes that one export writes at most.
@@ -115,7 +116,7 @@ pub(super) fn worst_of_sample(
     let mut per_model: Vec<Vec<LaneKey>> = vec![Vec::new(); plan.models.len()];
     for (at, record) in reader.records().enumerate() {
         let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
-        let key = find(plan, record.get(column).unwrap_or(""))?;
+        let key = find(plan, text_of_cell(record.get(column).unwrap_or("")))?;
         if per_model[key.model].len() < count {
             per_model[key.model].push(key);
         }

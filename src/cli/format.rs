@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::console;
 use crate::Result;
+use crate::readable::count;
 
 /// How tables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,13 +32,13 @@ impl FormatFlag {
     pub fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
         match self.format {
             Format::Text => console::print(&text()),
-            Format::Json => console::print(&json()?),
+            Format::Json => console::print_json(&json()?),
         }
     }
 
     /// Says what `--plan-only` left.
     pub fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
-        let text = || format!("{lanes} lanes planned in {}\n", path.display());
+        let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
         self.print(text, || {
             crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))
         })

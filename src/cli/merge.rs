@@ -10,6 +10,7 @@ use super::shard_flags::{PLAN_FILE, is_result};
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
+use crate::cluster::quoted_word;
 use crate::lock::FolderLock;
 use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
 use crate::report::files::check_folder;
@@ -108,8 +109,8 @@ pub(super) fn read_parts<T: Countable>(
     run_sha256: &str,
     units: u64,
 ) -> Result<Vec<Part<T>>> {
-    let command =
-        |shard: Shard| format!("lanesweep {verb} --plan {} --shard {shard} --out {}", plan.display(), dir.display());
+    let [plan, out] = [plan, dir].map(|path| quoted_word(&path.display().to_string()));
+    let command = |shard: Shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
     let found = collect(dir, units, command)?;
     let read = |(shard, path): &(Shard, PathBuf)| {
         let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &command(*shard))?;

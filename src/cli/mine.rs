@@ -10,6 +10,7 @@ use super::source::{self, Source};
 use super::{Exit, console};
 use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
+use crate::readable::count_of;
 use crate::scenario::{check_scenario_file, write_scenarios_of, write_scenarios_to};
 use crate::{Result, input_file};
 
@@ -55,12 +56,12 @@ impl Mine {
                     let (data, synthetic) = (from.describe(), from.is_synthetic());
                     ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
                 }
-                tracing::info!("{} scenarios written to {}", collection.scenarios.len(), path.display());
+                tracing::info!("{} scenarios written to {}", count_of(collection.scenarios.len()), path.display());
             }
             None => {
                 let mut text = Vec::new();
                 write_scenarios_to(&mut text, &collection.scenarios)?;
-                console::print(&String::from_utf8_lossy(&text))?;
+                console::print_json(&String::from_utf8_lossy(&text))?;
             }
         }
         Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })

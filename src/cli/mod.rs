@@ -10,7 +10,6 @@ mod conformance;
 mod console;
 mod devices;
 mod dry_run;
-mod environment;
 mod exit;
 mod export;
 mod export_lanes;
@@ -146,13 +145,11 @@ const MOST_THREADS: usize = 4096;
 
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
-    environment::quiet_drivers();
     let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => {
             let asked_for = !error.use_stderr();
-            // A closed pipe on `--help | head` is success.
-            let _ = error.print();
+            console::refuse(&error);
             return if asked_for { Exit::Ok } else { Exit::Usage }.into();
         }
     };
@@ -190,11 +187,8 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
             let help = format!("use at least 1 and at most {MOST_THREADS}; more than there are cores serve nothing");
             return Err(Error::usage(Place::item("--threads"), problem, help));
         }
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()
-            .map_err(|e| Error::Internal(format!("the thread pool did not start: {e}")))?;
     }
+    start_threads(cli.common.threads)?;
     match &cli.verb {
         Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
@@ -204,7 +198,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
-        Verb::Simulate(verb) => verb.run(),
+        Verb::Simulate(verb) => verb.run(cli.common.verbosity()),
         Verb::Export(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
@@ -214,6 +208,21 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Completions(verb) => verb.run(),
         Verb::Man(verb) => verb.run(),
     }
+}
+
+/// Starts the workers, one per core unless told otherwise: before the work, for a pool that cannot start later panics.
+///
+/// # Errors
+/// [`Error::Io`] where the system gives no more threads, or no memory for them.
+fn start_threads(count: Option<usize>) -> Result<()> {
+    let started = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).build_global();
+    started.map_err(|error| match std::error::Error::source(&error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
+        Some(refused) => {
+            let what = count.map_or("the worker threads".to_owned(), |count| format!("--threads {count}"));
+            Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, refused.to_string()))
+        }
+        None => Error::Internal(format!("the thread pool did not start: {error}")),
+    })
 }
 
 #[cfg(test)]

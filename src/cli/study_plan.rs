@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::mining::{MiningOptions, RecordingSummary};
-use crate::parameterization::{ModeShape, ParameterizationOptions};
+use crate::parameterization::{ModeShape, ParameterizationId, ParameterizationOptions};
 use crate::parts::{read_sealed_line, seal};
 use crate::report::distributions::ParameterHistogram;
 use crate::report::files::write_atomically_with;
@@ -107,6 +107,7 @@ impl PlannedStudy {
         let place = Place::file(path);
         facts.score.validate()?;
         let study = plan.read(&mut records, &place, wanted)?;
+        check_variants(study.outline(), &place)?;
         if facts.categories.len() != study.outline().blocks.len() {
             let problem = "it does not have the facts of every category";
             return Err(crate::Error::input(place, problem, AGAIN));
@@ -115,4 +116,40 @@ impl PlannedStudy {
     }
 }
 
+/// A checksum tells damage, not forgery: what reaches a page and a terminal must be what this program writes.
+fn check_variants(plan: &LanePlan, place: &Place) -> Result<()> {
+    for block in &plan.blocks {
+        for (at, name) in block.variants.iter().enumerate() {
+            let is_known = if at == 0 { name == "S" } else { ParameterizationId::find(block.category, name).is_some() };
+            if !is_known || block.variants[..at].contains(name) {
+                let problem = format!("`{name}` is no variant {at} of a {} study", block.category.label());
+                return Err(crate::Error::input(place.clone(), problem, AGAIN));
+            }
+        }
+    }
+    Ok(())
+}
+
 const AGAIN: &str = "make it with `lanesweep study … --plan-only --out DIR` of this version";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mining::mine_generated;
+    use crate::profile::Profile;
+    use crate::sweep::{StudyOptions, plan_study};
+    use crate::trajectory::generator::GeneratorOptions;
+
+    #[test]
+    fn a_plan_with_variants_that_no_study_has_is_refused_before_they_are_printed() {
+        let generated = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+        let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let made = || plan_study(&mined, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan;
+        assert!(check_variants(&made(), &Place::item("plan")).is_ok());
+        for (at, forged) in [(0, "1"), (1, "\u{1b}]0;owned\u{7}"), (1, "<script>"), (1, "S"), (2, "1")] {
+            let mut plan = made();
+            plan.blocks[0].variants[at] = forged.to_owned();
+            assert!(check_variants(&plan, &Place::item("plan")).is_err(), "{forged} as variant {at}");
+        }
+    }
+}

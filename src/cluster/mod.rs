@@ -7,6 +7,6 @@ mod shell;
 mod slurm;
 mod split_run;
 
-pub use shell::{directive_quoted, log_pattern, shell_quoted};
+pub use shell::{directive_quoted, log_pattern, quoted_word, shell_quoted};
 pub use slurm::{Resources, Scripts, SlurmArray};
 pub use split_run::SplitRun;

@@ -8,17 +8,22 @@ fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "_-./:,+@%".contains(c)
 }
 
-/// One word of a POSIX shell: as it is where nothing in it is special, else in single quotes.
+/// One word of a POSIX shell: as it is where nothing in it is special, else in single quotes. For commands in messages.
+pub fn quoted_word(word: &str) -> String {
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
+/// The same for a word of a script.
 ///
 /// # Errors
 /// [`Error::Usage`] naming `place` for control characters (line breaks among them), which could be quoted but not read
 /// in a script by a person.
 pub fn shell_quoted(place: &str, word: &str) -> Result<String> {
     refuse_control(place, word)?;
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return Ok(word.to_owned());
-    }
-    Ok(format!("'{}'", word.replace('\'', r"'\''")))
+    Ok(quoted_word(word))
 }
 
 /// The value of an option in an `#SBATCH` line, by the rules of `sbatch`: double quotes around, a backslash before

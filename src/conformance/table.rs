@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use crate::table::text_of_cell;
 use crate::{Error, Place, Result, input_file};
 
 /// What a table holds, told by its columns.
@@ -100,7 +101,7 @@ impl<'a> Row<'a> {
                 "compare the header with the published golden tables",
             )
         })?;
-        Ok(self.table.rows[self.index].get(*index).unwrap_or(""))
+        Ok(text_of_cell(self.table.rows[self.index].get(*index).unwrap_or("")))
     }
 
     /// A finite number that must be there.

@@ -95,7 +95,7 @@ pub(super) fn start(
     let thread = std::thread::Builder::new()
         .name("lanesweep device".to_owned())
         .spawn(guarded)
-        .map_err(|e| Error::Internal(format!("the device's thread did not start: {e}")))?;
+        .map_err(|e| Error::io("the device's thread", "start", e))?;
     let opened = opened.recv().map_err(|_| gone(&name))??;
     Ok((sender, opened, thread))
 }

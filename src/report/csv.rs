@@ -3,13 +3,14 @@
 use crate::criterion::Criterion;
 use crate::parameterization::ParameterizationId;
 use crate::score::{ClaimResult, Interval, ScoreTable, f1, precision, recall};
+use crate::table::cell_text;
 use crate::{Error, Result};
 
 pub(crate) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
     let broken = |e: &dyn std::fmt::Display| Error::Internal(format!("a CSV table cannot be written: {e}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        writer.write_record(row).map_err(|e| broken(&e))?;
+        writer.write_record(row.iter().map(|cell| cell_text(cell).into_owned())).map_err(|e| broken(&e))?;
     }
     writer.into_inner().map_err(|e| broken(&e))
 }
@@ -27,10 +28,14 @@ pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
     let mut rows =
         vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
     for category in &scores.categories {
-        for cell in &category.cells {
+        for (at, cell) in category.cells.iter().enumerate() {
             let failures =
                 if cell.variant == 0 { cell.counts.both } else { cell.counts.both + cell.counts.only_s_prime };
-            let model = category.models.iter().position(|m| *m == cell.model).unwrap_or(0);
+            // Cells are variant × model × criterion, these counts variant × model.
+            let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
+                let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
+                Error::Internal(format!("no count of lanes at the time cap for {what}"))
+            })?;
             rows.push(vec![
                 category.category.key().to_owned(),
                 category.variants[cell.variant].clone(),
@@ -38,7 +43,7 @@ pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
                 cell.criterion.key().to_owned(),
                 failures.to_string(),
                 category.simulations.to_string(),
-                category.capped[cell.variant * category.models.len() + model].to_string(),
+                capped.to_string(),
                 data.to_owned(),
             ]);
         }
@@ -132,4 +137,41 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
         }
     }
     text(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::driver::ModelId;
+    use crate::scenario::Category;
+    use crate::score::{CategoryScores, Cell, ScoreOptions};
+    use crate::sweep::{Confusion, Headway};
+
+    fn scores(capped: Vec<u64>) -> ScoreTable {
+        let cell = |model, criterion| {
+            let counts = Confusion::default();
+            Cell { variant: 0, model, criterion, counts, f1_interval: None, undefined_draws: 0 }
+        };
+        let models = [ModelId::Rss, ModelId::Fsm];
+        let scores = CategoryScores {
+            category: Category::Lvd,
+            scenarios: 1,
+            simulations: 10,
+            variants: vec!["S".to_owned()],
+            // One model that the cells have is not in the list.
+            models: vec![ModelId::Rss],
+            cells: models.into_iter().flat_map(|m| Criterion::ALL.map(|c| cell(m, c))).collect(),
+            capped,
+            draws: Vec::new(),
+        };
+        ScoreTable { categories: vec![scores], headways: Headway::paper(), options: ScoreOptions::default() }
+    }
+
+    #[test]
+    fn no_model_gets_the_capped_lanes_of_another_one() {
+        let text = String::from_utf8(failures(&scores(vec![3, 8]), "synthetic").unwrap()).unwrap();
+        assert!(text.contains("lvd,S,RSS,collision,0,10,3,") && text.contains("lvd,S,FSM,btn,0,10,8,"), "{text}");
+        let error = failures(&scores(vec![3]), "synthetic").unwrap_err();
+        assert!(error.to_string().contains("FSM of S"), "{error}");
+    }
 }

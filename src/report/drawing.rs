@@ -3,6 +3,7 @@
 //! `kuva` supplies the scene and the SVG writer (number format, XML escapes); layout is ours. Every figure is 1000 px
 //! wide and as high as its texts need, so no text is cut.
 
+use crate::plain_text::acts;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
@@ -274,9 +275,9 @@ pub(super) fn text(scene: &mut Scene, (x, y): (f64, f64), line: &str, set: Type,
     });
 }
 
-/// Without the characters that XML 1.0 allows in no form, not even escaped.
+/// Without the characters that XML 1.0 allows in no form, not even escaped, and those that turn or hide others.
 pub(super) fn plain(line: &str) -> String {
-    let allowed = |c: char| !c.is_control() && !matches!(c, '\u{FFFE}' | '\u{FFFF}');
+    let allowed = |c: char| !acts(c) && !matches!(c, '\u{FFFE}' | '\u{FFFF}');
     line.chars().map(|c| if allowed(c) { c } else { '\u{FFFD}' }).collect()
 }
 

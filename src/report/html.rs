@@ -1,10 +1,11 @@
 //! One self-contained page: words, tables and figures of a run in one file, without a script, and with nothing that is
 //! fetched from elsewhere. What is on it is decided by who fills a [`Page`]; how it looks is in `templates`.
 
-use minijinja::Environment;
-use minijinja::value::Serde;
+use minijinja::value::{Serde, Value};
+use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
 
+use crate::plain_text::shown;
 use crate::{Error, Result};
 
 const TEMPLATE: &str = include_str!("templates/report.html");
@@ -89,7 +90,11 @@ impl Page {
         }
         let broken = |e: minijinja::Error| Error::Internal(format!("the report's page cannot be made: {e:#}"));
         let mut environment = Environment::new();
-        // The name's ending decides that texts are escaped.
+        // Beside the escapes of HTML, for which the name's ending decides: what turns or hides text is shown.
+        environment.set_formatter(|out, state, value| match value.as_str() {
+            Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(shown(text).as_ref())),
+            _ => escape_formatter(out, state, value),
+        });
         environment.add_template("report.html", TEMPLATE).map_err(broken)?;
         let template = environment.get_template("report.html").map_err(broken)?;
         template.render(Serde(Context { style: STYLE, page: self })).map_err(broken)
@@ -121,7 +126,7 @@ mod tests {
             caption: "A & B".into(),
             header: vec!["name".into(), "value".into()],
             texts: 1,
-            rows: vec![vec!["<script>alert(1)</script>".into(), "1\n[0 2]".into()]],
+            rows: vec![vec!["<script>alert(1)</script>\u{202e}\u{1b}".into(), "1\n[0 2]".into()]],
         };
         let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"50\" \
                    fill=\"#000\"><rect width=\"100%\" height=\"100%\"/></svg>\n";
@@ -142,6 +147,7 @@ mod tests {
     fn texts_are_escaped_and_figures_are_not() {
         let html = page().html().unwrap();
         assert!(!html.contains("<script"), "{html}");
+        assert!(html.contains("\\u{202e}\\u{1b}") && !html.contains(['\u{202e}', '\u{1b}']), "{html}");
         assert!(html.contains("&lt;script&gt;") && html.contains("A &amp; B") && html.contains("x &lt; y"));
         assert!(
             html.contains("viewBox=\"0 0 1000 50\" role=\"img\" fill=\"#000\"><rect width=\"100%\" height=\"100%\"/>")
@@ -156,6 +162,20 @@ mod tests {
         for outside in ["http:", "https:", "//", "@import", "url(", "<script", "src="] {
             assert!(!html.contains(outside), "{outside}");
         }
+    }
+
+    #[test]
+    fn the_page_forbids_scripts_and_everything_from_elsewhere() {
+        let html = page().html().unwrap();
+        let head = html.split_once("</head>").unwrap().0;
+        let policy = head.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap().1;
+        let policy = policy.split_once('"').unwrap().0;
+        assert!(policy.starts_with("default-src 'none';"), "{policy}");
+        // Styles are inline, the icon is empty; nothing else is let in.
+        let allowed: Vec<&str> = policy.split("; ").skip(1).collect();
+        let none = ["base-uri 'none'", "form-action 'none'"];
+        assert_eq!(allowed, [&["style-src 'unsafe-inline'", "img-src data:"][..], &none].concat());
+        assert!(head.find("Content-Security-Policy") < head.find("<style"), "before what it rules");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use serde_json::{Map, Value};
 
 use crate::criterion::Criterion;
 use crate::sweep::{NO_STEP, Outcome};
+use crate::table::text_of_cell;
 use crate::{Error, Result};
 
 /// Columns whose fields are texts even where they look like numbers (a parameterization's key is `1`). Every other
@@ -35,7 +36,9 @@ pub(super) fn records(csv: &[u8]) -> Result<Value> {
     for row in reader.records() {
         let row = row.map_err(broken)?;
         let fields = names.iter().zip(&row).filter(|(name, _)| *name != "data");
-        rows.push(Value::Object(fields.map(|(name, field)| (name.clone(), value(name, field))).collect::<Map<_, _>>()));
+        rows.push(Value::Object(
+            fields.map(|(name, field)| (name.clone(), value(name, text_of_cell(field)))).collect::<Map<_, _>>(),
+        ));
     }
     Ok(Value::Array(rows))
 }
@@ -72,6 +75,7 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
         "t_react_s": time(outcome.reaction_step),
         "t_crash_s": time(outcome.contact_step),
         "impact_speed_mps": is_contact.then_some(outcome.impact_speed),
+        "impact_closing_speed_mps": is_contact.then_some(outcome.impact_closing_speed),
         "t_end_s": time(outcome.end_step),
     })
 }

@@ -2,7 +2,9 @@
 //! threshold each lies.
 
 use crate::criterion::Criterion;
+use crate::readable::{count, count_of};
 use crate::sweep::{Chunk, LanePlan, Outcome};
+use crate::table::quoted;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,10 +53,10 @@ impl ReferenceComparison {
     pub fn text(&self) -> String {
         let mut text = format!(
             "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
-            self.differences.len(),
-            self.lanes * Criterion::ALL.len() as u64,
-            self.lanes,
-            self.cap_differs
+            count_of(self.differences.len()),
+            count(self.lanes * Criterion::ALL.len() as u64),
+            count(self.lanes),
+            count(self.cap_differs)
         );
         for d in self.differences.iter().take(20) {
             let side = if d.failed_in_f32 { "fails in f32 only" } else { "fails in f64 only" };
@@ -68,7 +70,7 @@ impl ReferenceComparison {
         let mut text = "lane,criterion,failed_in_f32,distance_to_threshold\n".to_owned();
         for d in &self.differences {
             let failed = u8::from(d.failed_in_f32);
-            text += &format!("{},{},{failed},{}\n", d.lane, d.criterion.key(), d.distance);
+            text += &format!("{},{},{failed},{}\n", quoted(&d.lane), d.criterion.key(), d.distance);
         }
         text
     }

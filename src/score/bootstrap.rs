@@ -24,6 +24,7 @@ pub struct ScoreOptions {
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
     /// Below so many failures in S a claim is not judged (10).
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub least_failures: u32,
 }
 

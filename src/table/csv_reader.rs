@@ -9,6 +9,7 @@ use std::rc::Rc;
 use serde_json::Value;
 
 use super::Row;
+use super::spreadsheet::text_of_cell;
 use crate::{Error, Place, Result, input_file};
 
 /// Longest row: no table here has any near it, and a quote that is never closed makes the rest of a file one row.
@@ -76,7 +77,7 @@ impl CsvRows {
         let number = self.record.position().map_or(0, csv::Position::line);
         let value = |at: &usize| match self.record.get(*at) {
             None | Some("") => Value::Null,
-            Some(text) => Value::from(text),
+            Some(text) => Value::from(text_of_cell(text)),
         };
         Ok(Some(Row { number, values: self.wanted.iter().map(value).collect() }))
     }

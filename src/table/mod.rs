@@ -17,11 +17,20 @@ mod parquet_reader;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
 mod reader;
+mod spreadsheet;
 mod writer;
 
 pub use column::{Cell, Column, Kind};
 pub use format::TableFormat;
 pub(crate) use names::{Named, Resolved, nearest, resolve};
+#[cfg(feature = "parquet")]
+pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::{Row, TableReader};
-pub(crate) use writer::quoted;
+pub(crate) use spreadsheet::{cell_text, quoted, text_of_cell};
 pub use writer::{TableFacts, TableWriter};
+
+/// No reader here panics without Parquet; see the function of this name with it.
+#[cfg(not(feature = "parquet"))]
+pub fn is_panic_caught() -> bool {
+    false
+}

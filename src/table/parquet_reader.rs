@@ -7,7 +7,6 @@ use std::cell::Cell;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Once;
 
 use arrow::array::{Array, ArrayRef, AsArray, StructArray};
 use arrow::compute::cast;
@@ -57,17 +56,14 @@ thread_local! {
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The decoder's work. Damage that makes it panic is an error about the file, and nothing else is printed.
+/// Whether a panic of this thread, which works on a damaged Parquet file, is going to be an error about that file: a
+/// program's panic hook (`std::panic::set_hook`) need not tell it. The library sets no hook.
+pub fn is_panic_caught() -> bool {
+    IS_CAUGHT.get()
+}
+
+/// The decoder's work. Damage that makes it panic is an error about the file.
 fn guarded<T>(path: &Path, work: impl FnOnce() -> std::result::Result<T, String>) -> Result<T> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let others = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| {
-            if !IS_CAUGHT.get() {
-                others(info);
-            }
-        }));
-    });
     IS_CAUGHT.set(true);
     let result = catch_unwind(AssertUnwindSafe(work));
     IS_CAUGHT.set(false);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
+use super::spreadsheet::quoted;
 use super::{Cell, Column, Kind, TableFormat, jsonl};
 use crate::atomic_file::AtomicFile;
 use crate::{Error, Result};
@@ -138,13 +139,4 @@ fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
 
 fn joined<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
-}
-
-/// A text as a CSV field.
-pub(crate) fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
-    }
 }

@@ -1,0 +1,99 @@
+//! Numbers for people: thousands separators, at most four significant digits, ∞ and – instead of `inf` and `NaN`. Every
+//! text and page writes its numbers here; files have every digit.
+
+/// Significant digits of a number for people.
+const DIGITS: usize = 4;
+
+/// `1,234,567`.
+pub(crate) fn count(count: impl Into<u64>) -> String {
+    grouped(&count.into().to_string())
+}
+
+/// The same for what is counted in memory.
+pub(crate) fn count_of(length: usize) -> String {
+    grouped(&length.to_string())
+}
+
+/// A quantity with four significant digits at most and no idle zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
+pub(crate) fn value(value: f64) -> String {
+    let text = significant(value, DIGITS);
+    let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
+    match digits.contains('.') {
+        true => format!("{}{power}", digits.trim_end_matches('0').trim_end_matches('.')),
+        false => text,
+    }
+}
+
+/// A number with so many significant digits, idle zeros too, so that columns stand below one another: `0.450`, `36.0`.
+/// Powers of ten below 0.001 and from a thousand million on.
+pub(crate) fn significant(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "–".to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "∞" } else { "-∞" }.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Rounded once, in decimal: 999.96 has the exponent of 1,000.
+    let rounded = format!("{value:.*e}", digits.saturating_sub(1));
+    let Some((mantissa, exponent)) = rounded.split_once('e') else { return rounded };
+    match exponent.parse::<i32>() {
+        Ok(exponent @ -3..=8) => {
+            let whole: f64 = rounded.parse().unwrap_or(value);
+            let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+            grouped(&format!("{whole:.decimals$}"))
+        }
+        _ => format!("{mantissa}e{exponent}"),
+    }
+}
+
+/// Thousands separators in the whole part of a decimal number.
+fn grouped(number: &str) -> String {
+    let (sign, number) = number.split_at(usize::from(number.starts_with('-')));
+    let (whole, fraction) = number.split_at(number.find('.').unwrap_or(number.len()));
+    let head = whole.len() % 3;
+    let mut groups: Vec<&str> = if head > 0 { vec![&whole[..head]] } else { Vec::new() };
+    groups.extend((head..whole.len()).step_by(3).map(|at| &whole[at..at + 3]));
+    format!("{sign}{}{fraction}", groups.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_thousands_separators() {
+        assert_eq!(
+            [0_u64, 999, 1000, 151_760, 100_000_000].map(count),
+            ["0", "999", "1,000", "151,760", "100,000,000"]
+        );
+        assert_eq!((count(7_u32), count_of(4114)), ("7".to_owned(), "4,114".to_owned()));
+    }
+
+    #[test]
+    fn quantities_have_four_digits_at_most_and_no_idle_zeros() {
+        let cases = [
+            (0.449_999_999_999_071_1, "0.45"),
+            (36.0, "36"),
+            (-1.25, "-1.25"),
+            (21.356_78, "21.36"),
+            (999.96, "1,000"),
+            (12_345.6, "12,350"),
+            (-98_765_432.0, "-98,770,000"),
+            (0.001_234_56, "0.001235"),
+            (0.000_123_456, "1.235e-4"),
+            (1e10, "1e10"),
+            (0.0, "0"),
+            (-0.0, "0"),
+            (f64::INFINITY, "∞"),
+            (f64::NEG_INFINITY, "-∞"),
+            (f64::NAN, "–"),
+        ];
+        for (number, text) in cases {
+            assert_eq!(value(number), text);
+        }
+        assert_eq!([0.45, 36.0, 1234.0, 9.999].map(|v| significant(v, 3)), ["0.450", "36.0", "1,230", "10.0"]);
+    }
+}
