@@ -247,4 +247,110 @@ fn help_names_every_verb_and_every_exit_code() {
     for exit in lanesweep::cli::Exit::ALL {
         assert!(help.contains(exit.meaning()), "{exit:?}");
     }
+    let chapter = include_str!("../docs/src/reference/exit-codes.md");
+    for code in lanesweep::cli::Exit::ALL.map(|exit| exit.code()).into_iter().chain([129, 130, 143]) {
+        assert!(help.lines().any(|line| line.trim_start().starts_with(&format!("{code}  "))), "{code}: {help}");
+        assert!(chapter.contains(&format!("\n| {code} | ")), "the chapter on exit codes has no {code}");
+    }
+}
+
+const CASE: &str = "simulate --category cut-in --ego-speed 30 --speed 20 --lateral-speed 1.5 --model Reg157";
+
+/// `simulate` on a case with more flags: stdout and, as one line, stderr.
+fn simulated(flags: &str) -> (String, String) {
+    let args: Vec<&str> = CASE.split(' ').chain(flags.split(' ')).collect();
+    let output = lanesweep(&args);
+    assert_eq!(code(&output), 0, "{flags}: {}", stderr(&output));
+    (String::from_utf8(output.stdout.clone()).unwrap(), stderr(&output))
+}
+
+#[test]
+fn a_contact_is_told_by_its_kind_and_its_closing_speed() {
+    let (json, _) = simulated("--thw 0.4 --format json");
+    let outcome: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let outcome = &outcome["lanes"][0]["outcome"];
+    let speed = |name: &str| outcome[name].as_f64().unwrap_or_else(|| panic!("{name}: {outcome}"));
+    let (ego, closing) = (speed("impact_speed_mps"), speed("impact_closing_speed_mps"));
+    assert!((ego - closing - 20.0).abs() < 1e-9, "the other one drives 20 m/s: {outcome}");
+    let (_, said) = simulated("--thw 0.4");
+    assert!(said.contains("(rear-end contact, closing at ") && said.contains(" m/s, the ego at "), "{said}");
+    let told = said.split("closing at ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    assert!((told - closing).abs() < 0.01, "{said}");
+}
+
+#[test]
+fn numbers_for_people_have_four_digits_at_most_and_an_infinite_one_a_sign() {
+    for flags in ["--thw 0.4", "--thw 1.1", "--gap 33.333333"] {
+        let (_, said) = simulated(flags);
+        for number in said.split(|c: char| !c.is_ascii_digit() && c != '.').filter(|n| n.contains('.') && n.len() > 1) {
+            let digits = number.trim_start_matches(['0', '.']).chars().filter(char::is_ascii_digit).count();
+            assert!(digits <= 4, "{number}: {said}");
+        }
+    }
+    // At the contact no braking helps.
+    let (csv, said) = simulated("--thw 0.4");
+    assert!(said.contains("max BTN ∞") && !said.contains("inf"), "{said}");
+    assert!(csv.contains(",inf,"), "files keep their spelling: {csv}");
+}
+
+#[test]
+fn the_initial_gap_is_that_of_the_first_row_whatever_the_profile() {
+    for profile in ["paper", "jrc-2021"] {
+        let (csv, said) = simulated(&format!("--thw 1.2 --profile {profile}"));
+        let mut lines = csv.lines();
+        let column = lines.next().unwrap().split(',').position(|name| name == "other_gap_m").unwrap();
+        let first: f64 = lines.next().unwrap().split(',').nth(column).unwrap().parse().unwrap();
+        let told = said.split("initial gap ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+        assert!((told - first).abs() < 0.005, "{profile}: {said} but the series starts at {first}");
+    }
+}
+
+#[test]
+fn quiet_means_errors_only() {
+    let args: Vec<&str> = CASE.split(' ').chain(["-q", "--thw", "0.4"]).collect();
+    let output = lanesweep(&args);
+    assert!(output.stderr.is_empty() && !output.stdout.is_empty(), "{}", stderr(&output));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_error_stream_that_takes_nothing_does_not_end_the_work() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let run = |args: &str| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+        command.args(args.split(' ')).stderr(full()).stdout(std::process::Stdio::null()).status().unwrap().code()
+    };
+    assert_eq!(run(&format!("{CASE} --thw 1")), Some(0));
+    assert_eq!(run("mine no-such-folder"), Some(6));
+    assert_eq!(run("study --synth-recordings"), Some(2));
+}
+
+#[cfg(unix)]
+#[test]
+fn threads_that_the_system_does_not_give_are_no_defect_of_the_program() {
+    for limit in ["ulimit -v 3000000", "ulimit -v 1500000"] {
+        let script = format!("{limit}; exec \"$0\" {CASE} --thw 1 --threads 4096");
+        let output = std::process::Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_lanesweep")]).output();
+        let output = output.unwrap();
+        assert_eq!(code(&output), 6, "{limit}: {}", stderr(&output));
+        assert!(stderr(&output).contains("--threads 4096: cannot start"), "{limit}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_study_of_some_headways_and_models_computes_no_claim_that_needs_all() {
+    let out = tempfile::tempdir().unwrap();
+    let few = ["--categories", "lvd", "--models", "FSM,RSS", "--thw", "1.2,0.4", "--backend", "cpu"];
+    let study = lanesweep(&[&["-q", "study", "--out", text(out.path())], &few[..], &SMALL[..]].concat());
+    assert_eq!(code(&study), 0, "{}", stderr(&study));
+    let printed = String::from_utf8(study.stdout).unwrap();
+    assert!(!printed.contains("Reg157 ") && printed.contains("not computed"), "{printed}");
+    let mut claims = csv::Reader::from_path(out.path().join("claims.csv")).unwrap();
+    let verdict = claims.headers().unwrap().iter().position(|name| name == "verdict").unwrap();
+    let verdicts: Vec<String> = claims.records().map(|row| row.unwrap()[verdict].to_owned()).collect();
+    assert!(verdicts.len() > 3 && verdicts.iter().all(|v| v == "not computed"), "{verdicts:?}");
+    let headways = std::fs::read_to_string(out.path().join("headways.csv")).unwrap();
+    assert!(headways.contains(",1.2s,RSS,") && !headways.contains(",2s,") && !headways.contains("CCHDM"), "{headways}");
+    assert_eq!(code(&lanesweep(&["study", "--thw", "0"])), 2);
+    assert_eq!(code(&lanesweep(&["study", "--models", "ACC"])), 2);
 }

@@ -407,6 +407,11 @@ fn known_shares_stand_beside_the_presets_under_the_profile_of_the_jrc_only() {
     };
     let jrc = shares(&[]);
     assert!(jrc.contains("known %") && jrc.contains("627 simulations"), "{jrc}");
+    // The grid was chosen for this share: that it comes out says nothing.
+    assert!(jrc.contains("+0.01*") && jrc.contains("* The known grid is not published. Ours was chosen"), "{jrc}");
+    let cut_in = lanesweep(&["-q", "map", "cut-in", "--preset", "jrc", "--out", text(dir.path())]);
+    let cut_in = String::from_utf8(cut_in.stdout).unwrap();
+    assert!(cut_in.contains("known %") && !cut_in.contains('*') && cut_in.contains("15,930"), "{cut_in}");
     assert!(!shares(&["--profile", "paper"]).contains("known %"));
     assert!(!shares(&["--criterion", "ttc"]).contains("known %"));
     assert!(shares(&["--reference"]).contains("| FSM   |   209 |    0 |    0.00 |"));

@@ -286,6 +286,10 @@ fn the_worst_lanes_of_a_study_are_those_with_the_smallest_margin() {
     assert_eq!(chosen.len(), 4);
     let collisions = least.values().filter(|(collides, _)| *collides).count();
     assert_eq!(chosen.iter().filter(|r| r["collision"] == "fail").count(), collisions.min(4));
+    for row in &chosen {
+        let speeds = ["impact_speed_mps", "impact_closing_speed_mps"].map(|name| row[name].is_empty());
+        assert_eq!(speeds, [row["collision"] == "pass"; 2], "no speed at a contact that was not: {row:?}");
+    }
     let ids: std::collections::HashSet<_> = chosen.iter().map(|r| r["lane"].split('/').next().unwrap()).collect();
     assert_eq!(ids.len(), 4, "every scenario once");
 }

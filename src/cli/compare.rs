@@ -20,6 +20,7 @@ use crate::driver::ModelId;
 use crate::estimate::Enough;
 use crate::parameterization::ParameterizationId;
 use crate::profile::Profile;
+use crate::readable::count;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
 use crate::report::files::{check_folder, make_folder, write_atomically};
@@ -120,7 +121,7 @@ impl Compare {
         let categories = source::categories(&self.categories, "--categories")?;
         let ids = lists::parameterizations(&categories, &self.parameterization)?;
         let models = lists::models(&self.models)?;
-        let headways = self.headways()?;
+        let headways = lists::paper_or_headways(&self.thw)?;
         self.check_samples()?;
         let typed = Driven { hours: self.hours, kilometres: self.km };
         typed.validate()?;
@@ -161,7 +162,7 @@ impl Compare {
             return self.forecast(&source, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
         make_folder(&self.out)?;
-        tracing::info!("{} lanes of S and S' on {}", plan.lane_count(), opened.backend().describe());
+        tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let recheck = opened.device().map(|_| self.seed);
         let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck };
         let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
@@ -292,13 +293,6 @@ impl Compare {
         self.format.print(|| text, || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(())
-    }
-
-    fn headways(&self) -> Result<Vec<Headway>> {
-        match self.thw.trim() {
-            "paper" => Ok(Headway::paper()),
-            list => lists::headways(list, "`paper`"),
-        }
     }
 
     fn check_samples(&self) -> Result<()> {

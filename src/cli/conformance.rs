@@ -10,6 +10,7 @@ use super::Exit;
 use super::format::FormatFlag;
 use crate::conformance::{LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
 use crate::profile::Profile;
+use crate::readable::{count, count_of};
 use crate::report::records;
 use crate::scenario::read_scenarios;
 use crate::{Error, Place, Result};
@@ -61,10 +62,10 @@ impl Conformance {
                 text,
                 "{} lanes of profile paper in f64 and f32: {} verdicts differ between the two; {} ties (rounding \
                  decides; equal once the gap moves by 1e-9 m); the end time differs in {} (information).",
-                seen.lanes,
-                seen.f32_different.len(),
-                seen.ties.len(),
-                seen.end_differs
+                count(seen.lanes),
+                count_of(seen.f32_different.len()),
+                count_of(seen.ties.len()),
+                count(seen.end_differs)
             );
             for lane in seen.ties.iter().map(|l| format!("  tie: {l}\n")) {
                 text += &lane;
@@ -129,13 +130,13 @@ fn render(tallies: &[Tally]) -> String {
         table.add_row([
             t.label.clone(),
             t.model.map_or("-".to_owned(), |m| m.name().to_owned()),
-            t.rows.to_string(),
-            t.robust.to_string(),
-            t.reacted.to_string(),
-            t.collided.to_string(),
-            format!("{}/{}", t.labels_equal, t.rows),
-            format!("{}/{}", t.types_equal, t.robust),
-            t.fragile_different.to_string(),
+            count(t.rows),
+            count(t.robust),
+            count(t.reacted),
+            count(t.collided),
+            format!("{}/{}", count(t.labels_equal), count(t.rows)),
+            format!("{}/{}", count(t.types_equal), count(t.robust)),
+            count(t.fragile_different),
             if t.passes() { "yes" } else { "NO" }.to_owned(),
         ]);
     }
@@ -154,7 +155,7 @@ fn render(tallies: &[Tally]) -> String {
     }
     for (quantity, compared, value, place) in largest {
         let at = if value > 0.0 { format!("  at {place}") } else { String::new() };
-        let _ = writeln!(text, "  {quantity:<28} {compared:>7} values  {value:.2e}{at}");
+        let _ = writeln!(text, "  {quantity:<28} {:>7} values  {value:.2e}{at}", count(compared));
     }
     text += "labels: equal collision labels (verdicts, for lanes); fragile: rows in which rounding decides and that \
              differ (information).\n";

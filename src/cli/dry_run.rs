@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::format::FormatFlag;
 use crate::Result;
+use crate::readable::{count, value};
 use crate::report::records::document;
 use crate::sweep::{Block, Forecast, LanePlan};
 
@@ -79,13 +80,13 @@ impl DryRun {
         let mut text = format!("Dry run: nothing is written.\nData    {}\n", self.data);
         let lanes: u64 = self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
         let most = if self.is_at_most { "at most " } else { "" };
-        text += &format!("Lanes   {most}{}\n", grouped(lanes));
+        text += &format!("Lanes   {most}{}\n", count(lanes));
         let wide = |of: &dyn Fn(&Part) -> usize| self.parts.iter().map(of).max().unwrap_or(0);
         let (a, b) = (wide(&|part| part.of.chars().count()), wide(&|part| part.what.chars().count()));
-        let c = wide(&|part| grouped(part.units).len());
-        let d = wide(&|part| grouped(part.lanes).len());
+        let c = wide(&|part| count(part.units).len());
+        let d = wide(&|part| count(part.lanes).len());
         for Part { of, what, units, lanes } in &self.parts {
-            let (count, lanes) = (grouped(*units), grouped(*lanes));
+            let (count, lanes) = (count(*units), count(*lanes));
             text += &format!("        {of:a$}  {what:b$}  {count:>c$} {}  {lanes:>d$} lanes\n", self.units);
         }
         let more = size(self.more_bytes);
@@ -103,7 +104,7 @@ impl DryRun {
                 "Time    {most}{} for the lanes, from {} of them run just now ({:.3} \u{b5}s each): an estimate, on this \
                  machine as it is loaded now\n        on {}\n",
                 time(forecast.seconds),
-                grouped(forecast.measured_lanes),
+                count(forecast.measured_lanes),
                 1e6 * forecast.seconds / forecast.lanes.max(1) as f64,
                 self.backend
             ),
@@ -122,21 +123,12 @@ impl DryRun {
     }
 }
 
-/// `1,234,567`.
-fn grouped(count: u64) -> String {
-    let digits = count.to_string();
-    let head = digits.len() % 3;
-    let mut groups: Vec<&str> = if head > 0 { vec![&digits[..head]] } else { Vec::new() };
-    groups.extend((head..digits.len()).step_by(3).map(|at| &digits[at..at + 3]));
-    groups.join(",")
-}
-
 fn size(bytes: u64) -> String {
     let mebibytes = bytes as f64 / f64::from(1 << 20);
     match mebibytes {
         m if m < 10.0 => format!("{m:.1} MiB"),
         m if m < 10_240.0 => format!("{m:.0} MiB"),
-        m => format!("{:.1} GiB", m / 1024.0),
+        m => format!("{} GiB", value(m / 1024.0)),
     }
 }
 
@@ -146,7 +138,7 @@ fn time(seconds: f64) -> String {
         s if s < 600.0 => format!("{s:.0} s"),
         s if s < 7200.0 => format!("{:.0} min", s / 60.0),
         s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
-        s => format!("{:.1} days", s / 86_400.0),
+        s => format!("{} days", value(s / 86_400.0)),
     }
 }
 
@@ -163,8 +155,7 @@ mod tests {
 
     #[test]
     fn numbers_read_as_a_person_writes_them() {
-        assert_eq!([0, 999, 1000, 151_760].map(grouped), ["0", "999", "1,000", "151,760"]);
         assert_eq!([0.3, 61.0, 900.0, 36_000.0].map(time), ["0.30 s", "61 s", "15 min", "10.0 h"]);
-        assert_eq!([1 << 20, 200 << 20, 20 << 30].map(size), ["1.0 MiB", "200 MiB", "20.0 GiB"]);
+        assert_eq!([1 << 20, 200 << 20, 20 << 30].map(size), ["1.0 MiB", "200 MiB", "20 GiB"]);
     }
 }

@@ -10,6 +10,7 @@ use super::format::FormatFlag;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::openscenario::{EgoMotion, export_folder};
+use crate::readable::count_of;
 use crate::report::files::check_folder;
 use crate::report::records::document;
 use crate::scenario::Side;
@@ -126,7 +127,7 @@ impl Xosc {
             document(&rows.collect())
         };
         self.format.print(|| lines, list)?;
-        tracing::info!("{} scenarios written to {}", rows.len(), self.out.display());
+        tracing::info!("{} scenarios written to {}", count_of(rows.len()), self.out.display());
         Ok(Exit::Ok)
     }
 

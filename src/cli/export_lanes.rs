@@ -378,6 +378,7 @@ fn properties(trace: &Trace, known: &Known, extras: &Extras, are_lengths_known: 
     let outcome = &trace.outcome;
     let time = |step: u32| if step == NO_STEP { String::new() } else { trace.time_s(step).to_string() };
     let value = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
+    let at_contact = |v: f64| if outcome.contact_step == NO_STEP { String::new() } else { value(v) };
     let verdict = |c: Criterion| if outcome.verdicts.failed(c) { "fail" } else { "pass" }.to_owned();
     let end = match outcome.end {
         EndReason::Contact => "contact",
@@ -408,7 +409,8 @@ fn properties(trace: &Trace, known: &Known, extras: &Extras, are_lengths_known: 
         ("min_gap_m", value(outcome.min_gap)),
         ("reaction_s", time(outcome.reaction_step)),
         ("contact_s", time(outcome.contact_step)),
-        ("impact_speed_mps", value(outcome.impact_speed)),
+        ("impact_speed_mps", at_contact(outcome.impact_speed)),
+        ("impact_closing_speed_mps", at_contact(outcome.impact_closing_speed)),
         ("end_s", time(outcome.end_step)),
         ("end", end.to_owned()),
     ];

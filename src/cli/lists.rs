@@ -43,6 +43,17 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     list.split(',').map(parse).collect()
 }
 
+/// The same, or `paper`: the ten of the paper.
+///
+/// # Errors
+/// As [`headways`].
+pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
+    match text.trim() {
+        "paper" => Ok(Headway::paper()),
+        list => headways(list, "`paper`"),
+    }
+}
+
 /// The parameterizations of `--parameterization` among those of some categories, in the registry's order; all where
 /// none is given.
 ///

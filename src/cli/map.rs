@@ -18,6 +18,7 @@ use crate::grid::{
 };
 use crate::openscenario::{Names, Rename, read_distribution, variations};
 use crate::profile::Profile;
+use crate::readable::{count, value};
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
 use crate::scenario::Category;
@@ -168,7 +169,8 @@ impl Map {
             bar.inc(plan.grid.cell_count() as u64);
             let known = |model: &ModelId| if is_jrc { preset.known(*model) } else { None };
             let known_percent = plan.models.iter().map(known).collect();
-            grids.push(MappedGrid { plan, map, known_percent, other });
+            let is_chosen_to_match = preset.is_chosen_to_match && is_jrc;
+            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other });
         }
         bar.finish_and_clear();
         let host = MapHost {
@@ -192,8 +194,8 @@ impl Map {
             || report.text(),
             || report.json(written.iter().map(name).filter(|name| name != "map.json").collect()),
         )?;
-        let (count, seconds, host) = (report.simulations(), report.host.sweep_s, &report.host.backend);
-        tracing::info!("{count} simulations in {seconds:.3} s on {host}");
+        let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
+        tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.len(), self.out.display());
         Ok(Exit::Ok)
     }
@@ -220,7 +222,8 @@ impl Map {
                     Some(path) => Grid::new(self.of_distribution(path, category)?)?,
                     None => self.own_grid(category)?,
                 };
-                vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent: Vec::new() }]
+                let known_percent = Vec::new();
+                vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent, is_chosen_to_match: false }]
             }
         };
         if !self.models.is_empty() {

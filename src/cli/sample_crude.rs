@@ -14,6 +14,7 @@ use super::sample_lanes;
 use super::sample_plan::PlannedSample;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use crate::estimate::StopRule;
+use crate::readable::count;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
 use crate::sampling::{
     BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
@@ -74,7 +75,7 @@ pub(super) fn run(
     let recheck = opened.device().map(|_| Recheck::new(plan, planned.facts.seed, ONE_IN));
     let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
     let counting = planned.counting();
-    tracing::info!("{} samples on {}", work.units.end - work.units.start, lanes.backend.describe());
+    tracing::info!("{} samples on {}", count(work.units.end - work.units.start), lanes.backend.describe());
     if work.units.is_empty() {
         desk.finish(work, [0, 0])?;
         return Ok(Exit::Ok);

@@ -17,6 +17,7 @@ use crate::estimate::{BinomialInterval, Checkpoints, StopRule};
 use crate::grid::Parameter;
 use crate::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::profile::Profile;
+use crate::readable;
 use crate::report::files::{make_folder, write_atomically};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
@@ -88,8 +89,8 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
             "{:.3} % of the distribution of {} lie outside {} … {} {} and are not drawn",
             100.0 * (1.0 - p.kept_share),
             p.parameter.key,
-            p.parameter.least,
-            p.parameter.most,
+            readable::value(p.parameter.least),
+            readable::value(p.parameter.most),
             p.parameter.unit
         );
     }
@@ -125,7 +126,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         exposure: None,
         is_sampled_headway: samples.has_distance(),
     };
-    tracing::info!("{count} samples on {}", lanes.backend.describe());
+    tracing::info!("{} samples on {}", readable::count(count), lanes.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
     let crude = sample_crude(&plan, 0..count, &lanes, &counting, &options, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);

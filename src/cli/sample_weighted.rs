@@ -16,6 +16,7 @@ use super::weighted_plan::PlannedWeighted;
 use crate::driver::ModelId;
 use crate::estimate::{BlockSums, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
 use crate::parts::{Countable, Ledger};
+use crate::readable::count;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
@@ -56,7 +57,7 @@ pub(super) fn run(
     }
     let mut work = desk.begin::<WeightedTally>(&[], true)?;
     let left: u64 = work.ledger.missing(work.units.clone())?.iter().map(|range| range.end - range.start).sum();
-    tracing::info!("{left} samples on {}", opened.backend().describe());
+    tracing::info!("{} samples on {}", count(left), opened.backend().describe());
     {
         let _resumable = interrupt::resumable();
         let bar = console::progress(verbosity, left, "sampling");

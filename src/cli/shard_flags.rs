@@ -8,6 +8,7 @@ use clap::Args;
 
 use crate::lock::FolderLock;
 use crate::parts::{Countable, Journal, Ledger, Part, Shard, read_part, write_part};
+use crate::readable::count;
 use crate::report::files::make_folder;
 use crate::{Error, Place, Result, interrupt};
 
@@ -155,7 +156,8 @@ impl Desk<'_> {
             let (journal, found) = Journal::open(&self.out.join(name), self.run_sha256, units.clone())?;
             let done = ledger.resume(journal, found)?;
             if done > 0 {
-                tracing::info!("{done} of {} units are done already: this run continues", units.end - units.start);
+                let (done, all) = (count(done), count(units.end - units.start));
+                tracing::info!("{done} of {all} units are done already: this run continues");
             }
         }
         Ok(Work { units, ledger, lock })

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
 use super::source::refuse_overwriting;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
+use crate::readable::value;
 use crate::report::files::{make_folder, write_atomically};
 use crate::report::records;
 use crate::report::trace_figure::{TraceFigure, TraceSeries};
@@ -71,7 +73,7 @@ pub struct Simulate {
 }
 
 impl Simulate {
-    pub fn run(&self) -> Result<Exit> {
+    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
         let lanes = self.lanes()?;
         let named: Vec<(String, &Trace)> = lanes.traced.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect();
@@ -83,8 +85,8 @@ impl Simulate {
             write_atomically(path, figure(&lanes, self.until).svg().as_bytes())?;
         }
         self.format.print(|| trace_table::csv(&named), || document(&lanes, &named))?;
-        for lane in &lanes.traced {
-            eprint!("{}", summary(lane, lanes.traced.len() > 1));
+        if verbosity != Verbosity::Quiet {
+            lanes.traced.iter().for_each(|lane| console::say(&summary(lane, lanes.traced.len() > 1)));
         }
         Ok(Exit::Ok)
     }
@@ -169,7 +171,7 @@ fn figure(lanes: &Lanes, until_s: Option<f64>) -> TraceFigure<'_> {
         1 => format!("{category}: {}", first.key),
         _ => match first.key.rsplitn(4, '/').collect::<Vec<_>>()[..] {
             [_, headway, _, scenario] => format!("{category}: {scenario}, headway {headway}"),
-            _ => format!("{category}, initial gap {} m", (first.trace.initial_gap_m * 1e3).round() / 1e3),
+            _ => format!("{category}, initial gap {} m", value(first.trace.initial_gap_m)),
         },
     };
     let synthetic = if lanes.synthetic && !lanes.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
@@ -202,21 +204,24 @@ fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
 /// How a lane ended, in words.
 fn summary(lane: &Traced, is_one_of_many: bool) -> String {
     let Traced { key, trace, reference, .. } = lane;
-    let time = |step: u32| if step == NO_STEP { "never".to_owned() } else { format!("{} s", trace.time_s(step)) };
+    let time = |step: u32| match step {
+        NO_STEP => "never".to_owned(),
+        step => format!("{} s", value(trace.time_s(step))),
+    };
     let outcome = &trace.outcome;
     let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
     let mut text = format!(
         "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {} s, max BTN {}, min gap {} m\n",
         trace.category.label(),
         trace.model.name(),
-        trace.initial_gap_m,
+        value(trace.initial_gap_m),
         verdicts(outcome),
         time(outcome.reaction_step),
         time(outcome.end_step),
         end(outcome),
-        outcome.min_ttc,
-        outcome.max_btn,
-        outcome.min_gap
+        value(outcome.min_ttc),
+        value(outcome.max_btn),
+        value(outcome.min_gap)
     );
     if let Some(reference) = reference {
         text.push_str(&match differences(outcome, reference, &time) {
@@ -234,7 +239,12 @@ fn verdicts(outcome: &Outcome<f64>) -> String {
 
 fn end(outcome: &Outcome<f64>) -> String {
     match outcome.end {
-        EndReason::Contact => format!("contact of type {} at {} m/s", outcome.contact.code(), outcome.impact_speed),
+        EndReason::Contact => format!(
+            "{}, closing at {} m/s, the ego at {} m/s",
+            outcome.contact.label(),
+            value(outcome.impact_closing_speed),
+            value(outcome.impact_speed)
+        ),
         EndReason::Settled => "nothing can happen any more".to_owned(),
         EndReason::Standstill => "the ego stands".to_owned(),
         EndReason::Cap => "time cap".to_owned(),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::console::{self, Verbosity};
 use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
+use crate::readable;
 use crate::scenario::{Category, Scenario, read_scenarios};
 use crate::trajectory::generator::GeneratorOptions;
 use crate::trajectory::highd;
@@ -77,7 +78,7 @@ impl Source {
 pub fn counts(scenarios: &[Scenario]) -> String {
     let part = |category: Category| {
         let count = count(scenarios, category);
-        format!("{} {} found, {} kept", category.label(), count.found, count.kept)
+        format!("{} {} found, {} kept", category.label(), readable::count(count.found), readable::count(count.kept))
     };
     Category::ALL.map(part).join("; ")
 }

@@ -16,10 +16,11 @@ use super::source::{self, Source};
 use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags};
+use super::{Exit, ProfileFlags, lists};
 use crate::criterion::Criterion;
 use crate::mining::{Collection, count};
 use crate::parameterization::{ParameterizationOptions, Reduction};
+use crate::readable;
 use crate::report::distributions::parameter_histograms;
 use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
@@ -37,7 +38,7 @@ use crate::{Error, Place, Result, input_file};
 /// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "seed" | "categories" | "published" | "reference" | "profile" | "dt"
+    "dir" | "scenarios" | "seed" | "categories" | "models" | "thw" | "published" | "reference" | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
     "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
@@ -76,6 +77,12 @@ pub struct Study {
     /// Categories, separated by commas [default: cut-in,cut-out,lvd]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
+    /// Driver models, separated by commas [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    models: Vec<String>,
+    /// Time headways in seconds, separated by commas, or `paper` (2.0, 1.8, … 0.2): the paper's claims need all of them
+    #[arg(long, value_name = "LIST|paper", default_value = "paper")]
+    thw: String,
     /// Print lanes, memory and an estimate of the time, and end: nothing is written
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
     dry_run: bool,
@@ -169,8 +176,9 @@ impl Study {
         let profile = self.profile.load()?;
         let options = StudyOptions {
             categories: self.categories()?,
+            models: lists::models(&self.models)?,
+            headways: lists::paper_or_headways(&self.thw)?,
             parameterization: config.parameterization.clone(),
-            ..StudyOptions::default()
         };
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
@@ -264,7 +272,7 @@ impl Study {
         // Before the work, so that a folder that cannot be written to is known at once.
         let mut work = desk.begin::<Partial>(&[], true)?;
         let lanes = plan.first_lane_of(work.units.end) - plan.first_lane_of(work.units.start);
-        tracing::info!("{lanes} lanes on {}", backend.describe());
+        tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
         let mut swept = timed(&mut timings.sweep_s, || run_units(&study.study, &mut work, &how, verbosity))?;
         if self.shards.is_part() {
             desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;

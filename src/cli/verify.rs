@@ -12,6 +12,7 @@ use super::source::{self, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::profile::Profile;
+use crate::readable::count;
 use crate::report::{records, verification};
 use crate::scenario::Category;
 use crate::sweep::{Backend, LanePlan, LaneRunner, StudyOptions, Wanted, plan_study};
@@ -96,9 +97,12 @@ impl Verify {
             lanes += comparison.lanes();
             differing += comparison.differing();
         }
-        let found =
-            if equal { "every word equals the CPU's".to_owned() } else { format!("{differing} DIFFER from the CPU's") };
-        let text = || format!("\n{lanes} lanes, all computed by what is under test itself: {found}.\n");
+        let found = if equal {
+            "every word equals the CPU's".to_owned()
+        } else {
+            format!("{} DIFFER from the CPU's", count(differing))
+        };
+        let text = || format!("\n{} lanes, all computed by what is under test itself: {found}.\n", count(lanes));
         self.format.print(text, || {
             records::document(&serde_json::json!({
                 "under_test": tested.describe(),

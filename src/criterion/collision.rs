@@ -19,6 +19,15 @@ impl Contact {
     pub fn code(self) -> u32 {
         self as u32
     }
+
+    /// In words: the ego drives into the other one's rear end, or the other one comes from the side or behind.
+    pub fn label(self) -> &'static str {
+        match self {
+            Contact::None => "no contact",
+            Contact::BySide => "side contact",
+            Contact::Frontal => "rear-end contact",
+        }
+    }
 }
 
 /// Do the boxes overlap at one step? Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.

@@ -22,6 +22,8 @@ pub struct Preset {
     pub models: Vec<ModelId>,
     /// Known shares of crashes in per cent, as published: one decimal.
     pub known_percent: Vec<(ModelId, f64)>,
+    /// The grid is ours and was chosen so that a known share comes out: that it does confirms nothing.
+    pub is_chosen_to_match: bool,
 }
 
 impl Preset {
@@ -81,13 +83,19 @@ pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
             let low = grid("cut_in_low", (10.0, 60.0, 10.0), (10.0, 60.0, 10.0), (1.0, 59.0, 1.0))?;
             let high = grid("cut_in_high", (70.0, 130.0, 20.0), (10.0, 130.0, 30.0), (1.0, 119.0, 2.0))?;
             let known = |shares: [f64; 4]| [Fsm, Rss, Reg157, Cchdm].into_iter().zip(shares).collect();
-            let preset = |grid, shares| Preset { grid, models: ModelId::ALL.to_vec(), known_percent: known(shares) };
+            let preset = |grid, shares| Preset {
+                grid,
+                models: ModelId::ALL.to_vec(),
+                known_percent: known(shares),
+                is_chosen_to_match: false,
+            };
             Ok(vec![preset(low, [5.7, 5.5, 14.1, 23.4]), preset(high, [11.8, 10.6, 20.4, 25.3])])
         }
         Category::Lvd => {
             let (x, y) = (range("deceleration_mps2", (0.0, 9.0), 0.5)?, range("ego_speed_kmh", (30.0, 130.0), 10.0)?);
             let grid = Grid::new(parts("lvd", x, y))?;
-            Ok(vec![Preset { grid, models: following, known_percent: vec![(Fsm, 0.0), (Cchdm, 0.0), (Rss, 1.9)] }])
+            let known_percent = vec![(Fsm, 0.0), (Cchdm, 0.0), (Rss, 1.9)];
+            Ok(vec![Preset { grid, models: following, known_percent, is_chosen_to_match: true }])
         }
         Category::CutOut => {
             let x = range("ahead_gap_m", (10.0, 100.0), 2.0)?;
@@ -95,7 +103,7 @@ pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
             let fixed = vec![(Parameter::find(category, "ahead_speed_kmh", "preset")?, 0.0)];
             let panel_axes = vec![range("ego_speed_kmh", (60.0, 120.0), 10.0)?];
             let grid = Grid::new(GridParts { panel_axes, fixed, ..parts("cut_out", x, y) })?;
-            Ok(vec![Preset { grid, models: following, known_percent: Vec::new() }])
+            Ok(vec![Preset { grid, models: following, known_percent: Vec::new(), is_chosen_to_match: false }])
         }
     }
 }

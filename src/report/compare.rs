@@ -11,6 +11,7 @@ use crate::criterion::Criterion;
 use crate::density::Driven;
 use crate::driver::ModelId;
 use crate::estimate::{Enough, Ratio, RatioVerdict};
+use crate::readable;
 use crate::sampling::{CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate};
 use crate::score::f1;
 use crate::{Error, Result};
@@ -161,9 +162,9 @@ impl CompareFile {
                 text,
                 "\n{}: {} scenarios from {} headways (S); {} samples of each density from the same",
                 category.category.label(),
-                category.scenarios,
+                readable::count(category.scenarios),
                 self.headways.len(),
-                self.samples
+                readable::count(self.samples)
             );
             for criterion in Criterion::ALL {
                 text.push_str(&self.block(category, criterion));
@@ -202,7 +203,7 @@ impl CompareFile {
             ("program", self.program.clone()),
             ("profile", self.profile.clone()),
             ("seed", self.seed.to_string()),
-            ("samples of each density", self.samples.to_string()),
+            ("samples of each density", readable::count(self.samples)),
             ("SHA-256 of the scenarios", self.scenarios_sha256.clone()),
             ("SHA-256 of the plan of S and S'", self.study_plan_sha256.clone()),
         ];
@@ -338,14 +339,7 @@ fn range(low: f64, high: f64) -> String {
 
 /// A rate in six characters or so.
 fn short(value: f64) -> String {
-    match value {
-        0.0 => "0".to_owned(),
-        v if v.abs() >= 100.0 => format!("{v:.0}"),
-        v if v.abs() >= 10.0 => format!("{v:.1}"),
-        v if v.abs() >= 1.0 => format!("{v:.2}"),
-        v if v.abs() >= 1e-3 => format!("{v:.4}"),
-        v => format!("{v:.1e}"),
-    }
+    readable::significant(value, if value.abs() < 1e-3 { 2 } else { 3 })
 }
 
 /// A factor in four characters.

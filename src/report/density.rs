@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::tables::{aligned, table};
 use crate::density::{DensityModel, Exposure, Rate, Representativeness, SearchEnd, standard_deviation};
+use crate::readable::{count, count_of, significant};
 
 /// Everything of one density but its kernels.
 pub fn text(model: &DensityModel) -> String {
@@ -14,10 +15,10 @@ pub fn text(model: &DensityModel) -> String {
         id.category.label(),
         id.key,
         id.description,
-        model.kde.points().len(),
-        provenance.found,
-        provenance.kept,
-        provenance.left_out
+        count_of(model.kde.points().len()),
+        count(provenance.found),
+        count(provenance.kept),
+        count(provenance.left_out)
     );
     let header = ["parameter", "unit", "mean", "deviation", "scale", "kernel", "valid"];
     let mut parameters = table(header.map(str::to_owned).to_vec());
@@ -47,8 +48,13 @@ pub fn text(model: &DensityModel) -> String {
     let valid = &model.valid;
     let _ = writeln!(
         text,
-        "P_valid    {:.5} [{:.5}, {:.5}], {} of {} draws, seed {}",
-        valid.estimate, valid.low, valid.high, valid.valid, valid.draws, valid.seed
+        "P_valid    {:.4} [{:.4}, {:.4}], {} of {} draws, seed {}",
+        valid.estimate,
+        valid.low,
+        valid.high,
+        count(valid.valid),
+        count(valid.draws),
+        valid.seed
     );
     let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
     if let Some(representativeness) = &model.representativeness {
@@ -92,7 +98,7 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
 const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";
 
 fn exposure(exposure: &Exposure) -> String {
-    let mut parts = vec![format!("{} events", exposure.events)];
+    let mut parts = vec![format!("{} events", count(exposure.events))];
     let mut rate = |rate: &Option<Rate>, driven: Option<f64>, unit: &str| {
         if let (Some(rate), Some(driven)) = (rate, driven) {
             parts.push(format!(
@@ -138,9 +144,9 @@ pub fn summary(models: &[&DensityModel]) -> String {
         rows.add_row([
             format!("{} {}", id.category.label(), id.key),
             model.space.dimensions().to_string(),
-            model.kde.points().len().to_string(),
+            count_of(model.kde.points().len()),
             short(model.kde.bandwidth().value),
-            format!("{:.5}", model.valid.estimate),
+            format!("{:.4}", model.valid.estimate),
             of(|r| r.metric),
             of(|r| r.generated_test),
             of(|r| r.train_test),
@@ -153,15 +159,6 @@ pub fn summary(models: &[&DensityModel]) -> String {
     )
 }
 
-/// Four significant digits.
 fn short(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = 3 - (value.abs().log10().floor() as i32);
-    match digits {
-        ..=0 => format!("{value:.0}"),
-        1..=6 => format!("{value:.*}", digits as usize),
-        _ => format!("{value:.3e}"),
-    }
+    significant(value, 4)
 }

@@ -14,6 +14,8 @@ use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
 use crate::profile::Profile;
+use crate::readable;
+use crate::table::quoted;
 use crate::{Error, Result};
 
 /// A swept grid with what is known of it.
@@ -24,6 +26,8 @@ pub struct MappedGrid {
     pub map: GridMap,
     /// Known shares, per cent, by model of the map.
     pub known_percent: Vec<Option<f64>>,
+    /// The grid was chosen so that a known share comes out: that it does confirms nothing.
+    pub is_chosen_to_match: bool,
     /// The same grid under another profile, with the profile's name.
     pub other: Option<(String, GridPlan, GridMap)>,
 }
@@ -101,12 +105,14 @@ impl MapReport {
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let (failures, cells) = (mapped.map.failures(at, self.criterion), mapped.map.cell_count());
                 let percent = 100.0 * failures as f64 / cells as f64;
-                let mut row = vec![mapped.plan.grid.name().to_owned(), model.name().to_owned(), cells.to_string()];
-                row.extend([failures.to_string(), format!("{percent:.2}")]);
+                let mut row =
+                    vec![mapped.plan.grid.name().to_owned(), model.name().to_owned(), readable::count_of(cells)];
+                row.extend([readable::count(failures), format!("{percent:.2}")]);
                 if any_known {
                     let known = mapped.known_percent[at];
                     row.push(known.map_or("-".to_owned(), |k| format!("{k:.1}")));
-                    row.push(known.map_or("-".to_owned(), |k| format!("{:+.2}", percent - k)));
+                    let mark = if mapped.is_chosen_to_match { "*" } else { "" };
+                    row.push(known.map_or("-".to_owned(), |k| format!("{:+.2}{mark}", percent - k)));
                 }
                 shares.add_row(row);
             }
@@ -114,9 +120,15 @@ impl MapReport {
         let mut text = format!(
             "Share of cells that fail {criterion} under {}, of {} simulations\n{}",
             self.profile.name,
-            self.simulations(),
+            readable::count(self.simulations()),
             aligned(shares, 2)
         );
+        if self.grids.iter().any(|mapped| mapped.is_chosen_to_match) {
+            text.push_str(
+                "* The known grid is not published. Ours was chosen so that the share of RSS comes out: that it agrees \
+                 confirms nothing.\n",
+            );
+        }
         let differences = self.differences();
         if !differences.is_empty() {
             let header = ["map", "first", "second", "both pass", "both fail", "only first fails", "only second fails"];
@@ -124,7 +136,7 @@ impl MapReport {
             for difference in &differences {
                 let mut row = vec![difference.grid.name().to_owned(), difference.first.clone()];
                 row.push(difference.second.clone());
-                row.extend(count(&difference.cells).map(|n| n.to_string()));
+                row.extend(count(&difference.cells).map(readable::count));
                 table.add_row(row);
             }
             text.push_str(&format!("\nDifferences in {criterion}\n{}", aligned(table, 3)));
@@ -198,7 +210,7 @@ impl MapReport {
 
     fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {
         let fixed: Vec<String> =
-            grid.fixed().iter().map(|(p, value)| format!("{}: {value} {}.", p.label, p.unit)).collect();
+            grid.fixed().iter().map(|(p, v)| format!("{}: {} {}.", p.label, readable::value(*v), p.unit)).collect();
         let mut notes = fixed;
         if grid.has_native_gap() {
             notes.push("Initial gap: each model's own distance at the ego's speed, a headway of 2 s where it has none (column initial_gap_m).".to_owned());
@@ -271,6 +283,7 @@ impl MapReport {
         let mut out = io::BufWriter::new(out);
         write_header(&mut out, &self.grids, "first,second,difference")?;
         for Difference { grid, first, second, cells, .. } in differences {
+            let (first, second) = (quoted(first), quoted(second));
             for (cell, kind) in cells.iter().enumerate() {
                 writeln!(out, "{},{first},{second},{}", place_of(grid, cell), kind.key())?;
             }
@@ -349,6 +362,8 @@ struct GridRecord<'a> {
     cases: CaseStyle,
     native_gap: bool,
     cells: usize,
+    /// The grid was chosen so that a known share comes out.
+    chosen_to_match: bool,
     shares: Vec<ShareRecord>,
     plans: Vec<PlanRecord<'a>>,
 }
@@ -428,6 +443,7 @@ impl<'a> GridRecord<'a> {
             cases: grid.style(),
             native_gap: grid.has_native_gap(),
             cells: map.cell_count(),
+            chosen_to_match: mapped.is_chosen_to_match,
             shares: map.models.iter().enumerate().map(share).collect(),
             plans: (mapped.plan.parts.iter().chain(others))
                 .map(|part| PlanRecord {

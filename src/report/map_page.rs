@@ -2,6 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
+use crate::readable::count;
 use crate::{Error, Result};
 
 impl MapReport {
@@ -48,7 +49,7 @@ impl MapReport {
             program,
             lead: format!(
                 "{} simulations: {} over a grid of parameters, profile {}.",
-                self.simulations(),
+                count(self.simulations()),
                 self.criterion.label(),
                 self.profile.name
             ),

@@ -2,7 +2,7 @@
 
 use crate::criterion::Criterion;
 use crate::density::DensityModel;
-use crate::sweep::{Chunk, LanePlan, NO_STEP};
+use crate::sweep::{Chunk, LanePlan, NO_STEP, Outcome};
 use crate::table::{Cell, Column, Kind, TableWriter};
 use crate::{Error, Result};
 
@@ -26,8 +26,8 @@ pub fn columns(density: &DensityModel) -> Vec<Column> {
         c("contact_type", Kind::Whole, "1", "Kind of contact; 0 without one."),
         c("reaction_s", Kind::Binary64, "s", "When the driver first reacted; null if never."),
         c("end_s", Kind::Binary64, "s", "When the run ended."),
-        c("impact_speed_mps", Kind::Binary32, "m/s", "Speed of the ego at contact."),
-        c("impact_closing_speed_mps", Kind::Binary32, "m/s", "Closing speed at contact."),
+        c("impact_speed_mps", Kind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
+        c("impact_closing_speed_mps", Kind::Binary32, "m/s", "Closing speed at contact; null without one."),
     ];
     columns.extend(density.space.parameters().iter().map(|parameter| Column {
         name: parameter.name.clone().into(),
@@ -49,6 +49,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, density: &DensityMo
     let dt = plan.profile.frame.dt_s;
     let dimensions = density.space.dimensions();
     let value = |v: f64| Cell::number(v.is_finite().then_some(v));
+    let at_contact = |outcome: &Outcome<f64>, v: f64| Cell::number((outcome.contact_step != NO_STEP).then_some(v));
     let time = |step: u32| Cell::number((step != NO_STEP).then(|| (f64::from(step) * dt * 1e9).round() / 1e9));
     let (headways, models) = (plan.headways.len(), plan.models.len());
     for (unit, lanes) in chunk.units.clone().zip(chunk.outcomes.chunks(headways * models)) {
@@ -79,8 +80,8 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, density: &DensityMo
                 Cell::Whole(i64::from(outcome.contact.code())),
                 time(outcome.reaction_step),
                 time(outcome.end_step),
-                value(outcome.impact_speed),
-                value(outcome.impact_closing_speed),
+                at_contact(outcome, outcome.impact_speed),
+                at_contact(outcome, outcome.impact_closing_speed),
             ];
             row.extend(point.iter().map(|&v| Cell::Number(v)));
             table.row(&row)?;

@@ -10,6 +10,7 @@ use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
 use crate::profile::Profile;
+use crate::readable::{count, count_of, significant, value};
 use crate::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::sweep::generated::ATTEMPTS;
@@ -255,37 +256,38 @@ impl EstimateFile {
             density.parameterization,
             match density.kernels {
                 0 => format!("distributions of {}", density.parameters.join(", ")),
-                kernels => format!("density over {kernels} scenarios"),
+                kernels => format!("density over {} scenarios", count_of(kernels)),
             },
             density.provenance.data
         );
         if let Some(draws) =
             self.draws.as_ref().filter(|d| d.samples < self.samples && self.stopped == StopReason::Samples)
         {
-            let ranges: Vec<String> = draws.ranges.iter().map(|[a, b]| format!("{a}..{b}")).collect();
-            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), self.samples);
+            let ranges: Vec<String> =
+                draws.ranges.iter().map(|[a, b]| format!("{}..{}", count(*a), count(*b))).collect();
+            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), count(self.samples));
         }
         if let Some(draws) = &self.draws {
             let _ = writeln!(
                 text,
                 "{} samples, {} lanes; {:.2} % of the draws invalid and drawn again{}{}",
-                draws.samples,
-                draws.lanes,
+                count(draws.samples),
+                count(draws.lanes),
                 100.0 * draws.rejected_share,
                 if draws.voids > 0 {
-                    format!(", {} samples void (none of {ATTEMPTS} draws valid)", draws.voids)
+                    format!(", {} samples void (none of {ATTEMPTS} draws valid)", count(draws.voids))
                 } else {
                     String::new()
                 },
                 if draws.capped_lanes > 0 {
-                    format!("; {} lanes ended at the time cap", draws.capped_lanes)
+                    format!("; {} lanes ended at the time cap", count(draws.capped_lanes))
                 } else {
                     String::new()
                 },
             );
         }
         if !self.given.is_empty() {
-            let list: Vec<String> = self.given.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
             let _ = writeln!(text, "given {}: probabilities are conditional, risks are not known", list.join(", "));
         }
         let has_hours = self.estimates.iter().any(|r| r.risk.per_hour.is_some());
@@ -302,7 +304,7 @@ impl EstimateFile {
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
                 row.headway.clone(),
-                e.failures.to_string(),
+                count(e.failures),
                 short(e.probability),
                 interval_text(e.interval.low, e.interval.high, e.interval.kind),
                 match 100.0 * e.relative_half_width {
@@ -335,7 +337,7 @@ impl EstimateFile {
         let _ = writeln!(
             text,
             "Intervals at {} %; ± is the half-width of that of P over P; ≤ bounds from above where nothing failed",
-            100.0 * level
+            value(100.0 * level)
         );
         // A density of N scenarios was never seen beyond them.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
@@ -347,7 +349,7 @@ impl EstimateFile {
                 text,
                 "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",
                 short(resolved),
-                self.density.kernels
+                count_of(self.density.kernels)
             );
         }
         if self.density.provenance.synthetic {
@@ -367,10 +369,10 @@ impl EstimateFile {
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
                 short(row.estimate.variance_reduction),
-                format!("{:.0}", w.effective_size),
-                format!("{:.0}", w.effective_size_failures),
+                value(w.effective_size),
+                value(w.effective_size_failures),
                 format!("{:.2} %", 100.0 * w.largest_share_failures),
-                format!("{:.4} ± {:.4}", w.mean_weight, w.mean_weight_error),
+                format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)),
             ]);
         }
         aligned(rows, 2)
@@ -394,22 +396,14 @@ fn bootstrap_text(record: &BootstrapRecord) -> String {
         let values = [Some(row.probability), row.per_hour, row.per_1000_km];
         rows.add_row(names.into_iter().chain(values.map(ends)).collect::<Vec<_>>());
     }
-    let how = format!("95 % of {} replicates of {} samples each:\n", record.replicates, record.samples);
+    let how =
+        format!("95 % of {} replicates of {} samples each:\n", count(record.replicates), count(record.samples));
     how + &aligned(rows, 2)
 }
 
-/// Three digits, in powers of ten where it is small or large.
+/// Three digits.
 pub(super) fn short(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    match value.abs() {
-        0.0 => "0".to_owned(),
-        v if !(1e-3..1e4).contains(&v) => format!("{value:.2e}"),
-        v if v >= 100.0 => format!("{value:.0}"),
-        v if v >= 1.0 => format!("{value:.2}"),
-        _ => format!("{value:.4}"),
-    }
+    significant(value, 3)
 }
 
 pub(super) fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {

@@ -5,6 +5,7 @@ use super::panels::{Mark, Panel, PanelFigure, PanelSeries};
 use super::sampling::{EstimateFile, interval_text, rate_text, short};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
+use crate::readable::{count, count_of, value};
 use crate::sampling::EstimateRow;
 use crate::scenario::Category;
 use crate::sweep::Headway;
@@ -22,7 +23,7 @@ impl EstimateFile {
             warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
         }
         if !self.given.is_empty() {
-            let list: Vec<String> = self.given.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
             let given = list.join(", ");
             warnings.push(format!("Given {given}: probabilities are conditional, risks are not known."));
         }
@@ -34,10 +35,10 @@ impl EstimateFile {
             program: self.program.clone(),
             lead: format!(
                 "{} samples of {}, estimator {}, profile {}. {}",
-                self.samples,
+                count(self.samples),
                 match density.kernels {
                     0 => format!("distributions of {}", density.parameters.join(", ")),
-                    kernels => format!("a density over {kernels} mined scenarios"),
+                    kernels => format!("a density over {} mined scenarios", count_of(kernels)),
                 },
                 self.estimator,
                 self.profile.name,
@@ -63,8 +64,8 @@ impl EstimateFile {
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
                 row.headway.clone(),
-                e.runs.to_string(),
-                e.failures.to_string(),
+                count(e.runs),
+                count(e.failures),
                 short(e.probability),
                 interval_text(e.interval.low, e.interval.high, e.interval.kind),
                 if width.is_finite() { format!("{:.1}", 100.0 * width) } else { "–".to_owned() },
@@ -92,7 +93,7 @@ impl EstimateFile {
         let mut tables = vec![PageTable {
             caption: format!(
                 "Probability of failure with its {} % interval, and risk where the exposure is known",
-                100.0 * level
+                value(100.0 * level)
             ),
             header: header.map(str::to_owned).to_vec(),
             texts: 3,
@@ -104,10 +105,10 @@ impl EstimateFile {
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
                 short(row.estimate.variance_reduction),
-                format!("{:.0}", w.effective_size),
-                format!("{:.0}", w.effective_size_failures),
+                value(w.effective_size),
+                value(w.effective_size_failures),
                 format!("{:.2}", 100.0 * w.largest_share_failures),
-                format!("{:.4} ± {:.4}", w.mean_weight, w.mean_weight_error),
+                format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)),
             ])
         };
         let weights: Vec<Vec<String>> = overall.iter().filter_map(weighted).collect();
@@ -137,9 +138,10 @@ impl EstimateFile {
                 match self.density.kernels {
                     0 => String::new(),
                     kernels => format!(
-                        "Probabilities below {} (one in {kernels} scenarios) come from the tails of the density's \
+                        "Probabilities below {} (one in {} scenarios) come from the tails of the density's \
                          kernels, not from data. ",
-                        short(1.0 / kernels as f64)
+                        short(1.0 / kernels as f64),
+                        count_of(kernels)
                     ),
                 }
             ),
@@ -192,7 +194,7 @@ impl EstimateFile {
             ("points".to_owned(), self.points.to_owned()),
             ("seed".to_owned(), self.seed.to_string()),
             ("profile".to_owned(), self.profile.name.clone()),
-            ("time step".to_owned(), format!("{} s", self.profile.frame.dt_s)),
+            ("time step".to_owned(), format!("{} s", value(self.profile.frame.dt_s))),
             ("SHA-256 of the density".to_owned(), self.density.sha256.clone()),
         ];
         facts.extend(self.plan_sha256.iter().map(|sha| ("SHA-256 of the plan".to_owned(), sha.clone())));
@@ -201,7 +203,10 @@ impl EstimateFile {
             let text = format!(
                 "{} samples, {} lanes, {percent:.2} % of the draws invalid and drawn again, {} samples void, \
                  {} lanes at the time cap",
-                draws.samples, draws.lanes, draws.voids, draws.capped_lanes
+                count(draws.samples),
+                count(draws.lanes),
+                count(draws.voids),
+                count(draws.capped_lanes)
             );
             facts.push(("draws".to_owned(), text));
         }
@@ -209,7 +214,7 @@ impl EstimateFile {
         host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
         host.push((
             "checked".to_owned(),
-            format!("{} lanes of a device computed again on the CPU", self.host.rechecked_lanes),
+            format!("{} lanes of a device computed again on the CPU", count(self.host.rechecked_lanes)),
         ));
         if self.host.seconds > 0.0 {
             host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));

@@ -6,7 +6,7 @@ use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::estimate::IntervalKind;
 use crate::sampling::{Checkpoint, RiskRate, WorstSample};
-use crate::sweep::Outcome;
+use crate::sweep::{NO_STEP, Outcome};
 
 impl EstimateFile {
     /// `estimates.csv`.
@@ -161,8 +161,9 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
             row.lane.value.to_string(),
         ];
         fields.extend(Criterion::ALL.map(|c| u8::from(o.verdicts.failed(c)).to_string()));
-        let values = [o.min_ttc, o.max_btn, o.min_gap, o.impact_speed, o.impact_closing_speed];
-        fields.extend(values.map(|v| number(Some(v))));
+        let at_contact = |v: f64| (o.contact_step != NO_STEP).then_some(v);
+        fields.extend([o.min_ttc, o.max_btn, o.min_gap].map(|v| number(Some(v))));
+        fields.extend([o.impact_speed, o.impact_closing_speed].map(|v| number(at_contact(v))));
         fields.extend(row.point.iter().map(f64::to_string));
         table.push(fields);
     }

@@ -2,18 +2,20 @@
 //! number of parameters, the shapes of a decomposition.
 
 use super::panels::{Guide, Mark, Panel, PanelFigure, PanelSeries};
-use crate::Result;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::parameterization::{Kind, ModeShape, ParameterizationId};
 use crate::score::{CategoryScores, f1, precision, recall};
 use crate::sweep::{Confusion, Headway, LanePlan, Partial};
+use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadwayFailures {
+    variants: Vec<String>,
     headways: Vec<Headway>,
-    /// Variant × headway × model × criterion.
+    models: Vec<ModelId>,
+    /// Variant × headway × model × criterion, as many as those are.
     failures: Vec<u64>,
 }
 
@@ -24,22 +26,36 @@ impl HeadwayFailures {
     /// Where the counts are not those of the plan.
     pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
         let failures = partial.headway_failures(plan, block)?.to_vec();
-        Ok(HeadwayFailures { headways: plan.headways.clone(), failures })
+        HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
+    }
+
+    fn new(
+        variants: &[String],
+        headways: &[Headway],
+        models: &[ModelId],
+        failures: Vec<u64>,
+    ) -> Result<HeadwayFailures> {
+        let expected = variants.len() * headways.len() * models.len() * Criterion::ALL.len();
+        if failures.len() != expected {
+            let problem = format!("{} counts of failures by headway, expected {expected}", failures.len());
+            return Err(Error::Internal(problem));
+        }
+        let (variants, headways, models) = (variants.to_vec(), headways.to_vec(), models.to_vec());
+        Ok(HeadwayFailures { variants, headways, models, failures })
     }
 
     /// Failed lanes of a variant at a headway; models and criteria by their places in the plan.
-    fn count(&self, models: usize, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
-        let lane = (variant * self.headways.len() + headway) * models + model;
-        self.failures.get(lane * Criterion::ALL.len() + criterion.index()).copied().unwrap_or(0)
+    fn count(&self, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
+        let lane = (variant * self.headways.len() + headway) * self.models.len() + model;
+        self.failures[lane * Criterion::ALL.len() + criterion.index()]
     }
 
     /// One row per variant, headway, model and criterion.
     pub fn rows(&self, scores: &CategoryScores, data: &str) -> Vec<Vec<String>> {
-        let models = scores.models.len();
         let mut rows = Vec::new();
-        for (variant, name) in scores.variants.iter().enumerate() {
+        for (variant, name) in self.variants.iter().enumerate() {
             for (at, headway) in self.headways.iter().enumerate() {
-                for (model, id) in scores.models.iter().enumerate() {
+                for (model, id) in self.models.iter().enumerate() {
                     for criterion in Criterion::ALL {
                         rows.push(vec![
                             scores.category.key().to_owned(),
@@ -47,7 +63,7 @@ impl HeadwayFailures {
                             headway.to_string(),
                             id.name().to_owned(),
                             criterion.key().to_owned(),
-                            self.count(models, (variant, at, model, criterion)).to_string(),
+                            self.count((variant, at, model, criterion)).to_string(),
                             scores.scenarios.to_string(),
                             data.to_owned(),
                         ]);
@@ -68,7 +84,7 @@ impl HeadwayFailures {
         let panel = |(model, id): (usize, &ModelId)| {
             let series = |criterion: Criterion| {
                 let share = |(at, headway): (usize, &Headway)| {
-                    let failed = self.count(scores.models.len(), (0, at, model, criterion));
+                    let failed = self.count((0, at, model, criterion));
                     (thw_s(headway), 100.0 * failed as f64 / scores.scenarios.max(1) as f64)
                 };
                 let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().map(share).collect();
@@ -89,7 +105,7 @@ impl HeadwayFailures {
             title: format!("{}: failures of the recorded scenarios against the headway", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
             caption: "Share of the recorded scenarios (S) in which the driver model fails the criterion.".to_owned(),
-            panels: scores.models.iter().enumerate().map(panel).collect(),
+            panels: self.models.iter().enumerate().map(panel).collect(),
         }
     }
 }
@@ -266,6 +282,16 @@ pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn failures_by_headway_are_as_many_as_the_lanes_they_count_or_an_error() {
+        let (variants, headways) = (["S".to_owned()], [Headway::ThwS(1.0), Headway::ThwS(0.5)]);
+        let of = |counts: u64| HeadwayFailures::new(&variants, &headways, &[ModelId::Fsm], (0..counts).collect());
+        assert_eq!(of(6).unwrap().count((0, 1, 0, Criterion::Btn)), 5);
+        for wrong in [0, 5, 7] {
+            assert!(matches!(of(wrong), Err(Error::Internal(_))), "{wrong} counts");
+        }
+    }
 
     #[test]
     fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {

@@ -8,6 +8,7 @@ use super::tables;
 use crate::criterion::Criterion;
 use crate::mining::RecordingSummary;
 use crate::parameterization::{Kind, ParameterizationId};
+use crate::readable::{count, value};
 use crate::scenario::Category;
 use crate::score::{CategoryScores, ClaimVerdict, precision, recall};
 use crate::{Error, Result};
@@ -46,7 +47,7 @@ impl StudyReport {
                 "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {} headways, against {} \
                  driver models, judged by collision, TTC and BTN under profile {}.",
                 sentence(&run.data),
-                run.lanes,
+                count(run.lanes),
                 self.scores.categories.first().map_or(0, |c| c.simulations / c.scenarios.max(1)),
                 self.scores.categories.first().map_or(0, |c| c.models.len()),
                 run.profile.name
@@ -64,14 +65,15 @@ impl StudyReport {
             let numbers = [category.found, category.kept, category.lanes, category.capped_lanes, category.undefined_f1];
             let key = category.category;
             let label = Category::ALL.into_iter().find(|c| c.key() == key).map_or(key, Category::label);
-            [label.to_owned()].into_iter().chain(numbers.map(|n| n.to_string())).collect()
+            [label.to_owned()].into_iter().chain(numbers.map(count)).collect()
         });
         let counts = table("Mined scenarios, and what became of them", &header, 1, rows.collect());
         let shown = run.recordings.iter().take(MOST_RECORDINGS);
         let line = |recording: &RecordingSummary| {
             let files = recording.files.iter().map(|file| format!("\n  {} {}", file.sha256, file.file));
             let (hours, kilometres) = (recording.driven_s / 3600.0, recording.driven_m / 1000.0);
-            let counts = format!("{} vehicles, {hours:.2} h and {kilometres:.1} km driven", recording.vehicles);
+            let (vehicles, hours, kilometres) = (count(recording.vehicles), value(hours), value(kilometres));
+            let counts = format!("{vehicles} vehicles, {hours} h and {kilometres} km driven");
             format!("{}: {counts}{}", recording.id, files.collect::<String>())
         };
         let mut recordings: Vec<String> = shown.map(line).collect();
@@ -138,7 +140,7 @@ impl StudyReport {
         let mut header = vec!["model".to_owned(), "criterion".to_owned(), "S fails".to_owned()];
         header.extend(scores.variants.iter().skip(1).cloned());
         let rows = tables::f1_rows(scores, self.published);
-        let level = 100.0 * self.scores.options.confidence;
+        let level = value(100.0 * self.scores.options.confidence);
         PageTable { caption: format!("F1 with its {level} % bootstrap interval"), header, texts: 2, rows }
     }
 
@@ -147,7 +149,7 @@ impl StudyReport {
             let overall = &result.overall;
             let difference = overall.value.map_or("-".to_owned(), |value| format!("{value:+.3}"));
             let interval = overall.interval.map_or(String::new(), |i| format!("\n[{:+.3} {:+.3}]", i.low, i.high));
-            let count = |verdict: ClaimVerdict| result.rows.iter().filter(|row| row.verdict == verdict).count();
+            let of_verdict = |verdict: ClaimVerdict| result.rows.iter().filter(|row| row.verdict == verdict).count();
             let all = [
                 ClaimVerdict::Holds,
                 ClaimVerdict::Contradicted,
@@ -155,13 +157,14 @@ impl StudyReport {
                 ClaimVerdict::TooFew,
                 ClaimVerdict::NotRun,
             ];
-            let cells = all.into_iter().filter(|v| count(*v) > 0).map(|v| format!("{} {}", count(v), v.text()));
+            let cells =
+                all.into_iter().filter(|v| of_verdict(*v) > 0).map(|v| format!("{} {}", of_verdict(v), v.text()));
             vec![
                 result.claim.id.to_owned(),
                 result.claim.statement.to_owned(),
                 overall.verdict.text().to_owned(),
                 cells.collect::<Vec<_>>().join("\n"),
-                overall.failures.to_string(),
+                count(overall.failures),
                 format!("{difference}{interval}"),
             ]
         };
@@ -183,7 +186,7 @@ impl StudyReport {
         let mut facts = vec![
             ("program".to_owned(), run.program.clone()),
             ("profile".to_owned(), run.profile.name.clone()),
-            ("time step".to_owned(), format!("{} s", run.profile.frame.dt_s)),
+            ("time step".to_owned(), format!("{} s", value(run.profile.frame.dt_s))),
             ("seed of the bootstrap".to_owned(), run.score.seed.to_string()),
             ("SHA-256 of the plan".to_owned(), run.plan_sha256.clone()),
         ];
@@ -196,7 +199,7 @@ impl StudyReport {
             "checked".to_owned(),
             match run.sweep.rechecked_lanes {
                 0 => "no lane of a device".to_owned(),
-                lanes => format!("{lanes} lanes of the device computed again on the CPU, all equal"),
+                lanes => format!("{} lanes of the device computed again on the CPU, all equal", count(lanes)),
             },
         ));
         let seconds = &run.timings;

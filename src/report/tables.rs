@@ -5,6 +5,7 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use crate::criterion::Criterion;
+use crate::readable;
 use crate::score::{
     CategoryScores, ClaimResult, ClaimRow, Interval, ScoreTable, f1, published_failures, published_lvd_f1,
 };
@@ -50,13 +51,13 @@ pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<Stri
         for (at, &model) in category.models.iter().enumerate() {
             let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.both);
             let mut row = vec![category.category.label().to_owned(), model.name().to_owned()];
-            row.extend(Criterion::ALL.map(|c| count(c).to_string()));
-            row.extend([category.simulations.to_string(), category.capped[at].to_string()]);
+            row.extend(Criterion::ALL.map(|c| readable::count(count(c))));
+            row.extend([category.simulations, category.capped[at]].map(readable::count));
             if published {
                 let theirs = |c| published_failures(category.category, model, c);
                 let counts: Vec<_> = Criterion::ALL.into_iter().filter_map(theirs).collect();
-                let failures: Vec<String> = counts.iter().map(|p| p.failures.to_string()).collect();
-                let of = counts.first().map(|p| format!("{} ({})", failures.join(" "), p.simulations));
+                let failures: Vec<String> = counts.iter().map(|p| readable::count(p.failures)).collect();
+                let of = counts.first().map(|p| format!("{} ({})", failures.join(" "), readable::count(p.simulations)));
                 row.push(of.unwrap_or_else(|| "-".to_owned()));
             }
             rows.push(row);
@@ -76,7 +77,7 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
     format!(
         "{}: F1 of S' against S over {} scenarios, [bootstrap interval]; - is undefined (0/0)\n{}",
         scores.category.label(),
-        scores.scenarios,
+        readable::count(scores.scenarios),
         aligned(table, 2)
     )
 }
@@ -88,7 +89,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
         for criterion in Criterion::ALL {
             let Some(s) = scores.index(0, model, criterion) else { continue };
             let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
-            row.push(scores.cells[s].counts.both.to_string());
+            row.push(readable::count(scores.cells[s].counts.both));
             for variant in 1..scores.variants.len() {
                 let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
                 let mut text = cell.map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));
@@ -141,7 +142,7 @@ pub fn claims(results: &[ClaimResult]) -> String {
         table.add_row([
             result.claim.id.to_owned(),
             wrap(result.claim.statement, 34),
-            row.failures.to_string(),
+            readable::count(row.failures),
             difference(row),
             row.verdict.text().to_owned(),
             verdicts.join("\n"),

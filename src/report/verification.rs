@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::tables::{aligned, table};
 use crate::criterion::Criterion;
+use crate::readable::{count, value};
 use crate::sweep::{Outcome, words};
 use crate::verify::{Comparison, WORDS};
 
@@ -21,10 +22,10 @@ pub fn comparison(comparison: &Comparison) -> String {
         if Criterion::ALL.iter().any(|c| !tally.tests(*c)) {
             untested.push(tally.model);
         }
-        let mut row = vec![tally.category.label().to_owned(), tally.model.name().to_owned(), tally.lanes.to_string()];
+        let mut row = vec![tally.category.label().to_owned(), tally.model.name().to_owned(), count(tally.lanes)];
         row.extend(Criterion::ALL.map(share));
-        row.push(format!("{:.0}", tally.steps as f64 / tally.lanes.max(1) as f64));
-        row.extend([tally.words_differing, tally.verdicts_differing, tally.reference_differing].map(|n| n.to_string()));
+        row.push(value(tally.steps as f64 / tally.lanes.max(1) as f64));
+        row.extend([tally.words_differing, tally.verdicts_differing, tally.reference_differing].map(count));
         rows.add_row(row);
     }
     let mut text = format!("{} (plan {})\n{}", comparison.set, &comparison.plan_sha256[..12], aligned(rows, 2));
@@ -32,8 +33,11 @@ pub fn comparison(comparison: &Comparison) -> String {
         text += "* outside 5–95 %: these lanes hardly test this criterion\n";
     }
     if comparison.modes_differing > 0 {
-        let _ =
-            writeln!(text, "{} values differ where verdicts or counts alone are asked for", comparison.modes_differing);
+        let _ = writeln!(
+            text,
+            "{} values differ where verdicts or counts alone are asked for",
+            count(comparison.modes_differing)
+        );
     }
     for lane in &comparison.worst {
         let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));
@@ -86,21 +90,22 @@ pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String
     format!("{key}\n{}", aligned(rows, 1))
 }
 
-/// The words as people read them; numbers with every digit.
+/// The words as people read them. Numbers with every digit: a difference may be in the last one.
 fn shown(o: &Outcome<f64>) -> [String; 12] {
+    let number = |v: f64| if v.is_finite() { v.to_string() } else { value(v) };
     let step = |step: u32| if step == u32::MAX { "never".to_owned() } else { step.to_string() };
     [
         format!("{:04b}", o.verdicts.0),
-        o.contact.code().to_string(),
+        format!("{} ({})", o.contact.code(), o.contact.label()),
         o.contact_with.to_string(),
         format!("{:?}", o.end),
         step(o.reaction_step),
         step(o.contact_step),
         step(o.end_step),
-        o.impact_speed.to_string(),
-        o.impact_closing_speed.to_string(),
-        o.min_ttc.to_string(),
-        o.max_btn.to_string(),
-        o.min_gap.to_string(),
+        number(o.impact_speed),
+        number(o.impact_closing_speed),
+        number(o.min_ttc),
+        number(o.max_btn),
+        number(o.min_gap),
     ]
 }

@@ -141,7 +141,8 @@ struct Reader {
 
 /// Instants of one scenario, so far.
 struct Open {
-    first_row: u64,
+    /// Row of every instant.
+    rows: Vec<u64>,
     id: Value,
     /// Of the first row, per chosen column.
     first: Vec<Value>,
@@ -214,7 +215,7 @@ impl Reader {
                 if is_series { vec![value.clone()] } else { Vec::new() }
             };
             let series = self.chosen.iter().zip(&values).map(|(column, value)| series(column, value)).collect();
-            self.open = Some(Open { first_row: row.number, id, first: values, series, times_s: vec![time_s] });
+            self.open = Some(Open { rows: vec![row.number], id, first: values, series, times_s: vec![time_s] });
             return Ok(());
         };
         for (at, (column, value)) in self.chosen.iter().zip(values).enumerate() {
@@ -231,6 +232,7 @@ impl Reader {
                 _ => {}
             }
         }
+        open.rows.push(row.number);
         open.times_s.push(time_s);
         Ok(())
     }
@@ -252,14 +254,14 @@ impl Reader {
                 };
                 leaf.put(&mut scenario, value);
             }
-            let place = || self.table.place(open.first_row, open.id.as_str().map(name)).column("time_s");
-            let rate_hz = rate_hz(&open.times_s).map_err(|problem| {
-                Error::input(place(), problem, "give every scenario rows at equal distances in time, in order")
+            let place = |at: usize| self.table.place(open.rows[at], open.id.as_str().map(name)).column("time_s");
+            let rate_hz = rate_hz(&open.times_s).map_err(|(at, problem)| {
+                Error::input(place(at), problem, "give every scenario rows at equal distances in time, in order")
             })?;
             if !has_rate {
                 scenario.insert("fps".to_owned(), Value::from(rate_hz));
             }
-            self.take(scenario, open.first_row)?;
+            self.take(scenario, open.rows[0])?;
         }
         match self.found.scenarios.is_empty() && self.table.next_row()?.is_none() {
             true => Err(Error::input(self.table.file(), "holds no scenario", HELP)),
@@ -290,25 +292,61 @@ impl Reader {
     }
 }
 
-/// Samples per second of instants at equal distances.
-fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, String> {
-    let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else { return Err("no instant".to_owned()) };
-    if times_s.len() < 2 {
-        return Err("one instant, but a scenario has a duration".to_owned());
+/// Samples per second of instants at equal distances; at least one. An error says which instant is wrong.
+fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
+    let end = times_s.len() - 1;
+    let (first, last) = (times_s[0], times_s[end]);
+    if end == 0 {
+        return Err((0, "one instant, but a scenario has a duration".to_owned()));
     }
-    let step_s = (last - first) / (times_s.len() - 1) as f64;
+    let step_s = (last - first) / end as f64;
     if step_s.is_nan() || step_s <= 0.0 {
-        return Err(format!("the last instant, {last} s, is not after the first, {first} s"));
+        return Err((end, format!("the last instant, {last} s, is not after the first, {first} s")));
     }
-    for (k, time_s) in times_s.iter().enumerate() {
-        let expected_s = first + k as f64 * step_s;
-        // Times are often written with two or three digits.
-        if (time_s - expected_s).abs() > 0.05 * step_s {
-            return Err(format!(
-                "{time_s} s where {expected_s:.4} s was expected: the instants are not equally spaced"
-            ));
-        }
+    // Times are often written with two or three digits.
+    let is_off = |(k, time_s): (usize, &f64)| (time_s - (first + k as f64 * step_s)).abs() > 0.05 * step_s;
+    if times_s.iter().enumerate().any(is_off) {
+        let (at, usual_s) = odd_instant(times_s);
+        let (before, time_s) = (times_s[at - 1], times_s[at]);
+        return Err((
+            at,
+            format!("{time_s} s after {before} s; most instants are {usual_s:.4} s apart: they are not equally spaced"),
+        ));
     }
     // 25 Hz from times with rounding errors is 25 Hz.
     Ok((1e6 / step_s).round() / 1e6)
+}
+
+/// The first instant whose distance from the one before is far from the usual one, and that distance: a single wrong
+/// time bends the mean distance, and with it what would be expected everywhere. At least two instants.
+fn odd_instant(times_s: &[f64]) -> (usize, f64) {
+    let steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual_s = sorted[(sorted.len() - 1) / 2];
+    let off = |step: &f64| (step - usual_s).abs();
+    let largest = steps.iter().map(off).fold(0.0, f64::max);
+    (1 + steps.iter().position(|step| off(step) >= 0.5 * largest).unwrap_or(0), usual_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_instant_that_is_wrong_is_named_wherever_it_stands() {
+        let good: Vec<f64> = (0..8).map(|k| f64::from(k) * 0.04).collect();
+        assert_eq!(rate_hz(&good), Ok(25.0));
+        for at in 1..8 {
+            let mut times = good.clone();
+            times[at] += 0.013;
+            let (found, problem) = rate_hz(&times).unwrap_err();
+            assert_eq!(found, at, "{problem}");
+        }
+        // 25 Hz with two digits fits; 30 Hz needs three.
+        let rounded: Vec<f64> = (0..91).map(|k| (f64::from(k) * 1000.0 / 30.0).round() / 1000.0).collect();
+        assert_eq!(rate_hz(&rounded).map(f64::round), Ok(30.0));
+        assert_eq!(rate_hz(&[1.0]).unwrap_err().0, 0);
+        assert_eq!(rate_hz(&[1.0, 0.5]).unwrap_err().0, 1);
+    }
 }

@@ -16,6 +16,7 @@ use super::table::{CategoryScores, ScoreTable};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::scenario::Category;
+use crate::sweep::Headway;
 
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
@@ -49,7 +50,7 @@ pub enum ClaimVerdict {
     Undecided,
     /// Fewer failures in S than needed.
     TooFew,
-    /// A variant or model that it needs was not run.
+    /// A variant, a model or a headway that it speaks of was not run.
     NotRun,
 }
 
@@ -61,7 +62,7 @@ impl ClaimVerdict {
             ClaimVerdict::Contradicted => "contradicted",
             ClaimVerdict::Undecided => "undecided",
             ClaimVerdict::TooFew => "too few",
-            ClaimVerdict::NotRun => "not run",
+            ClaimVerdict::NotRun => "not computed",
         }
     }
 }
@@ -71,7 +72,7 @@ impl ClaimVerdict {
 pub struct ClaimRow {
     /// The cell; `None` for the mean over all usable ones.
     pub cell: Option<(ModelId, Criterion)>,
-    /// Failures of S in these cells.
+    /// Failures of S: in the cell, or in all cells of the claim, those that are left out included.
     pub failures: u64,
     /// Value on the whole sample.
     pub value: Option<f64>,
@@ -94,6 +95,14 @@ pub struct ClaimResult {
     pub rows: Vec<ClaimRow>,
     /// Cells left out for too few failures.
     pub left_out: usize,
+}
+
+impl ClaimRow {
+    /// Says nothing of what was not run.
+    fn leave_out(&mut self) {
+        (self.value, self.interval, self.undefined_draws) = (None, None, 0);
+        self.verdict = ClaimVerdict::NotRun;
+    }
 }
 
 fn cells(models: &[ModelId], criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
@@ -197,11 +206,19 @@ pub fn paper_claims() -> Vec<Claim> {
     claims
 }
 
-/// Judges every claim whose category was simulated.
+/// Judges every claim whose category was simulated. The paper's are about all its headways and models: without one of
+/// them a claim is [`ClaimVerdict::NotRun`].
 pub fn judge_claims(table: &ScoreTable) -> Vec<ClaimResult> {
+    let paper = Headway::paper();
+    let has_paper_headways =
+        table.headways.len() == paper.len() && paper.iter().all(|headway| table.headways.contains(headway));
     let judge = |claim: Claim| {
         let scores = table.categories.iter().find(|c| c.category == claim.category)?;
-        Some(judge_claim(claim, scores, table.options.least_failures, table.options.confidence))
+        let mut judged = judge_claim(claim, scores, table.options.least_failures, table.options.confidence);
+        if !has_paper_headways {
+            std::iter::once(&mut judged.overall).chain(&mut judged.rows).for_each(ClaimRow::leave_out);
+        }
+        Some(judged)
     };
     paper_claims().into_iter().filter_map(judge).collect()
 }
@@ -211,12 +228,14 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
     let has_model = |m: &ModelId| scores.models.contains(m);
     let runnable =
         statistic.variants().iter().all(|v| scores.variant(v).is_some()) && statistic.models().iter().all(has_model);
+    let has_all_models = claim.cells.iter().all(|(model, _)| has_model(model));
     let failures = |&(model, criterion): &(ModelId, Criterion)| statistic.failures(scores, model, criterion);
     let of_draw = |draw: Option<usize>, (model, criterion): (ModelId, Criterion)| {
         let counts = |at: usize| draw.map_or(scores.cells[at].counts, |d| scores.draws[d][at]);
         statistic.value(scores, &counts, model, criterion)
     };
-    let row = |cell: Option<(ModelId, Criterion)>, cells: &[(ModelId, Criterion)]| {
+    // `cells` are those that are judged; the claim speaks of all.
+    let row = |cell: Option<(ModelId, Criterion)>, all: &[(ModelId, Criterion)], cells: &[(ModelId, Criterion)]| {
         let sizes = matches!(statistic, Statistic::F1Near(..)) && cells.len() > 1;
         let mean = |draw: Option<usize>| {
             let values: Option<Vec<f64>> = cells.iter().map(|&c| of_draw(draw, c)).collect();
@@ -227,21 +246,23 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         let undefined_draws = (scores.draws.len() - values.len()) as u32;
         let value = mean(None);
         let interval = interval(values, confidence).filter(|_| value.is_some());
-        let total: u64 = cells.iter().map(failures).sum();
-        let verdict = if !runnable || cell.is_some_and(|(model, _)| !has_model(&model)) {
-            ClaimVerdict::NotRun
-        } else if cells.is_empty() || total < u64::from(least) {
+        let total: u64 = all.iter().map(failures).sum();
+        let verdict = if cells.is_empty() || total < u64::from(least) {
             ClaimVerdict::TooFew
         } else if f64::from(undefined_draws) > MOST_UNDEFINED * scores.draws.len() as f64 {
             ClaimVerdict::Undecided
         } else {
             verdict(&statistic, interval)
         };
-        ClaimRow { cell, failures: total, value, interval, undefined_draws, verdict }
+        let mut row = ClaimRow { cell, failures: total, value, interval, undefined_draws, verdict };
+        if !runnable || !cell.map_or(has_all_models, |(model, _)| has_model(&model)) {
+            row.leave_out();
+        }
+        row
     };
     let usable: Vec<_> = claim.cells.iter().copied().filter(|c| failures(c) >= u64::from(least)).collect();
-    let overall = row(None, &usable);
-    let rows = claim.cells.iter().map(|&cell| row(Some(cell), &[cell])).collect();
+    let overall = row(None, &claim.cells, &usable);
+    let rows = claim.cells.iter().map(|&cell| row(Some(cell), &[cell], &[cell])).collect();
     ClaimResult { left_out: claim.cells.len() - usable.len(), claim, overall, rows }
 }
 
@@ -265,7 +286,7 @@ mod tests {
     use super::*;
     use crate::score::ScoreOptions;
     use crate::score::table::Cell;
-    use crate::sweep::Confusion;
+    use crate::sweep::{Confusion, Headway};
 
     /// Cut-out scores in which S fails as given per model (same for every criterion) and b and d differ from it
     /// as given; every draw equals the sample.
@@ -295,7 +316,7 @@ mod tests {
             capped: Vec::new(),
             draws: vec![counts; 20],
         };
-        ScoreTable { categories: vec![scores], options: ScoreOptions::default() }
+        ScoreTable { categories: vec![scores], headways: Headway::paper(), options: ScoreOptions::default() }
     }
 
     fn verdict_of(table: &ScoreTable, id: &str) -> ClaimVerdict {
@@ -312,8 +333,36 @@ mod tests {
     }
 
     #[test]
+    fn a_claim_of_the_paper_without_all_its_headways_or_models_is_not_computed() {
+        let mut some = table([100; 4], GOOD, GOOD);
+        some.headways.pop();
+        assert!(
+            judge_claims(&some).iter().all(|r| r.overall.verdict == ClaimVerdict::NotRun && r.overall.value.is_none())
+        );
+        let mut reordered = table([100; 4], GOOD, GOOD);
+        reordered.headways.reverse();
+        assert_eq!(verdict_of(&reordered, "cut-out b = d"), ClaimVerdict::Holds);
+        let mut three = table([100; 4], GOOD, GOOD);
+        let scores = &mut three.categories[0];
+        scores.models.retain(|model| *model != ModelId::Fsm);
+        scores.cells.retain(|cell| cell.model != ModelId::Fsm);
+        scores.draws = vec![scores.cells.iter().map(|c| c.counts).collect(); 20];
+        let judged = judge_claims(&three);
+        let verdict = |id: &str| judged.iter().find(|r| r.claim.id == id).unwrap().overall.verdict;
+        assert_eq!(verdict("cut-out b = d"), ClaimVerdict::NotRun);
+        assert_ne!(verdict("cut-out b, d best"), ClaimVerdict::NotRun, "it is about Reg157 and CCHDM");
+    }
+
+    #[test]
     fn a_claim_about_few_failures_is_not_judged() {
         assert_eq!(verdict_of(&table([3; 4], GOOD, GOOD), "cut-out c < a"), ClaimVerdict::TooFew);
+    }
+
+    #[test]
+    fn failures_that_are_too_few_to_judge_by_are_still_told() {
+        let judged = judge_claims(&table([3; 4], GOOD, GOOD));
+        let claim = judged.iter().find(|r| r.claim.id == "cut-out c < a").unwrap();
+        assert_eq!((claim.overall.verdict, claim.overall.failures), (ClaimVerdict::TooFew, 18), "2 models, 3 criteria");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::contradiction::contradiction;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
 use crate::scenario::Category;
-use crate::sweep::{Confusion, LanePlan, Partial, UnitCounts};
+use crate::sweep::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use crate::{Error, Place, Result};
 
 /// Recall TP/(TP + FN); `None` where S never fails.
@@ -93,6 +93,8 @@ impl CategoryScores {
 pub struct ScoreTable {
     /// One per category of the plan.
     pub categories: Vec<CategoryScores>,
+    /// Headways of the simulations.
+    pub headways: Vec<Headway>,
     /// How the intervals were made.
     pub options: ScoreOptions,
 }
@@ -153,7 +155,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
             draws,
         });
     }
-    Ok(ScoreTable { categories, options: options.clone() })
+    Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
 }
 
 #[cfg(test)]

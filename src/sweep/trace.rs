@@ -95,7 +95,8 @@ pub struct Trace {
     pub model: ModelId,
     /// Time step, s.
     pub dt_s: f64,
-    /// Initial gap, m, bumper to bumper.
+    /// Gap at the first step, m, bumper to bumper. Where the profile's runs start one step later (`start_shift`), that of
+    /// the case differs by what the vehicles drive until then.
     pub initial_gap_m: f64,
     /// Width of the ego, m.
     pub ego_width_m: f64,
@@ -150,12 +151,14 @@ impl Trace {
             Start::Headway(thw) => thw * case.ego_speed.to_f64(),
             Start::Gap(gap) => gap,
         };
+        let nominal_gap_m = gap + case.others[0].gap_offset.to_f64();
+        let shifted_gap_m = steps.first().filter(|_| profile.frame.start_shift).map(|first| first.others[0].gap_m);
         let ego_width_m = case.ego_width.to_f64();
         Trace {
             category,
             model,
             dt_s,
-            initial_gap_m: gap + case.others[0].gap_offset.to_f64(),
+            initial_gap_m: shifted_gap_m.unwrap_or(nominal_gap_m),
             ego_width_m,
             widths_m: case.others.map(|other| 2.0 * other.half_widths.to_f64() - ego_width_m),
             ttc_threshold_s: profile.criteria.ttc_threshold_s,
