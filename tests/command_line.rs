@@ -354,3 +354,23 @@ fn a_study_of_some_headways_and_models_computes_no_claim_that_needs_all() {
     assert_eq!(code(&lanesweep(&["study", "--thw", "0"])), 2);
     assert_eq!(code(&lanesweep(&["study", "--models", "ACC"])), 2);
 }
+
+#[test]
+fn a_recording_with_speeds_that_no_scenario_holds_is_bad_data_and_no_defect() {
+    let data = recordings();
+    let tracks = data.path().join("01_tracks.csv");
+    let table = std::fs::read_to_string(&tracks).unwrap();
+    let at = table.lines().next().unwrap().split(',').position(|name| name == "xVelocity").unwrap();
+    let faster = |(line, text): (usize, &str)| {
+        let mut fields: Vec<String> = text.split(',').map(str::to_owned).collect();
+        if line > 0 {
+            fields[at] = (fields[at].parse::<f64>().unwrap() * 1e6).to_string();
+        }
+        fields.join(",") + "\n"
+    };
+    std::fs::write(&tracks, table.lines().enumerate().map(faster).collect::<String>()).unwrap();
+    let out = data.path().join("s.jsonl");
+    let mined = lanesweep(&["-q", "mine", text(data.path()), "-o", text(&out)]);
+    assert_eq!(code(&mined), 3, "{}", stderr(&mined));
+    assert!(stderr(&mined).contains("`ego.v0`") && stderr(&mined).contains("at most 1e6"), "{}", stderr(&mined));
+}

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
-use crate::plain_text::{shown, shown_json};
+use crate::plain_text::{shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
 /// How much is said on stderr.
@@ -33,9 +33,10 @@ pub fn start_log(verbosity: Verbosity) {
         .with_writer(io::stderr)
         // Where stderr is gone or full there is nobody to tell, and telling it there would panic.
         .log_internal_errors(false)
+        // One message is one line, whatever a file is called.
         .fmt_fields(debug_fn(|out, field, value| match field.name() {
-            "message" => write!(out, "{}", shown(&format!("{value:?}"))),
-            name => write!(out, "{name}={}", shown(&format!("{value:?}"))),
+            "message" => write!(out, "{}", shown_in_line(&format!("{value:?}"))),
+            name => write!(out, "{name}={}", shown_in_line(&format!("{value:?}"))),
         }))
         .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
         .with_max_level(level)

@@ -31,7 +31,7 @@ pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the folder cannot be written to; [`crate::Error::Usage`] for a name that ends neither in
-/// `.jsonl` nor in `.parquet`; [`crate::Error::Internal`] for a scenario that [`read_scenarios`] would refuse.
+/// `.jsonl` nor in `.parquet`; [`crate::Error::Input`] for a scenario that [`read_scenarios`] would refuse.
 pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
     write_scenarios_of(path, scenarios, false)
 }

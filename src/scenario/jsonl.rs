@@ -99,10 +99,13 @@ fn write_lines<'a>(
     Ok(())
 }
 
-/// What could not be read again: JSON has no NaN, for instance, and it would be written as null.
+/// What could not be read again: JSON has no NaN, for instance, and it would be written as null. A recording may hold
+/// speeds and accelerations that no scenario has.
 pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
     check(scenario).map_err(|p| {
-        Error::Internal(format!("scenario {} cannot be written: `{}` {}", scenario.id, p.field, p.problem))
+        let place = Place::item(name(&scenario.id)).column(p.field);
+        let problem = format!("{}: it cannot be written", p.problem);
+        Error::input(place, problem, "correct the data that it was made of, or leave them out")
     })
 }
 
