@@ -38,7 +38,9 @@ fn recordings(criterion: &mut Criterion) {
     group.bench_function("read one", |b| b.iter(|| highd::read(black_box(&files)).unwrap()));
     group.bench_function("mine one", |b| b.iter(|| mine(black_box(&recording), &mining)));
     group.throughput(Throughput::Bytes(all));
-    group.bench_function("read and mine a folder", |b| b.iter(|| mine_folder(folder.path(), &mining, || ()).unwrap()));
+    group.bench_function("read and mine a folder", |b| {
+        b.iter(|| mine_folder(folder.path(), &mining, Default::default(), || ()).unwrap())
+    });
     group.finish();
 }
 

@@ -92,6 +92,7 @@ pub mod openscenario;
 pub mod parameterization;
 pub mod parts;
 mod plain_text;
+pub mod plausibility;
 pub mod profile;
 pub mod random;
 mod readable;

@@ -144,6 +144,7 @@ fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>
         end_cause: None,
         frame_switch: None,
         tag_frames: None,
+        synthetic: false,
     }
 }
 

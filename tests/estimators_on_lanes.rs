@@ -162,7 +162,8 @@ fn estimators_agree_with_crude_monte_carlo_on_lanes() {
 #[test]
 #[ignore = "10^8 lanes per data set"]
 fn every_estimator_holds_what_a_hundred_million_lanes_resolve() {
-    let mined = |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let mined =
+        |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), Default::default(), || ()).unwrap().scenarios;
     let samples = 100_000_000;
     compare("default data", &default_data(), Category::CutIn, "2", samples, 100_000);
     if let Some(dir) = common::sumo_recordings() {

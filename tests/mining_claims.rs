@@ -84,6 +84,7 @@ fn moved_traffic(cars: &[Car], rate_hz: f64, (ds, dd): (f64, f64)) -> Recording 
         frame_rate_hz: rate_hz,
         carriageways: vec![Carriageway { name: "1".into(), lane_lines_m }],
         tracks: cars.iter().enumerate().map(track).collect(),
+        synthetic: false,
     }
 }
 

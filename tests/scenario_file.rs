@@ -35,6 +35,7 @@ fn cut_out() -> Scenario {
         end_cause: Some("lc_end".into()),
         frame_switch: Some(79),
         tag_frames: Some([77, 81]),
+        synthetic: false,
     }
 }
 

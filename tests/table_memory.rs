@@ -1,12 +1,23 @@
-//! What writing a table holds in memory does not grow with its rows.
+//! What writing a table holds in memory does not grow with its rows; what reading and planning a small file of
+//! scenarios holds stays small, whatever the file claims.
 #![cfg(feature = "parquet")]
 
+#[path = "tables/made.rs"]
+mod made;
 #[allow(dead_code)]
 #[path = "mutated_inputs/memory.rs"]
 mod memory;
 
 use std::fs::File;
 use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, StringArray};
+use lanesweep::plausibility::Implausible;
+use lanesweep::profile::Profile;
+use lanesweep::scenario::read_scenario_file;
+use lanesweep::sweep::{StudyOptions, plan_study};
+use parquet::basic::Compression;
 
 use lanesweep::report::lanes::{Digits, columns};
 use lanesweep::table::{Cell, Kind, TableFacts, TableFormat, TableWriter};
@@ -53,4 +64,96 @@ fn a_million_lanes_take_no_more_memory_than_two_hundred_thousand() {
     let file = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap();
     let groups: Vec<i64> = file.metadata().row_groups().iter().map(|group| group.num_rows()).collect();
     assert_eq!(groups, [131_072, 131_072, 131_072, 131_072, 131_072, 131_072, 131_072, 82_496]);
+}
+
+/// Reads a file of scenarios, accepts what is implausible, and plans the study: what was wrong, and the most bytes held
+/// at once.
+fn study_of(path: &Path) -> (Option<String>, u64) {
+    let profile = Profile::load("paper").unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap();
+    memory::begin(0);
+    let planned = pool.install(|| {
+        let file = read_scenario_file(path, Implausible::Accepted)?;
+        plan_study(&file.scenarios, &profile, &StudyOptions::default()).map(drop)
+    });
+    (planned.err().map(|error| error.to_string()), memory::end())
+}
+
+/// Lines of scenarios with `samples` samples each, up to a size of the file.
+fn lines(path: &Path, category: &str, samples: usize, fps: &str, bytes: usize) {
+    let series = vec!["9"; samples].join(",");
+    let mut text = String::new();
+    for id in 0.. {
+        if text.len() >= bytes {
+            break;
+        }
+        text.push_str(&format!(
+            "{{\"id\":\"{id}\",\"category\":\"{category}\",\"fps\":{fps},\"side\":\"left\",\"ego\":{{\"v0\":9,\
+             \"length\":4,\"width\":2}},\"target\":{{\"length\":4,\"width\":2,\"v\":[{series}],\"y\":[{series}]}}}}\n"
+        ));
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+/// Scenarios with series of so many equal values and texts of so many bytes.
+fn parquet(path: &Path, rows: usize, values: usize, text: usize) {
+    let numbers = |value: f64| -> ArrayRef { Arc::new(Float64Array::from(vec![value; rows])) };
+    let texts = |text: String| -> ArrayRef { Arc::new(StringArray::from(vec![text; rows])) };
+    let ids: Vec<String> = (0..rows).map(|row| row.to_string()).collect();
+    let columns = vec![
+        ("id", Arc::new(StringArray::from(ids)) as ArrayRef),
+        ("category", texts("cut_in".to_owned())),
+        ("recording", texts("x".repeat(text))),
+        ("side", texts("left".to_owned())),
+        ("fps", numbers(0.1)),
+        ("ego_v0", numbers(9.0)),
+        ("ego_length", numbers(4.0)),
+        ("ego_width", numbers(2.0)),
+        ("target_length", numbers(4.0)),
+        ("target_width", numbers(2.0)),
+        ("target_v", made::series(&vec![vec![9.0; values]; rows])),
+        ("target_y", made::series(&vec![vec![1.0; values]; rows])),
+    ];
+    made::write(path, columns, Compression::ZSTD(Default::default()));
+}
+
+#[test]
+fn no_small_file_of_scenarios_takes_more_than_200_mb() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    lines(&path("sparse.jsonl"), "cut_in", 13, "0.1", 2_100_000);
+    lines(&path("sparse-lvd.jsonl"), "lvd", 13, "0.1", 2_100_000);
+    lines(&path("slow.jsonl"), "cut_in", 121, "1", 2_100_000);
+    lines(&path("few.jsonl"), "cut_in", 260_000, "0.1", 2_100_000);
+    lines(&path("dense.jsonl"), "cut_in", 1300, "10", 2_100_000);
+    let cases = |header: &str, row: &str, rows: usize| format!("{header}\n{}", format!("{row}\n").repeat(rows));
+    let cut_ins = cases("category,ego_speed,speed,lateral_speed,duration_s,rate_hz", "cut-in,30,20,1,120,1000", 139);
+    std::fs::write(path("fine.csv"), cut_ins).unwrap();
+    let header = "category,ego_speed,speed,lateral_speed,ahead_gap,duration_s";
+    std::fs::write(path("long.csv"), cases(header, "cut-out,30,20,1,30,120", 5000)).unwrap();
+    parquet(&path("million.parquet"), 1, 1_000_000, 1);
+    parquet(&path("half-a-million.parquet"), 1, 500_000, 1);
+    parquet(&path("texts.parquet"), 64, 2, 8 << 20);
+    let said = |name: &str| {
+        let size = std::fs::metadata(path(name)).unwrap().len();
+        let (error, bytes) = study_of(&path(name));
+        println!("{name}: {size} bytes, {:.1} MB, {}", bytes as f64 / 1e6, error.as_deref().unwrap_or("planned"));
+        assert!(bytes < 200_000_000, "{name}: {bytes}");
+        error
+    };
+    for name in ["sparse.jsonl", "sparse-lvd.jsonl", "slow.jsonl"] {
+        let error = said(name).expect(name);
+        assert!(error.contains("were recorded"), "{name}: {error}");
+    }
+    for name in ["fine.csv", "long.csv"] {
+        let error = said(name).expect(name);
+        assert!(error.contains("too many for so few rows") && error.contains("column `duration_s`"), "{name}: {error}");
+    }
+    assert!(said("million.parquet").unwrap().contains("far more than a file of its size"));
+    assert!(said("texts.parquet").unwrap().contains("a text has 8388608 bytes"));
+    // Series end at the time cap, so long ones are no reason to refuse a file.
+    for name in ["few.jsonl", "dense.jsonl", "half-a-million.parquet"] {
+        let error = said(name);
+        assert!(error.is_none(), "{name}: {error:?}");
+    }
 }

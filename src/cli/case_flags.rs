@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Deserialize;
 
 use crate::driver::ModelId;
+use crate::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::profile::Profile;
 use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least, needed};
 use crate::sweep::Headway;
@@ -133,9 +134,24 @@ impl CaseFlags {
         }
     }
 
-    pub(super) fn case(&self, profile: &Profile) -> Result<Case> {
-        let frame = &profile.frame;
-        self.parameters().plain_case(frame.default_length_m, frame.default_width_m)?.case(frame.time_cap_s)
+    /// The case; what is doubtful of it is told.
+    pub(super) fn case(&self, profile: &Profile, implausible: Implausible) -> Result<Case> {
+        let (frame, mut doubts) = (&profile.frame, Doubts::new(implausible));
+        let mut parameters = self.parameters();
+        parameters.settle(&mut doubts, str::to_owned);
+        let wrong = |key: &str, problem| Error::usage(Place::item(key), problem, HELP);
+        let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
+        parameters.judge(&mut doubts)?;
+        for (key, quantity, value) in [("gap", Quantity::Gap, self.gap), ("thw", Quantity::Headway, self.thw)] {
+            let judged = value.map_or(Ok(()), |value| doubts.judge(quantity, value, || key.to_owned()));
+            judged.map_err(|problem| wrong(key, problem))?;
+        }
+        // An acceleration without an end leads far within the time cap.
+        let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
+        let judged = doubts.judge(Quantity::Speed, last_mps, || "the speed that the acceleration leads to".to_owned());
+        judged.map_err(|text| wrong("acceleration", format!("it leads to a speed of {text}")))?;
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        plain.case(frame.time_cap_s)
     }
 
     fn parameters(&self) -> CaseParameters {
@@ -167,9 +183,10 @@ pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
     let missing =
         || Error::usage(Place::file(path), format!("there is no row {row}"), "rows count from 1 after the header");
     for _ in 1..row {
-        rows.next_row()?.ok_or_else(missing)?;
+        drop(rows.next_row()?.ok_or_else(missing)?);
     }
-    let (_, mut found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
+    let (_, found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
+    let mut found = found?;
     // Of tables of scenarios: a single run has no key and no samples.
     ["id", "duration", "rate"].iter().for_each(|key| drop(found.remove(*key)));
     serde_json::from_value(serde_json::Value::Object(found))

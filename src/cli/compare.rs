@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, Part};
 use super::format::FormatFlag;
-use super::source::{self, Source};
+use super::source::{self, PlausibilityFlag, Source};
 use super::study_run::{How, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
@@ -96,6 +96,8 @@ pub struct Compare {
     #[command(flatten)]
     profile: ProfileFlags,
     #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
     generator: GeneratorFlags,
 }
 
@@ -134,8 +136,8 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
-        tracing::info!("{}", source.describe());
-        let collection = source.load(&config.mining, verbosity)?;
+        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
+        tracing::info!("{}", source.describe(collection.synthetic));
         tracing::info!("{}", source::counts(&collection.scenarios));
         let facts = fit::facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
@@ -153,13 +155,13 @@ impl Compare {
         let plan = &planned.plan;
         if plan.unit_count() == 0 {
             return Err(Error::input(
-                Place::item(source.describe()),
+                Place::item(facts.data),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
                 "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }
         if self.dry_run {
-            return self.forecast(&source, plan, &ids, &opened, started.elapsed().as_secs_f64());
+            return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
         make_folder(&self.out)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
@@ -239,7 +241,7 @@ impl Compare {
     /// What the run would be. Sampled lanes are taken to cost what those of their category's scenarios do.
     fn forecast(
         &self,
-        source: &Source,
+        data: &str,
         plan: &LanePlan,
         ids: &[ParameterizationId],
         opened: &Opened,
@@ -258,7 +260,7 @@ impl Compare {
             whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
         }
         DryRun {
-            data: source.describe(),
+            data: data.to_owned(),
             parts,
             units: "cases",
             is_at_most: false,

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::case_flags::{CaseFlags, from_toml};
 use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
 use super::format::FormatFlag;
+use super::source::PlausibilityFlag;
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::openscenario::{EgoMotion, export_folder};
@@ -96,6 +97,8 @@ pub struct Xosc {
     #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc")]
     out: PathBuf,
     #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
     profile: ProfileFlags,
 }
 
@@ -118,7 +121,7 @@ impl Xosc {
     fn run(&self) -> Result<Exit> {
         let extras = self.extras()?;
         check_folder(&self.out)?;
-        let Exported { scenarios, notes } = self.lanes(&extras)?;
+        let Exported { scenarios, notes, incomplete } = self.lanes(&extras)?;
         notes.iter().for_each(|note| tracing::warn!("{note}"));
         let rows = export_folder(&self.out, &scenarios)?;
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
@@ -128,7 +131,7 @@ impl Xosc {
         };
         self.format.print(|| lines, list)?;
         tracing::info!("{} scenarios written to {}", count_of(rows.len()), self.out.display());
-        Ok(Exit::Ok)
+        Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
     fn lanes(&self, extras: &Extras) -> Result<Exported> {
@@ -188,7 +191,8 @@ impl Xosc {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,
         });
-        Ok(Extras { ego, duration_s: self.duration, side, lane_width_m: self.lane_width })
+        let implausible = self.plausibility.policy();
+        Ok(Extras { ego, duration_s: self.duration, side, lane_width_m: self.lane_width, implausible })
     }
 
     fn criterion(&self) -> Result<Criterion> {

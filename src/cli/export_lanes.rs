@@ -5,14 +5,16 @@ use std::path::Path;
 use super::case_flags::CaseFlags;
 use super::export_worst::{worst_of_sample, worst_of_study};
 use super::simulate_lanes::{Run, find, find_run, model, refuse_void};
+use super::source::scenarios_of;
 use crate::criterion::Criterion;
 use crate::density::DensityModel;
 use crate::driver::{ModelId, NEVER};
 use crate::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
 use crate::parameterization::{Sizes, VehicleSize};
+use crate::plausibility::Implausible;
 use crate::profile::{CutOutTarget, Profile};
 use crate::scalar::Real;
-use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables, read_scenarios};
+use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
 use crate::sweep::{
     EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, StudyOptions, Trace, plan_study,
 };
@@ -25,6 +27,7 @@ pub(super) struct Extras {
     pub duration_s: Option<f64>,
     pub side: Option<Side>,
     pub lane_width_m: Option<f64>,
+    pub implausible: Implausible,
 }
 
 /// Which lanes are asked for by name.
@@ -38,6 +41,8 @@ pub(super) struct Source<'a> {
 pub(super) struct Exported {
     pub scenarios: Vec<Concrete>,
     pub notes: Vec<String>,
+    /// Other scenarios of the file were left out.
+    pub incomplete: bool,
 }
 
 /// Width of a lane where nothing tells it, m.
@@ -76,7 +81,8 @@ pub(super) fn of_run(
     match find_run(dir, first)? {
         Run::Study(study) => {
             let (whole, facts) = (study.plan(), &study.facts);
-            let mined = scenarios.map(read_scenarios).transpose()?.unwrap_or_default();
+            let mined = scenarios.map(|path| scenarios_of(path, extras.implausible)).transpose()?.unwrap_or_default();
+            let (mined, incomplete) = mined;
             let keys = match worst {
                 Some((count, variants)) => {
                     worst_of_study(&study.study, facts.reference, count, criterion, variants, source.models.as_deref())?
@@ -88,10 +94,11 @@ pub(super) fn of_run(
             let plan = &study.study.window(span)?;
             let about = About {
                 data: &facts.data,
-                is_synthetic: facts.synthetic,
+                is_synthetic: facts.synthetic || mined.iter().any(|scenario| scenario.synthetic),
                 mined: &mined,
                 density: None,
                 are_alike: false,
+                incomplete,
             };
             if facts.reference {
                 lanes::<f64>(plan, &keys, &about, extras)
@@ -108,7 +115,14 @@ pub(super) fn of_run(
                 Some((count, _)) => worst_of_sample(dir, &plan, count, source.models.as_deref())?,
                 None => named(&plan, source)?,
             };
-            let about = About { data: &data, is_synthetic: false, mined: &[], density: None, are_alike: true };
+            let about = About {
+                data: &data,
+                is_synthetic: false,
+                mined: &[],
+                density: None,
+                are_alike: true,
+                incomplete: false,
+            };
             lanes::<f32>(&plan, &keys, &about, extras)
         }
         Run::Sample(plan, density) => {
@@ -131,6 +145,7 @@ pub(super) fn of_run(
                 mined: &[],
                 density: Some(density.as_ref()),
                 are_alike: false,
+                incomplete: false,
             };
             lanes::<f32>(&plan, &keys, &about, extras)
         }
@@ -140,9 +155,9 @@ pub(super) fn of_run(
 /// Lanes of a scenario file, in f64; a scenario that the filters dropped too, and any headway.
 ///
 /// # Errors
-/// As [`read_scenarios`]; [`Error::Usage`] for a lane that the file does not have.
+/// As [`scenarios_of`]; [`Error::Usage`] for a lane that the file does not have.
 pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extras: &Extras) -> Result<Exported> {
-    let mut mined = read_scenarios(path)?;
+    let (mut mined, incomplete) = scenarios_of(path, extras.implausible)?;
     let mut options = StudyOptions::default();
     let mut headways = Vec::new();
     for key in source.keys {
@@ -160,8 +175,9 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extr
         options.headways = headways;
     }
     let plan = plan_study(&mined, profile, &options)?.plan;
+    let is_synthetic = mined.iter().any(|scenario| scenario.synthetic);
     let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
-    let about = About { data: &data, is_synthetic: false, mined: &mined, density: None, are_alike: false };
+    let about = About { data: &data, is_synthetic, mined: &mined, density: None, are_alike: false, incomplete };
     lanes::<f64>(&plan, &named(&plan, source)?, &about, extras)
 }
 
@@ -171,7 +187,7 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extr
 /// [`Error::Usage`] for flags that make no case.
 pub(super) fn of_case(flags: &CaseFlags, profile: &Profile, extras: &Extras) -> Result<Exported> {
     let (category, headway) = (flags.category()?, flags.headway()?);
-    let described = flags.case(profile)?;
+    let described = flags.case(profile, extras.implausible)?;
     let mut tables = Tables::default();
     let case = LaneCase::encode(&described, profile, &mut tables);
     let size = |length_m, width_m| VehicleSize { length_m, width_m };
@@ -196,7 +212,7 @@ pub(super) fn of_case(flags: &CaseFlags, profile: &Profile, extras: &Extras) -> 
         };
         scenarios.push(concrete(&trace, (&case, &tables), &case, &known, extras)?);
     }
-    Ok(Exported { scenarios, notes: Vec::new() })
+    Ok(Exported { scenarios, notes: Vec::new(), incomplete: false })
 }
 
 fn named(plan: &LanePlan, source: &Source) -> Result<Vec<LaneKey>> {
@@ -224,6 +240,8 @@ struct About<'a> {
     density: Option<&'a DensityModel>,
     /// Every vehicle has the same size.
     are_alike: bool,
+    /// Other scenarios of the file were left out.
+    incomplete: bool,
 }
 
 fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Extras) -> Result<Exported> {
@@ -268,7 +286,7 @@ fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Ext
     let note = "a study's plan knows the sums of two lengths only: the ego has the profile's length, the others what is \
                 left; gaps and contacts stay (--scenarios FILE tells the lengths)";
     let notes = if are_lengths_told { Vec::new() } else { vec![note.to_owned()] };
-    Ok(Exported { scenarios, notes })
+    Ok(Exported { scenarios, notes, incomplete: about.incomplete })
 }
 
 /// The same numbers in f64.

@@ -11,7 +11,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::{self, Source};
+use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
 use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use crate::mining::Collection;
@@ -74,6 +74,8 @@ pub struct Fit {
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
     generator: GeneratorFlags,
 }
 
@@ -107,8 +109,8 @@ impl Fit {
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
         let files = self.files(&ids, configured)?;
-        tracing::info!("{}", source.describe());
-        let collection = source.load(&config.mining, verbosity)?;
+        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
+        tracing::info!("{}", source.describe(collection.synthetic));
         tracing::info!("{}", source::counts(&collection.scenarios));
         let facts = facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
@@ -200,8 +202,8 @@ pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> 
         }
     };
     let mut facts = DataFacts {
-        data: source.describe(),
-        synthetic: source.is_synthetic(),
+        data: source.describe(collection.synthetic),
+        synthetic: collection.synthetic,
         scenarios_sha256,
         driven: Driven::of(collection),
     };
@@ -209,8 +211,8 @@ pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> 
         && let Some(beside) = ExposureFile::read_beside(path, &facts.scenarios_sha256)?
     {
         facts.driven = Some(beside.driven);
-        facts.synthetic = beside.synthetic;
         if beside.synthetic {
+            facts.synthetic = true;
             facts.data = beside.data;
         }
     }

@@ -9,6 +9,7 @@ use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
 use super::dry_run::{BUDGET, DryRun, Part};
 use super::format::FormatFlag;
+use super::source::PlausibilityFlag;
 use super::{Exit, lists};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
@@ -17,6 +18,7 @@ use crate::grid::{
     CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MOST_PANELS, MapBackend, PARAMETERS, Parameter,
 };
 use crate::openscenario::{Names, Rename, read_distribution, variations};
+use crate::plausibility::Doubts;
 use crate::profile::Profile;
 use crate::readable::{count, value};
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
@@ -84,6 +86,8 @@ pub struct Map {
     /// Time step, s [default: the profile's]
     #[arg(long, value_name = "SECONDS")]
     dt: Option<f64>,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -218,11 +222,12 @@ impl Map {
                 ));
             }
             None => {
-                let grid = match &self.distribution {
-                    Some(path) => Grid::new(self.of_distribution(path, category)?)?,
+                let parts = match &self.distribution {
+                    Some(path) => self.of_distribution(path, category)?,
                     None => self.own_grid(category)?,
                 };
-                let known_percent = Vec::new();
+                self.judge(&parts)?;
+                let (grid, known_percent) = (Grid::new(parts)?, Vec::new());
                 vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent, is_chosen_to_match: false }]
             }
         };
@@ -233,7 +238,18 @@ impl Map {
         Ok(grids)
     }
 
-    fn own_grid(&self, category: Category) -> Result<Grid> {
+    /// Looks at every value, and tells what is doubtful.
+    fn judge(&self, parts: &GridParts) -> Result<()> {
+        let mut doubts = Doubts::new(self.plausibility.policy());
+        for axis in [&parts.x, &parts.y].into_iter().chain(&parts.panel_axes) {
+            axis.values.iter().try_for_each(|value| axis.parameter.judge(*value, &mut doubts))?;
+        }
+        parts.fixed.iter().try_for_each(|(parameter, value)| parameter.judge(*value, &mut doubts))?;
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        Ok(())
+    }
+
+    fn own_grid(&self, category: Category) -> Result<GridParts> {
         let axis = |text: &Option<String>, flag: &str| {
             let text = text.as_deref().ok_or_else(|| {
                 let problem = "it is missing".to_owned();
@@ -241,7 +257,7 @@ impl Map {
             })?;
             GridAxis::parse(category, text, flag)
         };
-        Grid::new(GridParts {
+        Ok(GridParts {
             name: category.key().to_owned(),
             category,
             x: axis(&self.x, "--x")?,

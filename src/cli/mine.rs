@@ -6,12 +6,12 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::Verbosity;
-use super::source::{self, Source};
+use super::source::{self, PlausibilityFlag, Source};
 use super::{Exit, console};
 use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
 use crate::readable::count_of;
-use crate::scenario::{check_scenario_file, write_scenarios_of, write_scenarios_to};
+use crate::scenario::{check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::{Result, input_file};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
@@ -31,6 +31,8 @@ pub struct Mine {
     /// Only scenarios that pass the paper's filters
     #[arg(long)]
     kept: bool,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
 }
 
 impl Mine {
@@ -43,17 +45,17 @@ impl Mine {
             AtomicFile::create(path).map(drop)?;
         }
         let from = Source::Folder(self.dir.clone());
-        let mut collection = from.load(&configured.settings.mining, verbosity)?;
+        let mut collection = from.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }
         match &self.output {
             Some(path) => {
-                write_scenarios_of(path, &collection.scenarios, from.is_synthetic())?;
+                write_scenarios(path, &collection.scenarios)?;
                 if let Some(driven) = Driven::of(&collection) {
                     let scenarios_sha256 = input_file::sha256(path)?;
-                    let (data, synthetic) = (from.describe(), from.is_synthetic());
+                    let (data, synthetic) = (from.describe(collection.synthetic), collection.synthetic);
                     ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
                 }
                 tracing::info!("{} scenarios written to {}", count_of(collection.scenarios.len()), path.display());

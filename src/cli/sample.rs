@@ -17,6 +17,7 @@ use super::sample_lanes;
 use super::sample_plan::{PlannedSample, SampleFacts};
 use super::sample_weighted;
 use super::shard_flags::ShardFlags;
+use super::source::PlausibilityFlag;
 use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
@@ -146,6 +147,8 @@ pub struct Sample {
     /// Print lanes, memory and an estimate of the time, and end: nothing is written
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
     pub(super) dry_run: bool,
+    #[command(flatten)]
+    pub(super) plausibility: PlausibilityFlag,
     #[command(flatten)]
     pub(super) format: FormatFlag,
     #[command(flatten)]

@@ -16,6 +16,7 @@ use crate::density::Provenance;
 use crate::estimate::{BinomialInterval, Checkpoints, StopRule};
 use crate::grid::Parameter;
 use crate::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
+use crate::plausibility::Doubts;
 use crate::profile::Profile;
 use crate::readable;
 use crate::report::files::{make_folder, write_atomically};
@@ -84,6 +85,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         set: flags.set.clone(),
     };
     let samples = kept.samples()?;
+    judge(&samples, Doubts::new(flags.plausibility.policy()))?;
     for p in samples.parameters.iter().filter(|p| p.kept_share < 1.0) {
         tracing::warn!(
             "{:.3} % of the distribution of {} lie outside {} … {} {} and are not drawn",
@@ -157,6 +159,20 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     flags.format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", flags.out.display());
     Ok(Exit::Ok)
+}
+
+/// Looks at the fixed values and at the quartiles of the distributions: their tails are cut off anyway.
+fn judge(samples: &DistributionSamples, mut doubts: Doubts) -> Result<()> {
+    for (parameter, value) in &samples.fixed {
+        parameter.judge(*value, &mut doubts)?;
+    }
+    for p in &samples.parameters {
+        for share in [0.25, 0.75] {
+            p.parameter.judge(p.draw.value(share) * p.factor, &mut doubts)?;
+        }
+    }
+    doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+    Ok(())
 }
 
 fn record(kept: &Kept, samples: &DistributionSamples, path: &Path) -> DensityRecord {

@@ -8,7 +8,7 @@ use super::case_flags::{CaseFlags, from_table, from_toml};
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
-use super::source::refuse_overwriting;
+use super::source::{PlausibilityFlag, refuse_overwriting};
 use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
@@ -67,6 +67,8 @@ pub struct Simulate {
     #[arg(long, value_name = "SECONDS", requires = "plot")]
     until: Option<f64>,
     #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
     profile: ProfileFlags,
@@ -88,7 +90,7 @@ impl Simulate {
         if verbosity != Verbosity::Quiet {
             lanes.traced.iter().for_each(|lane| console::say(&summary(lane, lanes.traced.len() > 1)));
         }
-        Ok(Exit::Ok)
+        Ok(if lanes.incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
     fn lanes(&self) -> Result<Lanes> {
@@ -103,7 +105,7 @@ impl Simulate {
         let asked = Asked { key, models: self.case.named_models()?, compare: &self.compare };
         match (&self.from, &self.scenarios) {
             (Some(dir), _) => of_run(dir, &asked),
-            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &asked),
+            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &asked, self.plausibility.policy()),
             (None, None) => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
                 Err(Error::usage(Place::item("--lane"), "a key alone does not say what it is of", help))
@@ -116,7 +118,7 @@ impl Simulate {
         let profile = self.profile.load()?;
         let flags = self.flags()?;
         let mut tables = Tables::default();
-        let case = LaneCase::encode(&flags.case(&profile)?, &profile, &mut tables);
+        let case = LaneCase::encode(&flags.case(&profile, self.plausibility.policy())?, &profile, &mut tables);
         let (category, headway) = (flags.category()?, flags.headway()?);
         let traced = |model: ModelId| Traced {
             key: model.name().to_owned(),
@@ -125,7 +127,8 @@ impl Simulate {
             reference: None,
         };
         let traced = flags.models()?.into_iter().map(traced).collect();
-        Ok(Lanes { traced, origin: format!("profile {}, f64, a case of flags", profile.name), synthetic: false })
+        let origin = format!("profile {}, f64, a case of flags", profile.name);
+        Ok(Lanes { traced, origin, synthetic: false, incomplete: false })
     }
 
     fn flags(&self) -> Result<CaseFlags> {

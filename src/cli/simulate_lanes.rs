@@ -7,13 +7,14 @@ use serde::Deserialize;
 use super::sample_distribution;
 use super::sample_plan::{self, PlannedSample};
 use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
+use super::source::scenarios_of;
 use super::study_plan::{self, PlannedStudy};
 use crate::density::DensityModel;
 use crate::driver::ModelId;
 use crate::parts::kind_of;
+use crate::plausibility::Implausible;
 use crate::profile::Profile;
 use crate::scalar::Real;
-use crate::scenario::read_scenarios;
 use crate::sweep::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, StudyOptions, Trace, plan_study};
 use crate::{Error, Place, Result, input_file};
 
@@ -43,6 +44,8 @@ pub(super) struct Lanes {
     /// What they are of, in a few words.
     pub origin: String,
     pub synthetic: bool,
+    /// Other scenarios of the file were left out.
+    pub incomplete: bool,
 }
 
 /// Lanes of a finished run, in its own arithmetic.
@@ -61,17 +64,17 @@ pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
                 if facts.reference { traced::<f64>(&plan, asked, false)? } else { traced::<f32>(&plan, asked, true)? };
             let arithmetic = if facts.reference { "f64" } else { "f32" };
             let origin = format!("profile {}, {arithmetic}, {}", plan.profile.name, facts.data);
-            Ok(Lanes { traced, origin, synthetic: facts.synthetic })
+            Ok(Lanes { traced, origin, synthetic: facts.synthetic, incomplete: false })
         }
         Run::Sample(plan, density) => {
             refuse_void(&plan, &find(&plan, asked.key)?)?;
             let synthetic = density.provenance.synthetic;
             let origin = format!("profile {}, f32, sampled", plan.profile.name);
-            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic })
+            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic, incomplete: false })
         }
         Run::Distribution(plan, data) => {
             let origin = format!("profile {}, f32, {data}", plan.profile.name);
-            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic: false })
+            Ok(Lanes { traced: traced::<f32>(&plan, asked, true)?, origin, synthetic: false, incomplete: false })
         }
     }
 }
@@ -79,9 +82,9 @@ pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
 /// Lanes of a scenario file, in f64. A scenario that the filters dropped can be looked at too, and any headway.
 ///
 /// # Errors
-/// As [`read_scenarios`]; [`Error::Usage`] for a lane that the file does not have.
-pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked) -> Result<Lanes> {
-    let mut scenarios = read_scenarios(path)?;
+/// As [`scenarios_of`]; [`Error::Usage`] for a lane that the file does not have.
+pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked, implausible: Implausible) -> Result<Lanes> {
+    let (mut scenarios, incomplete) = scenarios_of(path, implausible)?;
     let id = asked.key.rsplitn(4, '/').last().unwrap_or(asked.key);
     if let Some(wanted) = scenarios.iter_mut().find(|s| s.id == id) {
         wanted.kept = true;
@@ -91,8 +94,9 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked) -> Res
         options.headways = vec![headway];
     }
     let plan = plan_study(&scenarios, profile, &options)?.plan;
+    let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
     let origin = format!("profile {}, f64, scenarios of {}", profile.name, path.display());
-    Ok(Lanes { traced: traced::<f64>(&plan, asked, false)?, origin, synthetic: false })
+    Ok(Lanes { traced: traced::<f64>(&plan, asked, false)?, origin, synthetic, incomplete })
 }
 
 pub(super) enum Run {

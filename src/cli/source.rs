@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
+
 use super::console::{self, Verbosity};
 use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
+use crate::plausibility::Implausible;
 use crate::readable;
-use crate::scenario::{Category, Scenario, read_scenarios};
+use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::trajectory::generator::GeneratorOptions;
-use crate::trajectory::highd;
-use crate::{Error, Place, Result, input_file};
+use crate::trajectory::highd::{self, made_up};
+use crate::{Error, Place, Result};
 
 /// What the scenarios of a run are.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,38 +25,31 @@ pub enum Source {
 }
 
 impl Source {
-    /// Where the scenarios are from, in one line.
-    pub fn describe(&self) -> String {
-        match self {
-            Source::Folder(dir) => match synthetic_marker(dir) {
-                Some(sentence) => sentence,
-                None => format!("recordings in {}", dir.display()),
-            },
+    /// Where the scenarios are from, in one line, which says so where they are made up.
+    pub fn describe(&self, synthetic: bool) -> String {
+        let text = match self {
+            Source::Folder(dir) => made_up(dir).unwrap_or_else(|| format!("recordings in {}", dir.display())),
             Source::Scenarios(path) => format!("scenarios of {}", path.display()),
             Source::Generated(options) => format!(
                 "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates {} times those of highD",
                 options.recordings, options.duration_s, options.seed, options.event_rate_factor
             ),
-        }
-    }
-
-    /// Made by the program: no statement about real traffic.
-    pub fn is_synthetic(&self) -> bool {
-        match self {
-            Source::Generated(_) => true,
-            Source::Folder(dir) => synthetic_marker(dir).is_some(),
-            Source::Scenarios(_) => false,
-        }
+        };
+        labelled(text, synthetic)
     }
 
     /// Reads or generates, and mines.
-    pub fn load(&self, mining: &MiningOptions, verbosity: Verbosity) -> Result<Collection> {
+    pub fn load(&self, mining: &MiningOptions, implausible: Implausible, verbosity: Verbosity) -> Result<Collection> {
         let collection = match self {
-            Source::Scenarios(path) => Collection { scenarios: read_scenarios(path)?, ..Collection::default() },
+            Source::Scenarios(path) => {
+                let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
+                let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
+                Collection { scenarios, problems, notes, synthetic, ..Collection::default() }
+            }
             Source::Folder(dir) => {
                 let length = highd::inventory(dir).map_or(0, |i| i.recordings.len() as u64);
                 let bar = console::progress(verbosity, length, "reading and mining");
-                let collection = mine_folder(dir, mining, || bar.inc(1))?;
+                let collection = mine_folder(dir, mining, implausible, || bar.inc(1))?;
                 bar.finish_and_clear();
                 collection
             }
@@ -64,14 +60,43 @@ impl Source {
                 collection
             }
         };
-        for problem in &collection.problems {
-            console::complain(problem);
-        }
-        for note in &collection.notes {
-            tracing::info!("{note}");
-        }
+        complain_of(&collection.problems, &collection.notes);
         Ok(collection)
     }
+}
+
+/// What is told one by one of what was left out.
+const TOLD: usize = 20;
+
+/// Tells what was left out and what is doubtful.
+pub fn complain_of(problems: &[Error], notes: &[String]) {
+    problems.iter().take(TOLD).for_each(console::complain);
+    if problems.len() > TOLD {
+        tracing::error!("{} more were left out", problems.len() - TOLD);
+    }
+    notes.iter().for_each(|note| tracing::warn!("{note}"));
+}
+
+/// What is done about input that no road has.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct PlausibilityFlag {
+    /// Use values that are beyond what is physical (a speed of 108 m/s), and tell them
+    #[arg(long)]
+    accept_implausible: bool,
+}
+
+impl PlausibilityFlag {
+    /// As readers take it.
+    pub fn policy(self) -> Implausible {
+        if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused }
+    }
+}
+
+/// The scenarios of a file of which one is asked for, and whether some were left out; what was wrong is told.
+pub fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec<Scenario>, bool)> {
+    let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
+    complain_of(&problems, &notes);
+    Ok((scenarios, !problems.is_empty()))
 }
 
 /// Found and kept, per category, in one line.
@@ -100,12 +125,9 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     Ok(list)
 }
 
-/// File that `synth` leaves beside its recordings, so that a study on them says what they are.
-pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
-
-fn synthetic_marker(dir: &Path) -> Option<String> {
-    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::LARGEST_SETTINGS_BYTES).ok()?;
-    text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
+/// What data are, in words that say so where they are made up.
+pub fn labelled(data: String, synthetic: bool) -> String {
+    if synthetic && !data.starts_with("SYNTHETIC DATA") { format!("SYNTHETIC DATA: {data}") } else { data }
 }
 
 /// An output must not be one of these files.

@@ -12,7 +12,7 @@ use super::console::Verbosity;
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan, units_of};
-use super::source::{self, Source};
+use super::source::{self, PlausibilityFlag, Source};
 use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
@@ -38,7 +38,8 @@ use crate::{Error, Place, Result, input_file};
 /// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "seed" | "categories" | "models" | "thw" | "published" | "reference" | "profile" | "dt"
+    "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
+    | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
     "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
@@ -94,6 +95,8 @@ pub struct Study {
     backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
     #[command(flatten)]
     generator: GeneratorFlags,
 }
@@ -185,9 +188,11 @@ impl Study {
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        tracing::info!("{}", source.describe());
         let mut timings = Timings::default();
-        let collection = timed(&mut timings.mine_s, || source.load(&config.mining, verbosity))?;
+        let collection =
+            timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
+        let data = source.describe(collection.synthetic);
+        tracing::info!("{data}");
         tracing::info!("{}", source::counts(&collection.scenarios));
         let planned = timed(&mut timings.plan_s, || outline_study(&collection.scenarios, &profile, &options))?;
         for left_out in &planned.left_out {
@@ -195,14 +200,14 @@ impl Study {
         }
         if planned.study.outline().unit_count() == 0 {
             return Err(Error::input(
-                Place::item(source.describe()),
+                Place::item(data),
                 format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
                 "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }
         let facts = StudyFacts {
-            data: source.describe(),
-            synthetic: source.is_synthetic(),
+            data,
+            synthetic: collection.synthetic,
             published: self.published,
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),

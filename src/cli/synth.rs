@@ -7,10 +7,10 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::source::{SYNTHETIC_MARKER, Source};
+use super::source::Source;
 use crate::report::files::{make_folder, write_atomically};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::trajectory::highd::{self, HighdFiles, RecordingInfo};
+use crate::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
 
 /// Flags of the generator.
@@ -66,7 +66,7 @@ impl Synth {
             ));
         }
         make_folder(&self.dir)?;
-        let sentence = Source::Generated(options.clone()).describe();
+        let sentence = Source::Generated(options.clone()).describe(true);
         let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
         write_atomically(&self.dir.join(SYNTHETIC_MARKER), marker.as_bytes())?;
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");

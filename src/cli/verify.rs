@@ -8,7 +8,7 @@ use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::source::{self, Source};
+use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::profile::Profile;
@@ -54,6 +54,8 @@ pub struct Verify {
     backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
     #[command(flatten)]
     generator: GeneratorFlags,
 }
@@ -151,13 +153,13 @@ impl Verify {
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
-        let collection = source.load(&configured.settings.mining, verbosity)?;
+        let collection = source.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
         if plan.unit_count() == 0 {
             let problem = format!("no scenario to simulate ({})", source::counts(&collection.scenarios));
             let help = "use more recordings or scenarios that pass the paper's filters";
-            return Err(Error::input(Place::item(source.describe()), problem, help));
+            return Err(Error::input(Place::item(source.describe(collection.synthetic)), problem, help));
         }
         Ok(plan)
     }

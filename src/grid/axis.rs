@@ -40,9 +40,7 @@ impl GridAxis {
                 range((number(from)?, number(to)?), number(step)?, text, flag)?
             }
         };
-        for &value in &values {
-            parameter.check(value, flag)?;
-        }
+        let values = values.into_iter().map(|value| parameter.check(value, flag)).collect::<Result<Vec<_>>>()?;
         if let Some(pair) = values.windows(2).find(|pair| pair[0] >= pair[1]) {
             let problem = format!("{} follows {} in `{text}`", pair[1], pair[0]);
             return Err(wrong(problem, "give every value once, in rising order"));

@@ -1,6 +1,7 @@
 //! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
 
 use crate::near_name::nearest;
+use crate::plausibility::{self, Doubts};
 use crate::profile::Profile;
 use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase};
 use crate::{Error, Place, Result};
@@ -150,11 +151,41 @@ impl Parameter {
         format!("{} ({})", self.label, self.unit)
     }
 
-    /// Checks that a value lies in the range.
+    /// What it is to a table of plausible values, and in which sign that has it.
+    fn plausible(&self) -> (plausibility::Quantity, f64) {
+        use plausibility::Quantity as Of;
+        match self.quantity {
+            Quantity::EgoSpeed | Quantity::OtherSpeed | Quantity::EndSpeed | Quantity::AheadSpeed => (Of::Speed, 1.0),
+            Quantity::Gap | Quantity::AheadGap => (Of::Gap, 1.0),
+            Quantity::Thw => (Of::Headway, 1.0),
+            Quantity::LateralSpeed => (Of::LateralSpeed, 1.0),
+            Quantity::LateralDistance => (Of::LateralPosition, 1.0),
+            Quantity::Deceleration => (Of::Acceleration, -1.0),
+            Quantity::Length => (Of::Length, 1.0),
+            Quantity::Width => (Of::Width, 1.0),
+        }
+    }
+
+    /// Looks at a value that a user gave.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for one beyond the physical range, unless such are accepted.
+    pub fn judge(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
+        let (quantity, sign) = self.plausible();
+        let judged = doubts.judge(quantity, sign * self.si(value), || self.key.to_owned());
+        judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
+    }
+
+    /// A value in the range; a speed that is noise of a standing vehicle is 0, which is told.
     ///
     /// # Errors
     /// [`Error::Usage`] with the range.
     pub fn check(&self, value: f64, flag: &str) -> Result<f64> {
+        let mut doubts = Doubts::default();
+        let is_still = self.plausible().0 == plausibility::Quantity::Speed
+            && doubts.speed(self.si(value), || format!("{} = {value}", self.key)) != self.si(value);
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        let value = if is_still { 0.0 } else { value };
         if (self.least..=self.most).contains(&value) {
             return Ok(value);
         }

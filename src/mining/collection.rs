@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::miner::{CategoryCount, Mined, mine};
 use super::options::MiningOptions;
+use crate::plausibility::Implausible;
 use crate::scenario::{Category, Scenario};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::highd::{self, FileChecksum};
@@ -44,13 +45,16 @@ pub struct Collection {
     pub recordings: Vec<RecordingSummary>,
     /// Recordings that were not, and why.
     pub problems: Vec<Error>,
-    /// What the data leaves open, as sentences.
+    /// What the data leaves open or what looks wrong, as sentences.
     pub notes: Vec<String>,
+    /// Made up by the program, in whole or in part: nothing that follows is a statement about real traffic.
+    pub synthetic: bool,
 }
 
 impl Collection {
     fn add(&mut self, part: Part) {
         self.notes.extend(part.notes);
+        self.synthetic |= part.synthetic;
         self.scenarios.extend(part.mined.scenarios);
         self.recordings.push(part.summary);
     }
@@ -69,13 +73,19 @@ struct Part {
     mined: Mined,
     summary: RecordingSummary,
     notes: Vec<String>,
+    synthetic: bool,
 }
 
 /// Reads and mines every recording of a folder. `done` is called after each one, from any thread.
 ///
 /// # Errors
 /// If the folder holds no recording, or none of them can be read: the first recording's error.
-pub fn mine_folder(dir: &Path, options: &MiningOptions, done: impl Fn() + Sync) -> Result<Collection> {
+pub fn mine_folder(
+    dir: &Path,
+    options: &MiningOptions,
+    implausible: Implausible,
+    done: impl Fn() + Sync,
+) -> Result<Collection> {
     options.validate()?;
     let inventory = highd::inventory(dir)?;
     let parts: Vec<Result<Part>> = inventory
@@ -83,10 +93,10 @@ pub fn mine_folder(dir: &Path, options: &MiningOptions, done: impl Fn() + Sync) 
         .par_iter()
         .with_max_len(1)
         .map(|files| {
-            let part = highd::read(files).map(|loaded| {
+            let part = highd::read_judged(files, implausible).map(|loaded| {
                 let mined = mine(&loaded.recording, options);
                 let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
-                Part { mined, summary, notes: loaded.notes }
+                Part { mined, summary, notes: loaded.notes, synthetic: loaded.recording.synthetic }
             });
             done();
             part
@@ -120,7 +130,7 @@ pub fn mine_generated(
             let mined = mine(&recording, options);
             let summary = summary(&recording, &mined, options, Vec::new());
             done();
-            Ok(Part { mined, summary, notes: Vec::new() })
+            Ok(Part { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
         })
         .collect::<Result<_>>()?;
     let mut collection = Collection::default();

@@ -68,6 +68,7 @@ impl Found<'_> {
             end_cause: None,
             frame_switch: None,
             tag_frames: None,
+            synthetic: scene.recording.synthetic,
         })
     }
 

@@ -106,6 +106,7 @@ mod tests {
     fn vehicles_ahead_come_nearest_first_and_only_from_the_same_frame() {
         let recording = Recording {
             id: "t".into(),
+            synthetic: false,
             frame_rate_hz: 25.0,
             carriageways: vec![Carriageway { name: "1".into(), lane_lines_m: vec![2.0, -2.0] }],
             tracks: vec![

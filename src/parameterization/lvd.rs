@@ -2,7 +2,7 @@
 
 use super::Sizes;
 use super::options::ParameterizationOptions;
-use super::series::{at, steps_of};
+use super::series::{TimeGrid, at, steps_of};
 use crate::scenario::{Case, Category, Lateral, Participant, Scenario, Speed};
 use crate::{Error, Result};
 
@@ -25,7 +25,14 @@ impl LvdParameters {
     }
 
     /// The case under the parameterization `key`.
-    pub fn case(&self, key: &str, sizes: &Sizes, dt_s: f64, options: &ParameterizationOptions) -> Result<Case> {
+    pub fn case(
+        &self,
+        key: &str,
+        sizes: &Sizes,
+        grid: impl Into<TimeGrid>,
+        options: &ParameterizationOptions,
+    ) -> Result<Case> {
+        let grid = grid.into();
         let LvdParameters { v0_mps: v0, v1_mps: v1, duration_s } = *self;
         let speed = match key {
             "i" => Speed::Kinematic {
@@ -38,10 +45,10 @@ impl LvdParameters {
                 let points: Vec<f64> =
                     (0..=n).map(|k| sinusoidal_speed(v0, v1, duration_s, duration_s * k as f64 / n as f64)).collect();
                 let value = |i: usize| match n {
-                    0 => sinusoidal_speed(v0, v1, duration_s, i as f64 * dt_s),
-                    _ => at(&points, n as f64 / duration_s, (i as f64 * dt_s).min(duration_s)),
+                    0 => sinusoidal_speed(v0, v1, duration_s, i as f64 * grid.dt_s),
+                    _ => at(&points, n as f64 / duration_s, (i as f64 * grid.dt_s).min(duration_s)),
                 };
-                Speed::Sampled((0..steps_of(duration_s, dt_s)).map(value).collect())
+                Speed::Sampled((0..steps_of(duration_s, grid)).map(value).collect())
             }
             _ => return Err(Error::Internal(format!("LVD parameterization {key} is not kinematic"))),
         };

@@ -26,6 +26,8 @@ pub use options::{
 };
 pub use recorded::recorded_case;
 pub use reduction::{LEAST_DURATION_S, ReducedScenario, Reduction};
+pub use series::TimeGrid;
+pub(crate) use series::steps_of;
 pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
@@ -101,7 +103,12 @@ impl ParameterizationId {
     }
 
     /// The case of a scenario under a kinematic parameterization; an error for one that needs a fit.
-    pub fn kinematic_case(&self, scenario: &Scenario, dt_s: f64, options: &ParameterizationOptions) -> Result<Case> {
+    pub fn kinematic_case(
+        &self,
+        scenario: &Scenario,
+        grid: impl Into<TimeGrid>,
+        options: &ParameterizationOptions,
+    ) -> Result<Case> {
         if self.kind != Kind::Kinematic || scenario.category != self.category {
             return Err(Error::Internal(format!("{} is no kinematic parameterization of {}", self.key, scenario.id)));
         }
@@ -109,7 +116,7 @@ impl ParameterizationId {
         match self.category {
             Category::CutIn => CutInParameters::of(scenario, options).case(self.key, &sizes, options),
             Category::CutOut => CutOutParameters::of(scenario, options)?.case(self.key, &sizes, options),
-            Category::Lvd => LvdParameters::of(scenario).case(self.key, &sizes, dt_s, options),
+            Category::Lvd => LvdParameters::of(scenario).case(self.key, &sizes, grid, options),
         }
     }
 }

@@ -1,19 +1,20 @@
 //! S: the scenario as recorded, then the last speeds and the last lateral position held.
 
-use super::series::{lateral_on_grid, speed_on_grid};
+use super::series::{TimeGrid, lateral_on_grid, speed_on_grid};
 use super::vehicle_ahead;
 use crate::Result;
 use crate::scenario::{Ahead, Case, Category, Lateral, Other, Participant, Scenario};
 
 /// The case of the recorded scenario on a time grid. Fails for a cut-out without a vehicle ahead.
-pub fn recorded_case(scenario: &Scenario, dt_s: f64) -> Result<Case> {
+pub fn recorded_case(scenario: &Scenario, grid: impl Into<TimeGrid>) -> Result<Case> {
+    let grid = grid.into();
     let (fps, duration_s) = (scenario.fps, scenario.duration_s());
-    let speed = |other: &Other| speed_on_grid(&other.v, fps, duration_s, dt_s);
+    let speed = |other: &Other| speed_on_grid(&other.v, fps, duration_s, grid);
     let target = &scenario.target;
     let lateral = if scenario.category == Category::Lvd {
         Lateral::Centred
     } else {
-        let (position_m, towards_mps) = lateral_on_grid(&target.y, fps, duration_s, dt_s);
+        let (position_m, towards_mps) = lateral_on_grid(&target.y, fps, duration_s, grid);
         Lateral::Sampled { position_m, towards_mps }
     };
     let ahead = match scenario.category {

@@ -2,7 +2,7 @@
 //! LVD iii–v (v; T).
 
 use super::options::{ParameterizationOptions, SvdLateral};
-use super::series::{at, lateral_on_grid, speed_on_grid};
+use super::series::{TimeGrid, at, lateral_on_grid, speed_on_grid};
 use super::svd::{SvdBasis, fit_svd};
 use super::{Kind, ParameterizationId, Sizes, lead_size, vehicle_ahead};
 use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario};
@@ -173,22 +173,23 @@ impl Reduction {
     }
 
     /// The case of a scenario under `d` coefficients. Sizes stay those of the scenario.
-    pub fn case(&self, scenario: &Scenario, d: usize, dt_s: f64) -> Result<Case> {
-        self.case_of(&self.reduce(scenario, d)?, &Sizes::of(scenario), dt_s)
+    pub fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
+        self.case_of(&self.reduce(scenario, d)?, &Sizes::of(scenario), grid)
     }
 
     /// The case of a rebuilt scenario on a time grid.
     ///
     /// # Errors
     /// For a cut-out without the size of the vehicle ahead.
-    pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, dt_s: f64) -> Result<Case> {
+    pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
+        let grid = grid.into();
         let duration_s = reduced.duration_s;
         let fps = (self.options.svd_instants - 1) as f64 / duration_s;
-        let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, dt_s);
+        let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, grid);
         let lateral = if self.category == Category::Lvd {
             Lateral::Centred
         } else {
-            let (position_m, towards_mps) = lateral_on_grid(&reduced.y, fps, duration_s, dt_s);
+            let (position_m, towards_mps) = lateral_on_grid(&reduced.y, fps, duration_s, grid);
             Lateral::Sampled { position_m, towards_mps }
         };
         let ahead = if self.category == Category::CutOut {

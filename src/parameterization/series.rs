@@ -1,6 +1,7 @@
 //! Series on other time grids, and the numbers that kinematic parameterizations take from them.
 
 use super::options::{AfterDuration, LateralSpeed, ParameterizationOptions};
+use crate::profile::Profile;
 use crate::scenario::{Other, Scenario, Speed};
 
 /// Value of a series of rate `fps` at time `t_s`, linear between samples, the last one held.
@@ -18,23 +19,47 @@ pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
     series[below] + (series[above] - series[below]) * share
 }
 
+/// Instants that motions are sampled at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeGrid {
+    /// Time between two, s.
+    pub dt_s: f64,
+    /// So many at most: no lane reads more.
+    pub max_steps: usize,
+}
+
+impl TimeGrid {
+    /// That of a profile's lanes, which end at its time cap.
+    pub fn of(profile: &Profile) -> TimeGrid {
+        TimeGrid { dt_s: profile.frame.dt_s, max_steps: profile.step_cap() as usize + 2 }
+    }
+}
+
+/// Without an end.
+impl From<f64> for TimeGrid {
+    fn from(dt_s: f64) -> TimeGrid {
+        TimeGrid { dt_s, max_steps: usize::MAX }
+    }
+}
+
 /// Number of steps of the grid that cover [0, T], the end included.
-pub fn steps_of(duration_s: f64, dt_s: f64) -> usize {
-    (duration_s / dt_s - 1e-9).ceil().max(0.0) as usize + 1
+pub fn steps_of(duration_s: f64, grid: TimeGrid) -> usize {
+    ((duration_s / grid.dt_s - 1e-9).ceil().max(0.0) as usize).saturating_add(1).min(grid.max_steps)
 }
 
 /// A speed series on the grid, never below 0.
-pub fn speed_on_grid(series: &[f64], fps: f64, duration_s: f64, dt_s: f64) -> Speed {
-    let value = |i: usize| at(series, fps, (i as f64 * dt_s).min(duration_s)).max(0.0);
-    Speed::Sampled((0..steps_of(duration_s, dt_s)).map(value).collect())
+pub fn speed_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> Speed {
+    let value = |i: usize| at(series, fps, (i as f64 * grid.dt_s).min(duration_s)).max(0.0);
+    Speed::Sampled((0..steps_of(duration_s, grid)).map(value).collect())
 }
 
 /// A lateral series on the grid with its speed towards the ego, w[i] = −(|y[i]| − |y[i−1]|)/dt, w[0] = w[1],
 /// 0 after T.
-pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, dt_s: f64) -> (Vec<f64>, Vec<f64>) {
+pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> (Vec<f64>, Vec<f64>) {
+    let dt_s = grid.dt_s;
     let time = |i: usize| i as f64 * dt_s;
     let position: Vec<f64> =
-        (0..steps_of(duration_s, dt_s)).map(|i| at(series, fps, time(i).min(duration_s))).collect();
+        (0..steps_of(duration_s, grid)).map(|i| at(series, fps, time(i).min(duration_s))).collect();
     let mut towards = vec![0.0; position.len()];
     for i in 1..position.len() {
         let inside = time(i) <= duration_s + 1e-9 * dt_s;
@@ -88,17 +113,17 @@ mod tests {
     #[test]
     fn a_series_at_its_own_rate_is_itself() {
         let series: Vec<f64> = (0..300).map(|k| 20.0 - 0.013 * f64::from(k)).collect();
-        let Speed::Sampled(grid) = speed_on_grid(&series, 25.0, 299.0 / 25.0, 0.04) else { panic!("sampled") };
+        let Speed::Sampled(grid) = speed_on_grid(&series, 25.0, 299.0 / 25.0, 0.04.into()) else { panic!("sampled") };
         assert_eq!(grid, series);
     }
 
     #[test]
     fn the_last_value_holds_between_the_end_and_the_next_step() {
-        let Speed::Sampled(grid) = speed_on_grid(&[10.0, 8.0], 25.0, 0.04, 0.03) else { panic!("sampled") };
+        let Speed::Sampled(grid) = speed_on_grid(&[10.0, 8.0], 25.0, 0.04, 0.03.into()) else { panic!("sampled") };
         assert_eq!(grid.len(), 3);
         assert!((grid[1] - 8.5).abs() < 1e-12);
         assert_eq!(grid[2], 8.0);
-        let (_, towards) = lateral_on_grid(&[1.0, 0.9], 25.0, 0.04, 0.03);
+        let (_, towards) = lateral_on_grid(&[1.0, 0.9], 25.0, 0.04, 0.03.into());
         assert_eq!(towards[2], 0.0);
     }
 }

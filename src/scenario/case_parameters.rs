@@ -1,6 +1,7 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, in a row of a table.
 
 use super::{Category, LATERAL_DISTANCE_M, PlainCase};
+use crate::plausibility::{Doubts, HELP, Quantity};
 use crate::{Error, Place, Result};
 
 /// What was given; speeds in m/s, lengths in m, accelerations in m/s². The names are the flags of `simulate`.
@@ -34,6 +35,45 @@ impl CaseParameters {
                 "use cut-in, cut-out or lvd",
             )
         })
+    }
+
+    /// Speeds that are noise of a standing vehicle become 0, and are counted; `place` says where a key stands.
+    pub fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
+        let speeds = [
+            ("ego_speed", &mut self.ego_speed),
+            ("speed", &mut self.speed),
+            ("end_speed", &mut self.end_speed),
+            ("ahead_speed", &mut self.ahead_speed),
+        ];
+        for (key, speed) in speeds {
+            *speed = speed.map(|v| doubts.speed(v, || place(key)));
+        }
+    }
+
+    /// Looks at what was given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a value beyond the physical range, unless such are accepted.
+    pub fn judge(&self, doubts: &mut Doubts) -> Result<()> {
+        let given = [
+            ("ego_speed", Quantity::Speed, self.ego_speed),
+            ("speed", Quantity::Speed, self.speed),
+            ("end_speed", Quantity::Speed, self.end_speed),
+            ("ahead_speed", Quantity::Speed, self.ahead_speed),
+            ("lateral_speed", Quantity::LateralSpeed, self.lateral_speed),
+            ("lateral_distance", Quantity::LateralPosition, self.lateral_distance),
+            ("acceleration", Quantity::Acceleration, self.acceleration),
+            ("ahead_gap", Quantity::Gap, self.ahead_gap),
+            ("length", Quantity::Length, self.length),
+            ("width", Quantity::Width, self.width),
+        ];
+        for (key, quantity, value) in given {
+            let Some(value) = value else { continue };
+            doubts
+                .judge(quantity, value, || key.to_owned())
+                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
+        }
+        Ok(())
     }
 
     /// The case; vehicles have the size given here unless told otherwise.

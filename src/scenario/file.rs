@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use super::check::check_written;
+use super::found::ScenarioFile;
 use super::{Scenario, jsonl, table_reader, table_writer};
 use crate::Result;
+use crate::plausibility::Implausible;
 use crate::table::TableFormat;
 
 /// Formats that scenarios are written in, the one for names without an ending first.
@@ -12,19 +15,29 @@ const WRITTEN: [TableFormat; 2] = [TableFormat::JsonLines, TableFormat::Parquet]
 const READ: [TableFormat; 3] = [TableFormat::JsonLines, TableFormat::Parquet, TableFormat::Csv];
 
 /// Reads a file of scenarios: JSON Lines or Parquet as `lanesweep mine` writes them, or a table that a user made, with
-/// a row per scenario, per instant of one, or per concrete case.
+/// a row per scenario, per instant of one, or per concrete case. One scenario in ten may be unusable.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read; [`crate::Error::Usage`] for a name with another ending;
 /// [`crate::Error::Input`] naming the file, the line or row, the scenario where its id can be read, and the field or
 /// column: a missing one, one of a wrong type or unit, series of unequal length or of fewer than two samples, a
-/// negative speed, a size, lane width or sample rate that is not above 0, a kept cut-out without the vehicle ahead or
-/// its gap, an id that came before, a file without scenarios, or a damaged one.
-pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
+/// speed of -0.5 m/s or below, a size, lane width or sample rate that is not above 0, a value beyond the physical range
+/// unless accepted, a kept cut-out without the vehicle ahead or its gap, an id that came before, a file without
+/// scenarios, or a damaged one.
+pub fn read_scenario_file(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
     match TableFormat::of(path, &READ, "the scenario file")? {
-        TableFormat::JsonLines => jsonl::read(path),
-        format => table_reader::read(path, format),
+        TableFormat::JsonLines => jsonl::read(path, implausible),
+        format => table_reader::read(path, format, implausible),
     }
+}
+
+/// As [`read_scenario_file`], where every scenario is needed and implausible ones are accepted.
+///
+/// # Errors
+/// As [`read_scenario_file`], for the first scenario that cannot be used.
+pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
+    let mut file = read_scenario_file(path, Implausible::Accepted)?;
+    if file.problems.is_empty() { Ok(file.scenarios) } else { Err(file.problems.swap_remove(0)) }
 }
 
 /// Writes a file of scenarios: whole or not at all.
@@ -33,24 +46,12 @@ pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
 /// [`crate::Error::Io`] if the folder cannot be written to; [`crate::Error::Usage`] for a name that ends neither in
 /// `.jsonl` nor in `.parquet`; [`crate::Error::Input`] for a scenario that [`read_scenarios`] would refuse.
 pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
-    write_scenarios_of(path, scenarios, false)
-}
-
-/// As [`write_scenarios`], for scenarios that are known to be made up by the program, if `synthetic`.
-///
-/// # Errors
-/// As [`write_scenarios`].
-pub fn write_scenarios_of<'a>(
-    path: &Path,
-    scenarios: impl IntoIterator<Item = &'a Scenario>,
-    synthetic: bool,
-) -> Result<()> {
     match check_scenario_file(path)? {
         TableFormat::JsonLines => jsonl::write(path, scenarios),
         format => {
             let scenarios: Vec<&Scenario> = scenarios.into_iter().collect();
-            scenarios.iter().try_for_each(|scenario| jsonl::check_written(scenario))?;
-            table_writer::write(path, format, scenarios, synthetic)
+            scenarios.iter().try_for_each(|scenario| check_written(scenario))?;
+            table_writer::write(path, format, &scenarios)
         }
     }
 }

@@ -160,6 +160,9 @@ pub struct Scenario {
     /// LVD: the untrimmed interval of the tags, half open: first frame with them, first frame without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_frames: Option<[i64; 2]>,
+    /// Made up by the program: nothing that follows from it is a statement about real traffic.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub synthetic: bool,
 }
 
 fn yes() -> bool {

@@ -6,7 +6,9 @@
 
 mod case;
 mod case_parameters;
+mod check;
 mod file;
+mod found;
 mod jsonl;
 mod leaves;
 mod mined;
@@ -20,8 +22,9 @@ mod table_writer;
 pub use case::{Ahead, Case, Participant};
 pub use case_parameters::CaseParameters;
 pub(crate) use case_parameters::{at_least, needed};
-pub use file::{check_scenario_file, read_scenarios, write_scenarios, write_scenarios_of};
-pub(crate) use jsonl::problem_of;
+pub(crate) use check::problem_of;
+pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios};
+pub use found::ScenarioFile;
 pub use jsonl::write_scenarios_to;
 pub use mined::{Category, Ego, Other, Scenario, Side};
 pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};

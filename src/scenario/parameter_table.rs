@@ -4,11 +4,13 @@
 use serde_json::{Map, Value};
 
 use super::case_parameters::{CaseParameters, at_least};
-use super::jsonl::{Problem, check, name};
+use super::check::name;
+use super::found::{Found, ScenarioFile};
 use super::leaves::number;
-use super::table_reader::{Chosen, Found, HELP, choose};
+use super::table_reader::{Chosen, HELP, choose};
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
 use crate::error::{Error, Place, Result};
+use crate::plausibility::{Doubts, Implausible};
 use crate::table::{Named, Row, TableReader};
 
 /// Columns and their units.
@@ -41,8 +43,9 @@ const RATE_HZ: f64 = 25.0;
 const SHORTEST_S: f64 = 1.0;
 /// And at most so long, s: the time cap of the paper's profile.
 const LONGEST_S: f64 = 120.0;
-/// Samples of all scenarios of a table, so that a small table cannot demand any memory.
-const MOST_SAMPLES: f64 = (16 << 20) as f64;
+/// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
+const MAX_SAMPLES: f64 = (2 << 20) as f64;
+const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 
 /// A row of parameters: names without units as keys, numbers in the units of [`COLUMNS`].
 pub(crate) struct ParameterRows {
@@ -59,12 +62,16 @@ impl ParameterRows {
         Ok(ParameterRows { table, chosen })
     }
 
-    /// The next row; fields that are empty are left out.
+    /// The next row, or what is wrong with it; fields that are empty are left out.
     ///
     /// # Errors
-    /// [`Error::Input`] for what is no number.
-    pub fn next_row(&mut self) -> Result<Option<(u64, Map<String, Value>)>> {
-        let Some(Row { number: row, values }) = self.table.next_row()? else { return Ok(None) };
+    /// As [`TableReader::next_row`].
+    pub fn next_row(&mut self) -> Result<Option<(u64, Result<Map<String, Value>>)>> {
+        let Some(row) = self.table.next_row()? else { return Ok(None) };
+        Ok(Some((row.number, self.typed(row))))
+    }
+
+    fn typed(&self, Row { number: row, values }: Row) -> Result<Map<String, Value>> {
         let mut map = Map::new();
         for (column, value) in self.chosen.iter().zip(values) {
             let (key, unit) = COLUMNS[column.field];
@@ -82,45 +89,84 @@ impl ParameterRows {
             }
             map.insert(key.to_owned(), value);
         }
-        Ok(Some((row, map)))
+        Ok(map)
     }
 
     /// An error about a value, told with file, row and column.
     pub fn told(&self, row: u64, error: Error) -> Error {
         let Error::Usage { place, problem, help } = error else { return error };
-        let key = place.item.unwrap_or_default();
+        Error::input(self.place(row, &place.item.unwrap_or_default(), None), problem, help)
+    }
+
+    /// A value of a row, with its column as the file names it.
+    fn place(&self, row: u64, key: &str, item: Option<String>) -> Place {
         let is = |column: &&Chosen| COLUMNS[column.field].0 == key;
-        let column = self.chosen.iter().find(is).map_or(key.clone(), |column| column.column.clone());
-        Error::input(self.table.place(row, None).column(column), problem, help)
+        let column = self.chosen.iter().find(is).map_or(key, |column| &column.column);
+        self.table.place(row, item).column(column)
     }
 }
 
 /// Every row as a scenario.
-pub(super) fn read(table: TableReader) -> Result<Vec<Scenario>> {
+pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<ScenarioFile> {
     let header = table.header();
     let mut rows = ParameterRows::new(table)?;
     if rows.chosen.iter().all(|column| COLUMNS[column.field].0 != "category") {
         return Err(Error::input(header, "no column `category`: this is no table of scenarios", HELP));
     }
-    let mut found = Found::new();
+    let mut found = Found::new(implausible);
     let mut samples = 0.0;
     while let Some((row, map)) = rows.next_row()? {
-        let scenario = of_row(&map, found.scenarios.len() + 1, &mut samples).map_err(|e| rows.told(row, e))?;
-        check(&scenario).map_err(|Problem { field, problem, help }| {
-            Error::input(rows.table.place(row, Some(name(&scenario.id))).column(field), problem, help)
-        })?;
-        found.add(scenario, row, &rows.table)?;
+        let count = found.count();
+        if samples > MAX_SAMPLES + MAX_SAMPLES_PER_ROW * count as f64 {
+            let problem = format!("the scenarios above have {samples} samples, too many for so few rows");
+            let help = "give shorter ones (`duration_s`) or a lower `rate_hz`, or make several tables";
+            return Err(Error::input(rows.table.place(row, None).column("duration_s"), problem, help));
+        }
+        let mut doubts = found.doubts();
+        let place = |key: &str| rows.place(row, key, None).to_string();
+        let scenario = map.and_then(|map| {
+            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.told(row, error))
+        });
+        match scenario {
+            Err(error) => found.refuse(error),
+            Ok(scenario) => {
+                found.add_doubts(doubts);
+                let item = Some(name(&scenario.id));
+                found.take(scenario, row, rows.table.word(), |field| rows.place(row, key_of(field), item.clone()));
+            }
+        }
     }
-    if found.scenarios.is_empty() {
-        return Err(Error::input(header, "holds no scenario", HELP));
-    }
-    Ok(found.scenarios)
+    found.finish(header, HELP)
 }
 
-fn of_row(map: &Map<String, Value>, row: usize, samples: &mut f64) -> Result<Scenario> {
+/// The column that a field of the scenario comes from.
+fn key_of(field: &str) -> &str {
+    match field.split('[').next().unwrap_or(field) {
+        "ego.v0" => "ego_speed",
+        "target.v" if field.ends_with("[0]") => "speed",
+        "target.v" => "acceleration",
+        "target.y" => "lateral_speed",
+        "lead.v" => "ahead_speed",
+        "ego.length" | "target.length" | "lead.length" => "length",
+        "ego.width" | "target.width" | "lead.width" => "width",
+        "gap0" => "gap",
+        "thw0" => "thw",
+        "D" => "ahead_gap",
+        "fps" => "rate",
+        other => other,
+    }
+}
+
+fn of_row(
+    map: &Map<String, Value>,
+    row: u64,
+    samples: &mut f64,
+    doubts: &mut Doubts,
+    place: &dyn Fn(&str) -> String,
+) -> Result<Scenario> {
     let text = |key: &str| map.get(key).and_then(Value::as_str).map(str::to_owned);
     let value = |key: &str| map.get(key).and_then(Value::as_f64);
-    let parameters = CaseParameters {
+    let mut parameters = CaseParameters {
         category: text("category"),
         ego_speed: value("ego_speed"),
         speed: value("speed"),
@@ -133,6 +179,7 @@ fn of_row(map: &Map<String, Value>, row: usize, samples: &mut f64) -> Result<Sce
         length: value("length"),
         width: value("width"),
     };
+    parameters.settle(doubts, place);
     let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
     let case = plain.case(LONGEST_S)?;
     let in_range = |key: &str, default: f64, least: f64, most: f64| match value(key) {
@@ -166,14 +213,6 @@ fn of_row(map: &Map<String, Value>, row: usize, samples: &mut f64) -> Result<Sce
     // Whole steps, so that the last sample is not before the end.
     let count = ((duration_s * rate_hz - 1e-9).ceil() + 1.0).max(2.0);
     *samples += count;
-    if *samples > MOST_SAMPLES {
-        let problem = "the scenarios up to here have more than 16 million samples";
-        return Err(Error::usage(
-            Place::item("duration"),
-            problem,
-            "give shorter ones, a lower `rate_hz`, or fewer rows",
-        ));
-    }
     let times_s: Vec<f64> = (0..count as u64).map(|k| k as f64 / rate_hz).collect();
     let other = |v: Vec<f64>, y: Vec<f64>| Other { length: plain.length_m, width: plain.width_m, v, y };
     let target = other(
@@ -210,6 +249,7 @@ fn of_row(map: &Map<String, Value>, row: usize, samples: &mut f64) -> Result<Sce
         end_cause: None,
         frame_switch: None,
         tag_frames: None,
+        synthetic: false,
     })
 }
 

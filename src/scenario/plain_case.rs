@@ -61,6 +61,15 @@ impl PlainCase {
         })
     }
 
+    /// Its speed when its acceleration ends, m/s; no event is later than `time_cap_s`.
+    ///
+    /// # Errors
+    /// As [`PlainCase::case`].
+    pub fn last_speed_mps(&self, time_cap_s: f64) -> Result<f64> {
+        let until_s = self.acceleration_until_s(time_cap_s)?.min(time_cap_s);
+        Ok((self.speed_mps + self.acceleration_mps2 * until_s).max(0.0))
+    }
+
     fn acceleration_until_s(&self, time_cap_s: f64) -> Result<f64> {
         let (initial_mps, end_mps) = (self.speed_mps, self.end_speed_mps.unwrap_or(0.0));
         match (self.acceleration_mps2, self.end_speed_mps) {

@@ -79,6 +79,7 @@ pub(super) const FIELDS: &[Field] = &[
     field("end_cause", Optional, Text, "", "What ended the scenario: lc_end, leader, ego_lane, data_end."),
     field("frame_switch", Optional, Frame, "1", "First frame in which the target is, or is no longer, the leader."),
     field("tag_frames", Optional, TwoFrames, "1", "LVD: first frame with the tags and first frame without."),
+    field("synthetic", Defaulted, YesNo, "", "Made up by the program: no statement about real traffic."),
 ];
 
 #[rustfmt::skip]
@@ -153,7 +154,7 @@ mod tests {
     fn every_written_field_is_known() {
         let line = r#"{"id": "a", "category": "lvd", "fps": 25.0, "side": "left", "ego": {"v0": 1.0, "length": 4.0,
             "width": 2.0}, "target": {"length": 4.0, "width": 2.0, "v": [1.0], "y": [0.0]}, "truncated_start": true,
-            "end_cause": "leader", "frame_switch": 1, "tag_frames": [1, 2]}"#;
+            "end_cause": "leader", "frame_switch": 1, "tag_frames": [1, 2], "synthetic": true}"#;
         let scenario: Scenario = serde_json::from_str(line).unwrap();
         let Ok(Value::Object(written)) = serde_json::to_value(scenario) else { panic!("not an object") };
         let mut written: Vec<&str> = written.keys().map(String::as_str).collect();

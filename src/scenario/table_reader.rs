@@ -1,16 +1,17 @@
 //! Scenarios from tables that this or any other program wrote: one row per scenario with series as lists, one row per
 //! scenario and instant, or one row per concrete case ([`super::parameter_table`]). The columns tell which it is.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::jsonl::{Problem, check, name};
+use super::check::name;
+use super::found::{Found, ScenarioFile};
 use super::leaves::{Leaf, leaves, names};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
+use crate::plausibility::Implausible;
 use crate::table::{Named, Resolved, Row, TableFormat, TableReader, nearest, resolve};
 
 /// Where the columns are told.
@@ -20,7 +21,7 @@ pub(super) const HELP: &str = "the columns are told in the chapter on tables (do
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] naming file, row, scenario and column.
-pub(super) fn read(path: &Path, format: TableFormat) -> Result<Vec<Scenario>> {
+pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
     let table = TableReader::open(path, format)?;
     let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s" }]);
     let names = names(&leaves);
@@ -34,42 +35,18 @@ pub(super) fn read(path: &Path, format: TableFormat) -> Result<Vec<Scenario>> {
     let mut reader = if has_time {
         let mut known = known;
         known.extend(time);
-        Reader::new(table, leaves, &known, &names)?
+        Reader::new(table, leaves, &known, &names, implausible)?
     } else if has_series {
-        Reader::new(table, leaves, &known, &names)?
+        Reader::new(table, leaves, &known, &names, implausible)?
     } else {
-        return parameter_table::read(table);
+        return parameter_table::read(table, implausible);
     };
     while let Some(row) = reader.table.next_row()? {
-        if has_time { reader.instant(row)? } else { reader.scenario(row)? }
+        if has_time { reader.instant(row) } else { reader.scenario(row) }
     }
-    reader.end()?;
-    Ok(reader.found.scenarios)
-}
-
-/// Scenarios that have been read, with where each id came from.
-pub(super) struct Found {
-    pub scenarios: Vec<Scenario>,
-    rows: HashMap<String, u64>,
-}
-
-impl Found {
-    pub fn new() -> Found {
-        Found { scenarios: Vec::new(), rows: HashMap::new() }
-    }
-
-    /// Takes a scenario whose id did not come before.
-    pub fn add(&mut self, scenario: Scenario, row: u64, table: &TableReader) -> Result<()> {
-        if let Some(first) = self.rows.insert(scenario.id.clone(), row) {
-            return Err(Error::input(
-                table.place(row, Some(name(&scenario.id))).column("id"),
-                format!("this id is that of {} {first} too, but every scenario needs its own", table.word()),
-                "rename one of the two; rows of one scenario stand together",
-            ));
-        }
-        self.scenarios.push(scenario);
-        Ok(())
-    }
+    reader.end();
+    let file = reader.table.file();
+    reader.found.finish(file, HELP)
 }
 
 /// Says which fields the columns of a table are, and takes only those.
@@ -137,6 +114,8 @@ struct Reader {
     found: Found,
     /// The scenario whose instants are being read.
     open: Option<Open>,
+    /// The scenario that is left out for one of its instants.
+    refused: Option<Value>,
 }
 
 /// Instants of one scenario, so far.
@@ -157,6 +136,7 @@ impl Reader {
         leaves: Vec<Leaf>,
         known: &[Named],
         names: &[(Named, usize, bool)],
+        implausible: Implausible,
     ) -> Result<Reader> {
         // What comes after the names is the time.
         let field_of = |at: usize| names.get(at).map_or(leaves.len(), |name| name.1);
@@ -175,22 +155,23 @@ impl Reader {
             return Err(Error::input(table.header(), problem, HELP));
         }
         let may_change = chosen.iter().map(|column| names.get(column.known).is_none_or(|name| name.2)).collect();
-        Ok(Reader { table, leaves, chosen, may_change, found: Found::new(), open: None })
+        let found = Found::new(implausible);
+        Ok(Reader { table, leaves, chosen, may_change, found, open: None, refused: None })
     }
 
     /// A row that is a scenario.
-    fn scenario(&mut self, row: Row) -> Result<()> {
+    fn scenario(&mut self, row: Row) {
         let values = self.chosen.iter().zip(row.values);
         let mut scenario = Map::new();
         for (column, value) in values {
             let leaf = &self.leaves[column.field];
             leaf.put(&mut scenario, leaf.typed(value, column.divisor));
         }
-        self.take(scenario, row.number)
+        self.take(scenario, row.number);
     }
 
     /// A row that is an instant of a scenario.
-    fn instant(&mut self, row: Row) -> Result<()> {
+    fn instant(&mut self, row: Row) {
         let time = self.leaves.len();
         let typed = |(column, value): (&Chosen, Value)| match self.leaves.get(column.field) {
             Some(leaf) => leaf.typed(value, column.divisor),
@@ -201,21 +182,34 @@ impl Reader {
             self.chosen.iter().position(|column| column.field == field).map_or(Value::Null, |at| values[at].clone())
         };
         let id = value_of(self.leaves.iter().position(|leaf| leaf.flat == "id").unwrap_or(time));
-        let item = id.as_str().map(name);
-        let Some(time_s) = value_of(time).as_f64() else {
-            let problem = format!("is {}; expected a time in seconds", value_of(time));
-            return Err(Error::input(self.table.place(row.number, item).column("time_s"), problem, HELP));
-        };
-        if self.open.as_ref().is_some_and(|open| open.id != id) {
-            self.end()?;
+        if self.refused.as_ref() == Some(&id) {
+            return;
         }
+        let time = value_of(time);
+        if self.open.as_ref().is_some_and(|open| open.id != id) {
+            self.end();
+        }
+        if let Err(error) = self.add_instant(row.number, &id, &time, values) {
+            self.found.refuse(error);
+            (self.open, self.refused) = (None, Some(id));
+        }
+    }
+
+    /// Appends an instant to the open scenario, or opens one.
+    fn add_instant(&mut self, row: u64, id: &Value, time: &Value, values: Vec<Value>) -> Result<()> {
+        let item = id.as_str().map(name);
+        let Some(time_s) = time.as_f64() else {
+            let problem = format!("is {time}; expected a time in seconds");
+            return Err(Error::input(self.table.place(row, item).column("time_s"), problem, HELP));
+        };
         let Some(open) = &mut self.open else {
             let series = |column: &Chosen, value: &Value| {
                 let is_series = self.leaves.get(column.field).is_some_and(Leaf::is_series);
                 if is_series { vec![value.clone()] } else { Vec::new() }
             };
             let series = self.chosen.iter().zip(&values).map(|(column, value)| series(column, value)).collect();
-            self.open = Some(Open { rows: vec![row.number], id, first: values, series, times_s: vec![time_s] });
+            self.open =
+                Some(Open { rows: vec![row], id: id.clone(), first: values, series, times_s: vec![time_s] });
             return Ok(());
         };
         for (at, (column, value)) in self.chosen.iter().zip(values).enumerate() {
@@ -224,7 +218,7 @@ impl Reader {
                 Some(_) if !self.may_change[at] && !value.is_null() && value != open.first[at] => {
                     let problem = format!("is {value}, but {} at the scenario's first instant", open.first[at]);
                     return Err(Error::input(
-                        self.table.place(row.number, item).column(&column.column),
+                        self.table.place(row, item).column(&column.column),
                         problem,
                         "what is of a whole scenario is the same in all its rows, or stands in the first only",
                     ));
@@ -238,58 +232,59 @@ impl Reader {
     }
 
     /// The instants that have been read make a scenario.
-    fn end(&mut self) -> Result<()> {
-        if let Some(open) = self.open.take() {
-            let mut scenario = Map::new();
-            let mut has_rate = false;
-            for (at, (column, first)) in self.chosen.iter().zip(open.first).enumerate() {
-                let Some(leaf) = self.leaves.get(column.field) else { continue };
-                has_rate |= leaf.flat == "fps" && !first.is_null();
-                let series = &open.series[at];
-                // A vehicle that is not there has no series.
-                let value = match leaf.is_series() {
-                    true if series.iter().all(Value::is_null) => Value::Null,
-                    true => Value::from(series.clone()),
-                    false => first,
-                };
-                leaf.put(&mut scenario, value);
-            }
-            let place = |at: usize| self.table.place(open.rows[at], open.id.as_str().map(name)).column("time_s");
-            let rate_hz = rate_hz(&open.times_s).map_err(|(at, problem)| {
-                Error::input(place(at), problem, "give every scenario rows at equal distances in time, in order")
-            })?;
-            if !has_rate {
-                scenario.insert("fps".to_owned(), Value::from(rate_hz));
-            }
-            self.take(scenario, open.rows[0])?;
+    fn end(&mut self) {
+        let Some(open) = self.open.take() else { return };
+        let mut scenario = Map::new();
+        let mut has_rate = false;
+        for (at, (column, first)) in self.chosen.iter().zip(open.first).enumerate() {
+            let Some(leaf) = self.leaves.get(column.field) else { continue };
+            has_rate |= leaf.flat == "fps" && !first.is_null();
+            let series = &open.series[at];
+            // A vehicle that is not there has no series.
+            let value = match leaf.is_series() {
+                true if series.iter().all(Value::is_null) => Value::Null,
+                true => Value::from(series.clone()),
+                false => first,
+            };
+            leaf.put(&mut scenario, value);
         }
-        match self.found.scenarios.is_empty() && self.table.next_row()?.is_none() {
-            true => Err(Error::input(self.table.file(), "holds no scenario", HELP)),
-            false => Ok(()),
+        let place = |at: usize| self.table.place(open.rows[at], open.id.as_str().map(name)).column("time_s");
+        match rate_hz(&open.times_s) {
+            Err((at, problem)) => {
+                let help = "give every scenario rows at equal distances in time, in order";
+                return self.found.refuse(Error::input(place(at), problem, help));
+            }
+            Ok(rate_hz) if !has_rate => drop(scenario.insert("fps".to_owned(), Value::from(rate_hz))),
+            Ok(_) => {}
         }
+        self.take(scenario, open.rows[0]);
     }
 
-    /// Makes the scenario and checks it.
-    fn take(&mut self, scenario: Map<String, Value>, row: u64) -> Result<()> {
+    /// Makes the scenario.
+    fn take(&mut self, scenario: Map<String, Value>, row: u64) {
         let value = Value::Object(scenario);
         let item = value.get("id").and_then(Value::as_str).map(name);
-        let place = |field: &str| self.table.place(row, item.clone()).column(self.column_of(field));
+        let (table, leaves, chosen) = (&self.table, &self.leaves, &self.chosen);
+        let place = |field: &str| -> Place { table.place(row, item.clone()).column(column_of(leaves, chosen, field)) };
         if let Some((field, problem)) = wrong_field(&value) {
-            return Err(Error::input(place(&field), problem, HELP));
+            return self.found.refuse(Error::input(place(&field), problem, HELP));
         }
-        let scenario: Scenario = serde_json::from_value(value)
-            .map_err(|e| Error::input(self.table.place(row, item.clone()), format!("not a scenario: {e}"), HELP))?;
-        check(&scenario).map_err(|Problem { field, problem, help }| Error::input(place(&field), problem, help))?;
-        self.found.add(scenario, row, &self.table)
+        match serde_json::from_value::<Scenario>(value) {
+            Ok(scenario) => self.found.take(scenario, row, table.word(), place),
+            Err(e) => {
+                let problem = format!("not a scenario: {e}");
+                self.found.refuse(Error::input(table.place(row, item.clone()), problem, HELP));
+            }
+        }
     }
+}
 
-    /// The column of a field, as the file names it; `target.v[3]` is the fourth value in `target_v`.
-    fn column_of(&self, field: &str) -> String {
-        let (stem, index) = field.find('[').map_or((field, ""), |at| field.split_at(at));
-        let flat = stem.replace('.', "_");
-        let is = |column: &&Chosen| self.leaves.get(column.field).is_some_and(|leaf| leaf.flat == flat);
-        format!("{}{index}", self.chosen.iter().find(is).map_or(flat.as_str(), |column| &column.column))
-    }
+/// The column of a field, as the file names it; `target.v[3]` is the fourth value in `target_v`.
+fn column_of(leaves: &[Leaf], chosen: &[Chosen], field: &str) -> String {
+    let (stem, index) = field.find('[').map_or((field, ""), |at| field.split_at(at));
+    let flat = stem.replace('.', "_");
+    let is = |column: &&Chosen| leaves.get(column.field).is_some_and(|leaf| leaf.flat == flat);
+    format!("{}{index}", chosen.iter().find(is).map_or(flat.as_str(), |column| &column.column))
 }
 
 /// Samples per second of instants at equal distances; at least one. An error says which instant is wrong.

@@ -16,12 +16,8 @@ pub fn scenario_columns() -> Vec<Column> {
 }
 
 /// The caller has checked that the scenarios can be read again.
-pub(super) fn write<'a>(
-    path: &Path,
-    format: TableFormat,
-    scenarios: impl IntoIterator<Item = &'a Scenario>,
-    synthetic: bool,
-) -> Result<()> {
+pub(super) fn write(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Result<()> {
+    let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
     let facts = TableFacts { table: "scenarios", synthetic, ..TableFacts::default() };
     let (leaves, columns) = (leaves(), scenario_columns());
     let mut table = TableWriter::create(path, format, columns.clone(), &facts)?;

@@ -12,7 +12,8 @@ use super::unit_record;
 use super::units::Units;
 use crate::driver::ModelId;
 use crate::parameterization::{
-    Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdFit, recorded_case, vehicle_ahead,
+    Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdFit, TimeGrid, recorded_case, steps_of,
+    vehicle_ahead,
 };
 use crate::profile::Profile;
 use crate::scenario::{Case, Category, Scenario, Tables};
@@ -191,7 +192,8 @@ impl Study {
         let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
         let reduction = self.reductions[at].as_ref();
         let ids: Vec<ParameterizationId> = parameterizations(block.category, reduction.is_some()).collect();
-        cases_of(&scenario, &ids, reduction, self.outline.profile.frame.dt_s, &self.head.parameterization)
+        let grid = TimeGrid::of(&self.outline.profile);
+        cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)
     }
 }
 
@@ -200,8 +202,13 @@ pub(super) fn parameterizations(category: Category, has_reduction: bool) -> impl
     ParameterizationId::of(category).filter(move |id| id.kind == Kind::Kinematic || has_reduction)
 }
 
-/// Steps of all series together: the records of lanes point into the tables with 32 bits.
-const MOST_STEPS: f64 = 4e9;
+/// Entries of all series at a time step of 0.1 s: so many for any file, and more for each value in it. Sparse series of
+/// long scenarios would make gigabytes of a short file.
+const MAX_ENTRIES: f64 = (8 << 20) as f64;
+const MAX_ENTRIES_PER_VALUE: f64 = 8.0;
+/// Entries at any time step of so many scenarios, whose cases are in memory at once: 2 GiB.
+const LIMIT_ENTRIES: f64 = (1 << 28) as f64;
+const CASES_AT_ONCE: usize = 2048;
 
 /// Plans a study over mined scenarios with all of its cases: the kept ones are simulated, in the order given; a
 /// decomposition may be fitted on more (see [`SvdFit`]).
@@ -214,9 +221,10 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
 pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyOutline> {
     let dt_s = profile.frame.dt_s;
     let parameterization = &options.parameterization;
+    let grid = TimeGrid::of(profile);
+    let (mut entries, mut values) = (0.0, 0.0);
     let mut held = Records::default();
     let mut record = Vec::new();
-    let mut steps = 0.0;
     let (mut blocks, mut reductions, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for &category in &options.categories {
         let of_category = || scenarios.iter().filter(move |s| s.category == category);
@@ -237,15 +245,19 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             Err(error) => return Err(error),
         };
         let ids: Vec<ParameterizationId> = parameterizations(category, reduction.is_some()).collect();
-        steps += kept.iter().map(|s| s.duration_s() / dt_s + 2.0).sum::<f64>() * (1 + ids.len()) as f64;
-        if steps > MOST_STEPS {
-            return Err(Error::usage(
-                Place::item("`frame.dt_s`"),
-                format!(
-                    "{dt_s} s: the scenarios and their parameterizations have {steps:.1e} steps, the tables {MOST_STEPS:.1e}"
-                ),
-                "use a longer time step, or study fewer or shorter scenarios at once",
-            ));
+        let sampled = ids.iter().filter(|id| id.kind != Kind::Kinematic || id.key == "ii").count() + 1;
+        // Speed, lateral position and lateral speed; in a cut-out the speed of the vehicle ahead; an LVD is centred.
+        let series = match category {
+            Category::CutIn => 3,
+            Category::CutOut => 4,
+            Category::Lvd => 1,
+        };
+        for some in kept.chunks(CASES_AT_ONCE) {
+            let steps: f64 = some.iter().map(|s| steps_of(s.duration_s(), grid) as f64).sum();
+            let at_once = steps * (sampled * series) as f64;
+            entries += at_once;
+            values += some.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * series.min(2) as f64;
+            check_size(at_once, entries, values, dt_s)?;
         }
         held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::most_bytes(scenario)).sum());
         for scenario in &kept {
@@ -270,19 +282,36 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
     Ok(StudyOutline { study: head.with_records(held)?, reductions, left_out })
 }
 
+/// Bounds the tables before anything of them is made.
+fn check_size(at_once: f64, entries: f64, values: f64, dt_s: f64) -> Result<()> {
+    let refused = |item: &str, problem: String, help: &str| Err(Error::usage(Place::item(item), problem, help));
+    let steps = format!("{dt_s} s: the scenarios and their parameterizations have {entries:.1e} values");
+    if at_once > LIMIT_ENTRIES {
+        let help = "use a longer time step, or study fewer or shorter scenarios at once";
+        return refused("`frame.dt_s`", format!("{steps}, the tables {LIMIT_ENTRIES:.1e}"), help);
+    }
+    // A finer time step is the user's choice and not the file's.
+    if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (0.1 / dt_s).max(1.0) {
+        let help =
+            "their sample rates are low for so long scenarios: give more samples, shorter scenarios, or fewer at once";
+        return refused("`frame.dt_s`", format!("{steps}, but {values:.1e} were recorded"), help);
+    }
+    Ok(())
+}
+
 /// S, then every S', of one scenario.
 fn cases_of(
     scenario: &Scenario,
     ids: &[ParameterizationId],
     reduction: Option<&Reduction>,
-    dt_s: f64,
+    grid: TimeGrid,
     options: &ParameterizationOptions,
 ) -> Result<Vec<Case>> {
-    let mut cases = vec![recorded_case(scenario, dt_s)?];
+    let mut cases = vec![recorded_case(scenario, grid)?];
     for id in ids {
         cases.push(match (id.kind, reduction) {
-            (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, dt_s)?,
-            _ => id.kinematic_case(scenario, dt_s, options)?,
+            (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, grid)?,
+            _ => id.kinematic_case(scenario, grid, options)?,
         });
     }
     Ok(cases)

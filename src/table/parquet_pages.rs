@@ -16,11 +16,11 @@ const LONGEST_HEADER: u64 = 1 << 20;
 /// Largest page, bytes.
 const LARGEST_PAGE: i64 = 256 << 20;
 /// Bytes that may come of a file of any size, and more for each of its bytes.
-const BYTES: u64 = 64 << 20;
-const BYTES_PER_BYTE: u64 = 1024;
+const BYTES: u64 = 16 << 20;
+const BYTES_PER_BYTE: u64 = 256;
 /// Values that may come of a file of any size, and more for each of its bytes.
-const VALUES: u64 = 4 << 20;
-const VALUES_PER_BYTE: u64 = 512;
+const VALUES: u64 = 1 << 20;
+const VALUES_PER_BYTE: u64 = 64;
 
 /// What is wrong with a file; `None` for what the system did not give.
 pub(super) type Refusal = &'static str;
@@ -81,13 +81,13 @@ pub(super) fn check_footer(file: &mut File, size: u64) -> Result<(), Refusal> {
         .ok_or(if is_flat { DAMAGED } else { "its columns are nested too deeply" })
 }
 
-/// Looks at the pages of the columns that will be read.
+/// Looks at the pages of the columns that will be read; the size of the largest, bytes.
 pub(super) fn check_pages<'a>(
     file: &mut File,
     size: u64,
     chunks: impl Iterator<Item = &'a ColumnChunkMetaData>,
-) -> Result<(), Refusal> {
-    let (mut bytes, mut values) = (0_u64, 0_u64);
+) -> Result<u64, Refusal> {
+    let (mut bytes, mut values, mut largest) = (0_u64, 0_u64, 0_u64);
     for chunk in chunks {
         let (start, length) = chunk.byte_range();
         let end = start.checked_add(length).filter(|end| *end <= size).ok_or(DAMAGED)?;
@@ -96,6 +96,7 @@ pub(super) fn check_pages<'a>(
             let page = page(file, at, (end - at).min(LONGEST_HEADER))?;
             bytes += page.uncompressed;
             values += page.values;
+            largest = largest.max(page.uncompressed);
             if bytes > BYTES.saturating_add(BYTES_PER_BYTE.saturating_mul(size))
                 || values > VALUES.saturating_add(VALUES_PER_BYTE.saturating_mul(size))
             {
@@ -104,7 +105,7 @@ pub(super) fn check_pages<'a>(
             at = at.saturating_add(page.length);
         }
     }
-    Ok(())
+    Ok(largest)
 }
 
 struct Page {

@@ -23,10 +23,13 @@ use super::Row;
 use super::parquet_pages::{check_footer, check_pages};
 use crate::{Error, Place, Result, input_file};
 
-/// Rows that are decoded together.
-const BATCH_ROWS: usize = 64;
+/// Rows that are decoded together, and fewer where pages are large: each row may repeat the longest text of a page.
+const BATCH_ROWS: u64 = 64;
+const BATCH_BYTES: u64 = 8 << 20;
 /// Longest series: eleven hours at 25 Hz.
 const LONGEST_SERIES: usize = 1 << 20;
+/// Longest text, bytes: every row may repeat it.
+const LONGEST_TEXT: usize = 1 << 16;
 
 pub(super) struct ParquetRows {
     path: PathBuf,
@@ -144,10 +147,11 @@ impl ParquetRows {
         }
         let mut pages = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
         let size = self.size;
-        guarded(&self.path, || check_pages(&mut pages, size, chunks()).map_err(str::to_owned))?;
+        let largest = guarded(&self.path, || check_pages(&mut pages, size, chunks()).map_err(str::to_owned))?;
+        let batch_rows = (BATCH_BYTES / largest.max(1)).clamp(1, BATCH_ROWS) as usize;
         let file = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
-        let builder = builder.with_projection(mask.clone()).with_batch_size(BATCH_ROWS);
+        let builder = builder.with_projection(mask.clone()).with_batch_size(batch_rows);
         self.reader = Some(guarded(&self.path, || builder.build().map_err(|e| e.to_string()))?);
         Ok(())
     }
@@ -233,7 +237,12 @@ fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
         return Ok(Value::Null);
     }
     Ok(match array.data_type() {
-        DataType::Utf8 => Value::from(array.as_string::<i32>().value(at)),
+        DataType::Utf8 => match array.as_string::<i32>().value(at) {
+            text if text.len() > LONGEST_TEXT => {
+                return Err(format!("a text has {} bytes; at most {LONGEST_TEXT} can be read", text.len()));
+            }
+            text => Value::from(text),
+        },
         DataType::Boolean => Value::from(array.as_boolean().value(at)),
         DataType::Int64 => Value::from(array.as_primitive::<Int64Type>().value(at)),
         DataType::Float64 => Value::from(array.as_primitive::<Float64Type>().value(at)),

@@ -164,6 +164,7 @@ mod tests {
             frame_rate_hz: 10.0,
             carriageways: vec![carriageway("1"), carriageway("2")],
             tracks,
+            synthetic: false,
         }
     }
 

@@ -15,6 +15,8 @@ pub struct Recording {
     pub carriageways: Vec<Carriageway>,
     /// Every vehicle, ascending by [`Track::id`].
     pub tracks: Vec<Track>,
+    /// Made up by the program: nothing that follows from it is a statement about real traffic.
+    pub synthetic: bool,
 }
 
 /// One direction of travel with its lanes.

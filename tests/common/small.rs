@@ -46,6 +46,7 @@ pub fn recording() -> Recording {
             Carriageway { name: "2".to_owned(), lane_lines_m: vec![-24.0, -27.5, -31.25] },
         ],
         tracks: Vec::new(),
+        synthetic: false,
     };
     let tracks = [(1, 0, 0, 1, 8), (2, 0, 2, 3, 5), (5, 1, 0, 1, 8), (7, 1, 1, 4, 5)];
     recording.tracks = tracks

@@ -49,7 +49,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
         .map(|(k, (carriageway, vehicle))| track(k as u32 + 1, carriageway, &carriageways, options.window_m, vehicle))
         .collect();
     let id = format!("{:02}", index + 1);
-    let mut recording = Recording { id, frame_rate_hz: options.frame_rate_hz, carriageways, tracks };
+    let mut recording = Recording { id, frame_rate_hz: options.frame_rate_hz, carriageways, tracks, synthetic: true };
     highd::quantize(&mut recording, Precision::Hundredths)?;
     label_lanes(&mut recording);
     Ok(recording)

@@ -211,7 +211,12 @@ impl Table {
 
     /// The error for a field of the present line.
     pub fn bad(&self, column: Column, problem: impl Into<String>, help: impl Into<String>) -> Error {
-        Error::input(self.place().column(column.name), problem, help)
+        Error::input(self.field(column), problem, help)
+    }
+
+    /// A field of the present line.
+    pub fn field(&self, column: Column) -> Place {
+        self.place().column(column.name)
     }
 
     /// The present line.

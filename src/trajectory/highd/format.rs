@@ -49,8 +49,8 @@ pub(super) const TRACKS_META_COLUMNS: [&str; 16] = [
     "numLaneChanges",
 ];
 
-/// `NN_recordingMeta.csv`: one line.
-pub(super) const RECORDING_META_COLUMNS: [&str; 15] = [
+/// `NN_recordingMeta.csv`: one line. The last column is ours and only there where the recording is made up.
+pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
     "id",
     "frameRate",
     "locationId",
@@ -66,6 +66,7 @@ pub(super) const RECORDING_META_COLUMNS: [&str; 15] = [
     "numTrucks",
     "upperLaneMarkings",
     "lowerLaneMarkings",
+    "synthetic",
 ];
 
 /// What the header line of a file is.

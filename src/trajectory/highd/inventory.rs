@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, input_file};
 
 /// The three files of one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +67,21 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
         return Err(nothing_complete(dir, inventory.problems));
     }
     Ok(inventory)
+}
+
+/// File that `lanesweep synth` leaves beside its recordings, for people, and for folders of versions that did not mark the
+/// recordings themselves.
+pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
+
+/// What the marker of a folder says of its recordings, in one line; `None` without a marker.
+pub fn made_up(dir: &Path) -> Option<String> {
+    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::LARGEST_SETTINGS_BYTES).ok()?;
+    text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
+}
+
+/// The folder that a recording's file is in.
+pub(super) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Every prefix that occurs, with which of the three files are there. The map sorts them.

@@ -6,6 +6,7 @@ use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TR
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
 use super::number;
+use crate::plausibility::{Doubts, HELP, Quantity};
 use crate::trajectory::{Carriageway, VehicleClass};
 use crate::{Error, Place, Result};
 
@@ -15,6 +16,8 @@ pub(super) struct RecordingMeta {
     pub lane_numbers: LaneNumbers,
     /// Those of the two carriageways that have lane lines.
     pub carriageways: Vec<Carriageway>,
+    /// The line says that the program made the recording up.
+    pub synthetic: bool,
     pub checksum: FileChecksum,
     /// The line that says all this.
     place: Place,
@@ -40,11 +43,12 @@ pub(super) struct Vehicle {
 }
 
 /// Reads `recordingMeta`.
-pub(super) fn read_recording_meta(files: &HighdFiles) -> Result<RecordingMeta> {
+pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
     let mut table = Table::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
     let frame_rate = table.column("frameRate")?;
     let upper_column = table.column(Direction::Upper.markings_column())?;
     let lower_column = table.column(Direction::Lower.markings_column())?;
+    let synthetic_column = table.optional_column("synthetic")?;
     if !table.next_row()? {
         return Err(Error::input(
             table.file_place(),
@@ -56,6 +60,7 @@ pub(super) fn read_recording_meta(files: &HighdFiles) -> Result<RecordingMeta> {
     let frame_rate_hz = frames_per_second(&table, frame_rate)?;
     let upper = markings(&table, upper_column)?;
     let lower = markings(&table, lower_column)?;
+    let synthetic = synthetic_column.map_or(Ok(false), |column| yes_or_no(&table, column))?;
     if upper.is_empty() && lower.is_empty() {
         return Err(table.bad(
             upper_column,
@@ -72,6 +77,10 @@ pub(super) fn read_recording_meta(files: &HighdFiles) -> Result<RecordingMeta> {
             "y points down: the upper lane lines must have the smaller values",
         ));
     }
+    judge(&table, frame_rate, Quantity::Rate, frame_rate_hz, doubts)?;
+    for (lines, column) in [(&upper, upper_column), (&lower, lower_column)] {
+        lines.array_windows().try_for_each(|[a, b]| judge(&table, column, Quantity::LaneWidth, b - a, doubts))?;
+    }
     if table.next_row()? {
         return Err(Error::input(
             table.place(),
@@ -85,7 +94,20 @@ pub(super) fn read_recording_meta(files: &HighdFiles) -> Result<RecordingMeta> {
         .filter(|(_, lines)| !lines.is_empty())
         .map(|(direction, lines)| carriageway(direction, &lines))
         .collect();
-    Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, checksum: table.finish(), place })
+    Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
+}
+
+fn judge(table: &Table, column: Column, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
+    let judged = doubts.judge(quantity, value, || table.field(column).to_string());
+    judged.map_err(|problem| table.bad(column, problem, HELP))
+}
+
+fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
+    match table.text(column)?.to_ascii_lowercase().as_str() {
+        "1" | "true" | "yes" => Ok(true),
+        "" | "0" | "false" | "no" => Ok(false),
+        _ => Err(table.bad(column, format!("{} is neither 1 nor 0", table.shown(column)), "write 1 or 0")),
+    }
 }
 
 fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
@@ -141,12 +163,19 @@ fn markings(table: &Table, column: Column) -> Result<Vec<f64>> {
 }
 
 /// Reads `tracksMeta`: the vehicles, ascending by id.
-pub(super) fn read_tracks_meta(files: &HighdFiles, recording: &RecordingMeta) -> Result<(Vec<Vehicle>, FileChecksum)> {
+pub(super) fn read_tracks_meta(
+    files: &HighdFiles,
+    recording: &RecordingMeta,
+    doubts: &mut Doubts,
+) -> Result<(Vec<Vehicle>, FileChecksum)> {
     let mut table = Table::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
     let columns = MetaColumns::of(&table)?;
     let mut vehicles: Vec<(Vehicle, Place)> = Vec::new();
     while table.next_row()? {
-        vehicles.push((columns.vehicle(&table, recording)?, table.place()));
+        let vehicle = columns.vehicle(&table, recording)?;
+        judge(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
+        judge(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
+        vehicles.push((vehicle, table.place()));
     }
     if vehicles.is_empty() {
         return Err(Error::input(

@@ -18,8 +18,8 @@ mod writable;
 mod write;
 
 pub use columns::FileChecksum;
-pub use inventory::{HighdFiles, Inventory, inventory};
+pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
 pub use precision::Precision;
-pub use read::{Loaded, read};
+pub use read::{Loaded, read, read_judged};
 pub use writable::quantize;
 pub use write::{RecordingInfo, write};

@@ -148,6 +148,7 @@ mod tests {
     fn ahead_beside_and_behind_are_told_by_lane_and_overlap() {
         let recording = Recording {
             id: "01".to_owned(),
+            synthetic: false,
             frame_rate_hz: 25.0,
             carriageways: vec![Carriageway { name: "2".to_owned(), lane_lines_m: vec![0.0, -3.5, -7.0] }],
             tracks: vec![

@@ -3,8 +3,9 @@
 
 use super::columns::{Column, FileChecksum, Table};
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
-use super::inventory::HighdFiles;
+use super::inventory::{HighdFiles, folder_of, made_up};
 use super::meta::{self, RecordingMeta, Vehicle};
+use crate::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Result};
 
@@ -23,6 +24,14 @@ pub struct Loaded {
     pub notes: Vec<String>,
 }
 
+/// As [`read_judged`], where implausible values are accepted.
+///
+/// # Errors
+/// As [`read_judged`].
+pub fn read(files: &HighdFiles) -> Result<Loaded> {
+    read_judged(files, Implausible::Accepted)
+}
+
 /// Reads one recording. Each file is read once, from start to end.
 ///
 /// The lines of `tracks` may be grouped by vehicle or by frame; each vehicle's frames must ascend by
@@ -31,13 +40,15 @@ pub struct Loaded {
 ///
 /// # Errors
 /// Anything that is not as it must be, with file, line and column or vehicle.
-pub fn read(files: &HighdFiles) -> Result<Loaded> {
-    let recording_meta = meta::read_recording_meta(files)?;
-    let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta)?;
+pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
+    let mut doubts = Doubts::new(implausible);
+    let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
+    let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
     let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
     let columns = TrackColumns::of(&table)?;
-    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles)?;
-    let notes = notes(&columns, &vehicles, &tracks);
+    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, &mut doubts)?;
+    let mut notes = notes(&columns, &vehicles, &tracks);
+    notes.extend(doubts.sentences());
     let rows = table.rows();
     let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
@@ -45,6 +56,7 @@ pub fn read(files: &HighdFiles) -> Result<Loaded> {
         frame_rate_hz: recording_meta.frame_rate_hz,
         carriageways: recording_meta.carriageways,
         tracks,
+        synthetic: recording_meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
     let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
     Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
@@ -87,12 +99,16 @@ fn read_tracks(
     columns: &TrackColumns,
     meta: &RecordingMeta,
     vehicles: &[Vehicle],
+    doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
     let mut tracks: Vec<Track> = vehicles.iter().map(empty_track).collect();
+    // Sums of the accelerations of each vehicle's last second: single samples are noisy.
+    let mut seconds = vec![0.0; vehicles.len()];
     let mut at = 0;
     while table.next_row()? {
         at = find_vehicle(table, columns.id, vehicles, at)?;
-        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at])?;
+        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
+        judge_sample(table, columns, meta.frame_rate_hz, &tracks[at], &mut seconds[at], doubts)?;
     }
     check_counts(table, vehicles, &tracks)?;
     tracks.retain(|track| !track.is_empty());
@@ -151,6 +167,7 @@ fn add_sample(
     meta: &RecordingMeta,
     vehicle: &Vehicle,
     track: &mut Track,
+    doubts: &mut Doubts,
 ) -> Result<()> {
     let frame = table.integer(columns.frame)?;
     if track.is_empty() {
@@ -165,7 +182,15 @@ fn add_sample(
     let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
     // Everything is parsed before anything is stored: the series keep the same length.
     let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
-    let v_s_mps = direction.forward(table.real(columns.velocity_x)?);
+    let told = || table.field(columns.velocity_x).to_string();
+    let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), told);
+    if v_s_mps < 0.0 {
+        return Err(table.bad(
+            columns.velocity_x,
+            format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", vehicle.id),
+            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s is taken as 0)",
+        ));
+    }
     let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
     let a_s_mps2 = direction.forward(table.real(columns.acceleration_x)?);
     let lane = match columns.lane {
@@ -178,6 +203,36 @@ fn add_sample(
     track.v_d_mps.push(v_d_mps);
     track.a_s_mps2.push(a_s_mps2);
     track.lane.push(lane);
+    Ok(())
+}
+
+/// Looks at the last sample of a track; `second` is the sum of its accelerations over a second so far.
+fn judge_sample(
+    table: &Table,
+    columns: &TrackColumns,
+    rate_hz: f64,
+    track: &Track,
+    second: &mut f64,
+    doubts: &mut Doubts,
+) -> Result<()> {
+    let k = track.len() - 1;
+    let mut judge = |quantity, value, column| {
+        let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
+        doubts.judge(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
+    };
+    judge(Quantity::Speed, track.v_s_mps[k], columns.velocity_x)?;
+    judge(Quantity::LateralSpeed, track.v_d_mps[k], columns.velocity_y)?;
+    if k > 0 {
+        judge(Quantity::LateralSpeed, (track.d_m[k] - track.d_m[k - 1]) * rate_hz, columns.y)?;
+    }
+    let window = (rate_hz.round() as usize).max(1);
+    *second += track.a_s_mps2[k];
+    if k >= window {
+        *second -= track.a_s_mps2[k - window];
+    }
+    if k + 1 >= window {
+        judge(Quantity::Acceleration, *second / window as f64, columns.acceleration_x)?;
+    }
     Ok(())
 }
 

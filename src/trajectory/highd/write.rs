@@ -281,8 +281,13 @@ impl Writer<'_> {
         line.integer(trucks as i64);
         line.measured_list(&self.layout.upper_y);
         line.measured_list(&self.layout.lower_y);
+        let (last, columns) = (RECORDING_META_COLUMNS.len() - 1, RECORDING_META_COLUMNS);
+        let columns = if self.recording.synthetic { &columns[..] } else { &columns[..last] };
+        if self.recording.synthetic {
+            line.text("1");
+        }
         let mut file = AtomicFile::create(path)?;
-        file.append(header(&RECORDING_META_COLUMNS).as_bytes())?;
+        file.append(header(columns).as_bytes())?;
         file.append(line.end())?;
         file.stage()
     }

@@ -1,0 +1,178 @@
+//! What no type says of a scenario: lengths, signs, what a category needs, and what is plausible on a road.
+
+use super::{Category, Other, Scenario};
+use crate::error::{Error, Place, Result};
+use crate::plausibility::{Doubts, HELP, Quantity};
+
+/// What could not be read again: JSON has no NaN, for instance, and it would be written as null. A recording may hold
+/// speeds and accelerations that no scenario has.
+pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
+    check(scenario).map_err(|p| {
+        let place = Place::item(name(&scenario.id)).column(p.field);
+        let problem = format!("{}: it cannot be written", p.problem);
+        Error::input(place, problem, "correct the data that it was made of, or leave them out")
+    })
+}
+
+/// What no reader of scenarios would accept, as a sentence.
+pub(crate) fn problem_of(scenario: &Scenario) -> Option<String> {
+    check(scenario).err().map(|p| format!("`{}` {}", p.field, p.problem))
+}
+
+/// How messages call a scenario.
+pub(super) fn name(id: &str) -> String {
+    format!("scenario {id}")
+}
+
+/// What is wrong with which field.
+pub(super) struct Problem {
+    pub field: String,
+    pub problem: String,
+    pub help: &'static str,
+}
+
+/// What no type says: lengths, signs and what a category needs.
+pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
+    let s = scenario;
+    expect((LEAST_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
+    above_zero("lane_width", s.lane_width)?;
+    at_least_zero("ego.v0", s.ego.v0)?;
+    above_zero("ego.length", s.ego.length)?;
+    above_zero("ego.width", s.ego.width)?;
+    let samples = s.target.v.len();
+    if samples < 2 {
+        return Err(Problem {
+            field: "target.v".into(),
+            problem: format!("{samples} samples, but a scenario has a duration: expected at least 2"),
+            help: "remove the scenario or export its whole series",
+        });
+    }
+    check_other("target", &s.target, samples)?;
+    if let Some(lead) = &s.lead {
+        check_other("lead", lead, samples)?;
+    }
+    for (field, value) in [("thw0", s.thw0), ("gap0", s.gap0), ("D", s.lead_gap), ("peak_decel", s.peak_decel)] {
+        value.map_or(Ok(()), |value| finite(field, value))?;
+    }
+    if s.category == Category::CutOut && s.kept && (s.lead.is_none() || s.lead_gap.is_none()) {
+        return Err(Problem {
+            field: if s.lead.is_none() { "lead" } else { "D" }.into(),
+            problem: "absent, but a kept cut-out uncovers a vehicle ahead".into(),
+            help: "give the vehicle ahead (`lead`) and the gap to it (`D`), or set `kept` to false",
+        });
+    }
+    Ok(())
+}
+
+fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result<(), Problem> {
+    above_zero(&format!("{role}.length"), other.length)?;
+    above_zero(&format!("{role}.width"), other.width)?;
+    for (field, series) in [("v", &other.v), ("y", &other.y)] {
+        if series.len() != samples {
+            return Err(Problem {
+                field: format!("{role}.{field}"),
+                problem: format!("{} samples, but `target.v` has {samples}", series.len()),
+                help: "all series of a scenario cover the same samples, frame0 to frame1",
+            });
+        }
+    }
+    for (k, &v) in other.v.iter().enumerate() {
+        at_least_zero(&format!("{role}.v[{k}]"), v)?;
+    }
+    for (k, &y) in other.y.iter().enumerate() {
+        finite(&format!("{role}.y[{k}]"), y)?;
+    }
+    Ok(())
+}
+
+/// Least sample rate, Hz: no motion can be told at a lower one.
+const LEAST_RATE_HZ: f64 = 0.1;
+
+/// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
+const LARGEST: f64 = 1e6;
+
+fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
+    expect(value.abs() <= LARGEST, field, value, "a number between -1e6 and 1e6")
+}
+
+fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
+    expect((0.0..=LARGEST).contains(&value), field, value, "a number of at least 0 and at most 1e6")
+}
+
+fn above_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
+    expect(value > 0.0 && value <= LARGEST, field, value, "a number above 0 and at most 1e6")
+}
+
+fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Result<(), Problem> {
+    if holds {
+        return Ok(());
+    }
+    Err(Problem {
+        field: field.into(),
+        problem: format!("is {value}; expected {what}"),
+        help: "correct the value or remove the scenario",
+    })
+}
+
+/// Takes a scenario as it was read: noise of standing vehicles is 0, what is wrong is refused, what is implausible is
+/// counted. `place` says where a field stands.
+pub(super) fn admit(
+    scenario: &mut Scenario,
+    doubts: &mut Doubts,
+    place: &dyn Fn(&str) -> String,
+) -> std::result::Result<(), Problem> {
+    scenario.ego.v0 = doubts.speed(scenario.ego.v0, || place("ego.v0"));
+    for (role, other) in [("target", Some(&mut scenario.target)), ("lead", scenario.lead.as_mut())] {
+        for (k, v) in other.into_iter().flat_map(|other| other.v.iter_mut().enumerate()) {
+            *v = doubts.speed(*v, || place(&format!("{role}.v[{k}]")));
+        }
+    }
+    check(scenario)?;
+    let s = &*scenario;
+    let mut judge = |quantity, field: &str, value, words: &dyn Fn(String) -> String| {
+        let judged = doubts.judge(quantity, value, || place(field));
+        judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP })
+    };
+    let is = |text: String| format!("is {text}");
+    judge(Quantity::Rate, "fps", s.fps, &is)?;
+    judge(Quantity::LaneWidth, "lane_width", s.lane_width, &is)?;
+    judge(Quantity::Speed, "ego.v0", s.ego.v0, &is)?;
+    judge(Quantity::Length, "ego.length", s.ego.length, &is)?;
+    judge(Quantity::Width, "ego.width", s.ego.width, &is)?;
+    for (field, quantity, value) in
+        [("gap0", Quantity::Gap, s.gap0), ("D", Quantity::Gap, s.lead_gap), ("thw0", Quantity::Headway, s.thw0)]
+    {
+        value.map_or(Ok(()), |value| judge(quantity, field, value, &is))?;
+    }
+    for (role, other) in [("target", Some(&s.target)), ("lead", s.lead.as_ref())] {
+        let Some(other) = other else { continue };
+        judge(Quantity::Length, &format!("{role}.length"), other.length, &is)?;
+        judge(Quantity::Width, &format!("{role}.width"), other.width, &is)?;
+        let mut worst =
+            |quantity, series: &str, values: &mut dyn Iterator<Item = f64>, words: &dyn Fn(String) -> String| {
+                let Some((k, value)) = farthest(quantity, values) else { return Ok(()) };
+                judge(quantity, &format!("{role}.{series}[{k}]"), value, words)
+            };
+        worst(Quantity::Speed, "v", &mut other.v.iter().copied(), &is)?;
+        worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), &is)?;
+        let jump = |text: String| format!("a jump to the side: {text}");
+        worst(Quantity::LateralSpeed, "y", &mut rates(&other.y, 1, s.fps), &jump)?;
+        // Over a second: single samples of recorded speeds are noisy.
+        let second = (s.fps.round() as usize).max(1);
+        let mean = |text: String| format!("mean of a second: {text}");
+        worst(Quantity::Acceleration, "v", &mut rates(&other.v, second, s.fps), &mean)?;
+    }
+    Ok(())
+}
+
+/// Changes over `n` samples, per second.
+fn rates(series: &[f64], n: usize, fps: f64) -> impl Iterator<Item = f64> {
+    series.iter().zip(series.iter().skip(n)).map(move |(before, after)| (after - before) * fps / n as f64)
+}
+
+/// The value that is farthest from the plausible ones, and where it is.
+fn farthest(quantity: Quantity, values: &mut dyn Iterator<Item = f64>) -> Option<(usize, f64)> {
+    let (least, most) = quantity.limits().plausible;
+    let beyond = |value: f64| (least - value).max(value - most);
+    values.enumerate().max_by(|(_, a), (_, b)| beyond(*a).total_cmp(&beyond(*b)))
+}

@@ -1,0 +1,119 @@
+//! Scenarios as they are read, one by one: the good ones, what was wrong with the others, and what was doubtful.
+
+use std::collections::HashMap;
+
+use super::Scenario;
+use super::check::{Problem, admit};
+use crate::error::{Error, Place, Result};
+use crate::plausibility::{Doubts, Implausible};
+
+/// One scenario in so many may be left out; where more cannot be used, the file is not what it is taken for.
+const ONE_IN: u64 = 10;
+/// Errors that are told one by one.
+const TOLD: usize = 20;
+/// Errors that are kept.
+const KEPT: usize = 1000;
+
+/// What a file of scenarios holds.
+#[derive(Debug)]
+pub struct ScenarioFile {
+    /// Those that can be used, in the file's order.
+    pub scenarios: Vec<Scenario>,
+    /// Why others were left out, at most one in ten.
+    pub problems: Vec<Error>,
+    /// What is doubtful of those that are used, as sentences.
+    pub notes: Vec<String>,
+}
+
+/// Scenarios that have been read, with where each id came from.
+pub(super) struct Found {
+    scenarios: Vec<Scenario>,
+    rows: HashMap<String, u64>,
+    problems: Vec<Error>,
+    /// Errors that are not kept.
+    more: u64,
+    doubts: Doubts,
+}
+
+impl Found {
+    pub fn new(implausible: Implausible) -> Found {
+        let doubts = Doubts::new(implausible);
+        Found { scenarios: Vec::new(), rows: HashMap::new(), problems: Vec::new(), more: 0, doubts }
+    }
+
+    /// Number of scenarios so far, good or not.
+    pub fn count(&self) -> u64 {
+        self.scenarios.len() as u64 + self.problems.len() as u64 + self.more
+    }
+
+    /// What is doubtful of one more scenario.
+    pub fn doubts(&self) -> Doubts {
+        self.doubts.another()
+    }
+
+    /// What was doubtful of a scenario before it was made.
+    pub fn add_doubts(&mut self, doubts: Doubts) {
+        self.doubts.add(doubts);
+    }
+
+    /// Takes a scenario that can be used and whose id did not come before. `place` says where a field stands, `word`
+    /// what rows are counted as.
+    pub fn take(&mut self, mut scenario: Scenario, row: u64, word: &str, place: impl Fn(&str) -> Place) {
+        let mut doubts = self.doubts();
+        let admitted = admit(&mut scenario, &mut doubts, &|field| place(field).to_string());
+        if let Err(Problem { field, problem, help }) = admitted {
+            return self.refuse(Error::input(place(&field), problem, help));
+        }
+        if let Some(first) = self.rows.get(&scenario.id) {
+            let problem = format!("this id is that of {word} {first} too, but every scenario needs its own");
+            let help = "remove or rename one of the two; rows of one scenario stand together";
+            // Nobody knows which of the two is meant, or the one is a piece of the other.
+            self.scenarios.retain(|other| other.id != scenario.id);
+            return self.refuse(Error::input(place("id"), problem, help));
+        }
+        self.rows.insert(scenario.id.clone(), row);
+        self.doubts.add(doubts);
+        // They grew by doubling, and thousands stay.
+        for other in std::iter::once(&mut scenario.target).chain(&mut scenario.lead) {
+            other.v.shrink_to_fit();
+            other.y.shrink_to_fit();
+        }
+        self.scenarios.push(scenario);
+    }
+
+    /// Leaves a scenario out.
+    pub fn refuse(&mut self, error: Error) {
+        if self.problems.len() < KEPT { self.problems.push(error) } else { self.more += 1 }
+    }
+
+    /// What was found; `help` says what a file without any scenario should hold.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for such a file, and for one of which more than one scenario in ten cannot be used: with what is
+    /// wrong with each, up to a number.
+    pub fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
+        let (total, bad) = (self.count(), self.problems.len() as u64 + self.more);
+        if total == 0 {
+            return Err(Error::input(file, "holds no scenario", help));
+        }
+        if bad * ONE_IN > total {
+            let first_help = self.problems[0].help().unwrap_or_default();
+            if bad == 1 {
+                return Err(self.problems.swap_remove(0));
+            }
+            let mut problem = format!("{bad} of {total} scenarios cannot be used, more than one in {ONE_IN}:");
+            for error in self.problems.iter().take(TOLD) {
+                problem.push_str(&format!("\n- {error}"));
+            }
+            if bad > TOLD as u64 {
+                problem.push_str(&format!("\n- and {} more", bad - TOLD as u64));
+            }
+            return Err(Error::input(file, problem, first_help));
+        }
+        if self.more > 0 {
+            let problem = format!("{} more scenarios cannot be used", self.more);
+            self.problems.push(Error::input(file, problem, "correct the others first"));
+        }
+        Ok(ScenarioFile { scenarios: self.scenarios, problems: self.problems, notes: self.doubts.sentences() })
+    }
+}
