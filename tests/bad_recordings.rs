@@ -7,6 +7,7 @@ use std::path::Path;
 
 use common::small::{self, Texts, edit_line, with_field, with_repeated_line, without_column, without_line};
 use lanesweep::Error;
+use lanesweep::plausibility::Implausible;
 use lanesweep::trajectory::highd::{self, HighdFiles};
 use proptest::prelude::*;
 
@@ -201,6 +202,68 @@ fn what_is_no_finite_number_is_named_with_line_and_column() {
         refused(
             |t| t.tracks = with_field(&t.tracks, 5, column, "2.5"),
             &["01_tracks.csv", "line 5", &format!("column `{column}`"), "`2.5` is not a whole number"],
+        );
+    }
+}
+
+#[test]
+fn small_speeds_backwards_are_noise_that_is_counted_and_larger_ones_an_error() {
+    // Line 5 is vehicle 1 in the upper lanes, which drive towards -x; line 20 vehicle 5 in the lower ones.
+    for (line, sign) in [(5, 1.0), (20, -1.0)] {
+        let with = |speed: f64| {
+            let mut texts = Texts::small();
+            texts.tracks = with_field(&texts.tracks, line, "xVelocity", &(sign * speed).to_string());
+            texts
+        };
+        let loaded = with(0.49).read().unwrap();
+        let noise: Vec<&String> = loaded.notes.iter().filter(|note| note.contains("is taken as 0, once")).collect();
+        assert!(
+            noise.len() == 1 && noise[0].contains(&format!("line {line}, column `xVelocity`")),
+            "{:?}",
+            loaded.notes
+        );
+        assert!(loaded.recording.tracks.iter().flat_map(|track| &track.v_s_mps).all(|v| *v >= 0.0));
+        for speed in [0.5, 20.0] {
+            let says = ["01_tracks.csv", &format!("line {line}"), "column `xVelocity`", "drives backwards"];
+            assert_says(&with(speed).read().unwrap_err(), &says);
+        }
+    }
+}
+
+#[test]
+fn what_no_road_has_is_refused_unless_accepted_and_then_told() {
+    let cases: [(&str, fn(&mut Texts), &[&str]); 6] = [
+        ("speed", |t| t.tracks = with_field(&t.tracks, 5, "xVelocity", "-108"), &["line 5", "km/h: 30 m/s"]),
+        ("jump", |t| t.tracks = with_field(&t.tracks, 5, "y", "12.6"), &["line 5", "column `y`", "lateral speed"]),
+        ("lateral", |t| t.tracks = with_field(&t.tracks, 5, "yVelocity", "11"), &["line 5", "column `yVelocity`"]),
+        ("length", |t| t.tracks_meta = with_field(&t.tracks_meta, 3, "width", "430"), &["line 3", "cm: 4.3 m"]),
+        ("width", |t| t.tracks_meta = with_field(&t.tracks_meta, 3, "height", "0.05"), &["line 3", "column `height`"]),
+        (
+            "lanes",
+            |t| t.recording_meta = t.recording_meta.replace("8.00;11.75;", "-350.00;11.75;"),
+            &["line 2", "lane width"],
+        ),
+    ];
+    for (what, spoil, says) in cases {
+        let dir = tempfile::tempdir().unwrap();
+        let mut texts = Texts::small();
+        spoil(&mut texts);
+        let files = HighdFiles::named(dir.path(), "01");
+        for (path, text) in [
+            (&files.tracks, &texts.tracks),
+            (&files.tracks_meta, &texts.tracks_meta),
+            (&files.recording_meta, &texts.recording_meta),
+        ] {
+            fs::write(path, text).unwrap();
+        }
+        let error = highd::read_judged(&files, Implausible::Refused).expect_err(what);
+        assert_says(&error, says);
+        assert!(error.help().unwrap().contains("--accept-implausible"), "{what}");
+        let loaded = highd::read_judged(&files, Implausible::Accepted).unwrap();
+        assert!(
+            loaded.notes.iter().any(|note| says.iter().all(|said| note.contains(said))),
+            "{what}: {:?}",
+            loaded.notes
         );
     }
 }

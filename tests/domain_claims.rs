@@ -2,7 +2,7 @@
 
 use lanesweep::criterion::{BrakeThreat, BtnForm, Criterion};
 use lanesweep::driver::ModelId;
-use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions, recorded_case};
+use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::profile::Profile;
 use lanesweep::scalar::{Counting, Real};
 use lanesweep::scenario::{Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
@@ -181,6 +181,44 @@ fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
                 assert_eq!(s.contact, prime.contact, "{key} {model:?} {thw}");
                 let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-6 * (1.0 + a.abs());
                 assert!(near(s.min_gap, prime.min_gap), "{key} {model:?} {thw}: {} {}", s.min_gap, prime.min_gap);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_scenario_holds_beyond_the_time_cap_changes_no_lane_and_takes_no_memory() {
+    let n = 25 * 200;
+    let t = |i: usize| i as f64 / 25.0;
+    let waves = |mean: f64| -> Vec<f64> { (0..n).map(|i| mean + 3.0 * (t(i) / 7.0).sin()).collect() };
+    let incoming: Vec<f64> = (0..n).map(|i| 3.5 * (1.0 - t(i) / 140.0).max(0.0)).collect();
+    let outgoing: Vec<f64> = (0..n).map(|i| 3.5 * (t(i) / 140.0).min(1.0)).collect();
+    let options = ParameterizationOptions::default();
+    for name in ["paper", "jrc-2021"] {
+        let profile = Profile::load(name).unwrap();
+        for scenario in [
+            scenario(Category::CutIn, waves(24.0), incoming.clone(), None),
+            scenario(Category::CutOut, waves(24.0), outgoing.clone(), Some(waves(20.0))),
+            scenario(Category::Lvd, waves(24.0), vec![0.0; n], None),
+        ] {
+            let sinusoid = ParameterizationId::find(Category::Lvd, "ii").unwrap();
+            let grid = TimeGrid::of(&profile);
+            let mut pairs = vec![[TimeGrid::from(grid.dt_s), grid].map(|grid| recorded_case(&scenario, grid).unwrap())];
+            if scenario.category == Category::Lvd {
+                let case = |grid| sinusoid.kinematic_case(&scenario, grid, &options).unwrap();
+                pairs.push([TimeGrid::from(grid.dt_s), grid].map(case));
+            }
+            for [whole, capped] in &pairs {
+                let mut tables = Tables::default();
+                LaneCase::encode(capped, &profile, &mut tables);
+                let longest = profile.step_cap() as usize + 2;
+                assert!(tables.speed.len() <= 3 * longest && tables.lateral.len() <= longest);
+                for model in ModelId::ALL {
+                    for thw in headways() {
+                        let outcomes = [whole, capped].map(|case| format!("{:?}", run(&profile, case, model, thw)));
+                        assert_eq!(outcomes[0], outcomes[1], "{name} {} {model:?} {thw}", scenario.category.key());
+                    }
+                }
             }
         }
     }

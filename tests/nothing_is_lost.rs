@@ -95,3 +95,88 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would not be heeded");
     refused(&["study", "--threads", "100000000"], "at most 4096");
 }
+
+/// What a folder of results or a document says of its data.
+fn is_synthetic(json: &[u8]) -> bool {
+    let value: serde_json::Value = serde_json::from_slice(json).unwrap();
+    let label = value.pointer("/synthetic").or(value.pointer("/density/provenance/synthetic"));
+    label.and_then(serde_json::Value::as_bool).expect("the document says whether its data are made up")
+}
+
+#[test]
+fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let ran = |args: &[&str]| {
+        let output = lanesweep(args);
+        assert!(output.status.success(), "{args:?}: {output:?}");
+        output.stdout
+    };
+    let recordings = at("recordings");
+    ran(&["-q", "synth", text(&recordings), "--synth-recordings", "2", "--synth-duration", "150"]);
+    // Copied without the sentence beside them, as among recordings of other origin.
+    std::fs::remove_file(recordings.join("SYNTHETIC.txt")).unwrap();
+    let scenarios = at("s.jsonl");
+    ran(&["-q", "mine", text(&recordings), "-o", text(&scenarios)]);
+    // What was driven is told beside the file, which may be lost too.
+    std::fs::remove_file(at("s.exposure.json")).unwrap();
+    let mut files = vec![scenarios.clone()];
+    if cfg!(feature = "parquet") {
+        ran(&["-q", "mine", text(&recordings), "-o", text(&at("s.parquet"))]);
+        std::fs::remove_file(at("s.parquet.exposure.json")).unwrap();
+        files.push(at("s.parquet"));
+    }
+    std::fs::write(
+        at("s.csv"),
+        "id,category,ego_speed,speed,lateral_speed,time_s,ego_length,ego_width,side,target_length,target_width,target_v,\
+         target_y,synthetic\na,cut-in,30,,,0,4,2,left,4,2,20,3.5,1\na,,,,,1,,,,,,20,2.5,\n",
+    )
+    .unwrap();
+    files.push(at("s.csv"));
+    for file in &files {
+        let (file, out) = (text(file), at("out"));
+        let report = ran(&["-q", "study", "--scenarios", file, "--out", text(&out)]);
+        assert!(
+            String::from_utf8_lossy(&report).contains("No number above is a statement about real traffic"),
+            "{file}"
+        );
+        assert!(is_synthetic(&std::fs::read(out.join("run.json")).unwrap()), "{file}");
+        let figures = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path());
+        for figure in figures.filter(|path| path.extension().is_some_and(|ending| ending == "svg")) {
+            assert!(std::fs::read_to_string(&figure).unwrap().contains("SYNTHETIC DATA"), "{}", figure.display());
+        }
+    }
+    let (file, density) = (text(&scenarios), at("i.json"));
+    let fit = ["fit", "--scenarios", file, "--category", "lvd", "--parameterization", "i", "--valid-draws", "1000"];
+    let fitted = ran(&[&["-q"], &fit[..], &["--no-comparison", "--format", "json", "--out", text(&density)]].concat());
+    assert!(is_synthetic(&fitted));
+    let sampled = ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--format", "json"];
+    assert!(is_synthetic(&ran(&[&sampled[..], &["--out", text(&at("sampled"))]].concat())));
+    let first: serde_json::Value =
+        serde_json::from_str(std::fs::read_to_string(&scenarios).unwrap().lines().next().unwrap()).unwrap();
+    let lane = format!("{}/S/1.2s/RSS", first["id"].as_str().unwrap());
+    let of_lane = ["--scenarios", file, "--lane", &lane];
+    assert!(is_synthetic(&ran(&[&["-q", "simulate", "--format", "json"], &of_lane[..]].concat())));
+    ran(&[&["-q", "export", "xosc", "--out", text(&at("played"))], &of_lane[..]].concat());
+    let mut played = std::fs::read_dir(at("played")).unwrap().map(|entry| entry.unwrap().path());
+    let played = played.find(|path| path.extension().is_some_and(|ending| ending == "xosc")).unwrap();
+    assert!(std::fs::read_to_string(played).unwrap().contains("SYNTHETIC DATA"));
+    let compare = ["-q", "compare", "--scenarios", file, "--categories", "lvd", "--parameterization", "i"];
+    let more = ["--samples", "500", "--thw", "0.6", "--format", "json", "--out", text(&at("compared"))];
+    assert!(is_synthetic(&ran(&[&compare[..], &more].concat())));
+}
+
+#[test]
+fn a_file_of_recorded_and_made_up_scenarios_is_made_up_and_one_of_recorded_ones_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let golden = std::fs::read_to_string(common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let mixed = golden.replacen("{", "{\"synthetic\":true,", 1);
+    for (text_of, is_made_up) in [(&golden, false), (&mixed, true)] {
+        let (file, out) = (dir.path().join("s.jsonl"), dir.path().join("out"));
+        std::fs::write(&file, text_of).unwrap();
+        let study = lanesweep(&["-q", "study", "--scenarios", text(&file), "--out", text(&out)]);
+        assert!(study.status.success(), "{study:?}");
+        assert_eq!(is_synthetic(&std::fs::read(out.join("run.json")).unwrap()), is_made_up);
+        assert_eq!(String::from_utf8_lossy(&study.stdout).contains("SYNTHETIC DATA"), is_made_up);
+    }
+}

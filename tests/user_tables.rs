@@ -296,3 +296,138 @@ fn a_small_file_that_claims_many_values_is_refused_before_they_are_made() {
     let text = read_scenarios(&path).unwrap_err().to_string();
     assert!(text.contains("far more than a file of its size"), "{text}");
 }
+
+/// Cut-ins, a row per instant; `change` spoils the rows of some.
+fn cut_ins(count: usize, change: impl Fn(usize, usize) -> Option<String>) -> String {
+    let mut text = "id,category,time_s,ego_speed_mps,ego_length_m,ego_width_m,side,target_length_m,target_width_m,\
+                    target_speed_mps,target_lateral_m\n"
+        .to_owned();
+    for id in 0..count {
+        for k in 0..20 {
+            let (time_s, y) = (k as f64 / 10.0, 3.5 - 0.1 * k as f64);
+            let row = format!("s{id},cut-in,{time_s},{},4.5,1.8,left,4.2,1.9,20,{y}\n", 28 + id % 3);
+            text.push_str(&change(id, k).unwrap_or(row));
+        }
+    }
+    text
+}
+
+/// A row with this speed and lateral position of the target.
+fn row(id: usize, k: usize, speed: f64, y: f64) -> Option<String> {
+    Some(format!("s{id},cut-in,{},30,4.5,1.8,left,4.2,1.9,{speed},{y}\n", k as f64 / 10.0))
+}
+
+#[test]
+fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_of_them_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = |text: &str, more: &[&str]| {
+        file(dir.path(), "s.csv", text);
+        said(dir.path(), &[&["study", "--scenarios", "s.csv", "--out", "out", "--backend", "cpu"], more].concat())
+    };
+    assert_eq!(study(&cut_ins(30, |_, _| None), &[]).0, 0);
+    // 2.5 m to the side in 0.1 s.
+    let jump = |id, k| if (id, k) == (7, 10) { row(7, 10, 20.0, 0.0) } else { None };
+    let (code, text) = study(&cut_ins(30, jump), &[]);
+    assert_eq!(code, 4, "{text}");
+    assert!(text.contains("column `target_lateral_m[9]`, scenario s7: a jump to the side: -26 m/s"), "{text}");
+    let run: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    assert_eq!((run["categories"][0]["kept"].as_u64(), run["left_out"].as_array().map(Vec::len)), (Some(29), Some(1)));
+    let (code, text) = study(&cut_ins(30, jump), &["--accept-implausible"]);
+    assert!(code == 0 && text.contains("an implausible lateral speed is used as it is, once"), "{text}");
+    let run: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    assert!(run["notes"][0].as_str().unwrap().contains("lateral speed"), "{}", run["notes"]);
+    // A table in kilometres per hour.
+    let (code, text) = study(&cut_ins(30, |id, k| row(id, k, 108.0, 3.5)), &[]);
+    assert_eq!(code, 3, "{text}");
+    assert!(text.contains("30 of 30 scenarios cannot be used") && text.contains("and 10 more"), "{text}");
+    assert!(text.contains("scenario s0: 108 m/s") && text.contains("scenario s19: 108 m/s"), "{text}");
+    assert!(text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"), "{text}");
+    // All kinds of errors at once.
+    let spoilt = |id, k| match (id, k) {
+        (1, 3) => Some("s1,cut-in,soon,30,4.5,1.8,left,4.2,1.9,20,3\n".to_owned()),
+        (2, 3) => row(2, 3, -7.0, 3.0),
+        (3, 0) => Some("s3,cut-in,0,30,4.5,1.8,up,4.2,1.9,20,3.5\n".to_owned()),
+        (4, 19) => row(4, 25, 20.0, 1.6),
+        _ => None,
+    };
+    let (code, text) = study(&cut_ins(30, spoilt), &[]);
+    assert_eq!(code, 3, "{text}");
+    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "one of \"left\"", "not equally spaced"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(study(&cut_ins(50, spoilt), &[]).0, 4);
+}
+
+#[test]
+fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let is_still = |name: &str, content: &str| {
+        let path = file(dir.path(), name, content);
+        let read = lanesweep::scenario::read_scenario_file(&path, Default::default()).unwrap();
+        assert!(read.problems.is_empty() && read.notes.len() == 1, "{name}: {:?}", read.notes);
+        assert!(read.notes[0].contains("between -0.5 and 0 m/s is taken as 0, once"), "{name}: {:?}", read.notes);
+        assert!(read.scenarios.iter().any(|s| s.target.v.contains(&0.0)), "{name}");
+    };
+    is_still("i.csv", &INSTANTS.replace("36,0.1", "-0.036,0.1"));
+    assert!(
+        of("i.csv", &INSTANTS.replace("36,0.1", "-1.8,0.1")).unwrap_err().to_string().contains("is -0.5; expected")
+    );
+    let cases = "category,ego_speed,speed,acceleration\nlvd,20,SPEED,0\n";
+    is_still("c.csv", &cases.replace("SPEED", "-0.01"));
+    let error = of("c.csv", &cases.replace("SPEED", "-0.5")).unwrap_err().to_string();
+    assert!(error.contains("line 2, column `speed`"), "{error}");
+    let line = |speed: f64| {
+        format!(
+            "{{\"id\":\"a\",\"category\":\"lvd\",\"fps\":10,\"side\":\"left\",\"ego\":{{\"v0\":20,\"length\":4,\"width\":2}},\
+             \"target\":{{\"length\":4,\"width\":2,\"v\":[1,{speed}],\"y\":[0,0]}}}}\n"
+        )
+    };
+    is_still("s.jsonl", &line(-0.01));
+    assert!(of("s.jsonl", &line(-0.5)).unwrap_err().to_string().contains("`target.v[1]`"));
+    let of_parquet = |speed: f64| {
+        let mut columns = least();
+        columns.retain(|(name, _)| *name != "target_v");
+        columns.push(("target_v", made::series(&[vec![20.0, 20.0, 25.0], vec![1.0, speed]])));
+        through(columns, Compression::UNCOMPRESSED)
+    };
+    assert_eq!(of_parquet(-0.49).unwrap()[1].target.v, [1.0, 0.0]);
+    assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
+
+    let lvd = |speed: &str| ["simulate --category lvd --model FSM --ego-speed 30 --gap 30 --speed", speed].join(" ");
+    let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    let (code, text) = simulate(&lvd("-0.01"));
+    assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");
+    assert_eq!(simulate(&lvd("-0.5")).0, 2);
+    let map = |speed: &str| {
+        let set = format!("other_speed_mps={speed}");
+        let args = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", &set, "--out", "map"];
+        said(dir.path(), &args)
+    };
+    let (code, text) = map("-0.01");
+    assert!(code == 0 && text.contains("taken as 0, once: other_speed_mps = -0.01"), "{text}");
+    assert_eq!(map("-0.5").0, 2);
+    assert_eq!(map("108").0, 2);
+}
+
+#[test]
+fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
+    let dir = tempfile::tempdir().unwrap();
+    let cut_in = "simulate --category cut-in --model FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
+    let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
+    let (code, text) = simulate("108");
+    assert!(
+        code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
+        "{text}"
+    );
+    let (code, text) = simulate("108 --accept-implausible");
+    assert!(code == 0 && text.contains("WARN an implausible speed is used as it is"), "{text}");
+    let (code, text) = simulate("90");
+    assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
+    let (code, text) = simulate("30 --acceleration 6");
+    assert!(code == 2 && text.contains("acceleration: it leads to a speed that no vehicle has: 740 m/s"), "{text}");
+    assert_eq!(simulate("30 --acceleration 6 --end-speed 40").0, 0);
+    let (code, text) = simulate("30 --length 430");
+    assert!(code == 2 && text.contains("430 looks like cm: 4.3 m"), "{text}");
+}

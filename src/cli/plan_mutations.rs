@@ -74,6 +74,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
             scenario_file_sha256: None,
             recordings: Vec::new(),
             left_out: Vec::new(),
+            notes: Vec::new(),
             categories: Vec::new(),
             mining: MiningOptions::default(),
             parameterization: ParameterizationOptions::default(),

@@ -214,6 +214,7 @@ impl Study {
             scenario_file_sha256: self.scenarios.as_deref().map(input_file::sha256).transpose()?,
             categories: category_facts(&collection, &planned, &config.parameterization)?,
             left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
+            notes: collection.notes,
             recordings: collection.recordings,
             mining: config.mining,
             parameterization: config.parameterization,

@@ -44,6 +44,8 @@ pub(super) struct StudyFacts {
     pub scenario_file_sha256: Option<String>,
     pub recordings: Vec<RecordingSummary>,
     pub left_out: Vec<String>,
+    /// What the data leave open or what looks wrong in them.
+    pub notes: Vec<String>,
     /// One per block of the plan.
     pub categories: Vec<CategoryFacts>,
     pub mining: MiningOptions,

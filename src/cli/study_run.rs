@@ -182,6 +182,7 @@ pub(super) fn finish_study(
         plan_sha256: plan.hash().to_owned(),
         scenario_file_sha256: facts.scenario_file_sha256,
         left_out: facts.left_out,
+        notes: facts.notes,
         recordings: facts.recordings,
         categories: category_records(study, &scores),
         lanes: plan.lane_count(),

@@ -117,6 +117,8 @@ pub struct RunRecord {
     pub recordings: Vec<RecordingSummary>,
     /// Recordings and parts that were left out, and why.
     pub left_out: Vec<String>,
+    /// What the data leave open or what looks wrong in them.
+    pub notes: Vec<String>,
     /// Per category.
     pub categories: Vec<CategoryRecord>,
     /// Lanes in all.

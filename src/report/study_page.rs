@@ -84,6 +84,9 @@ impl StudyReport {
         if !recordings.is_empty() {
             details.push((format!("{} recordings with their checksums", run.recordings.len()), recordings.join("\n")));
         }
+        if !run.notes.is_empty() {
+            details.push(("Notes on the data".to_owned(), run.notes.join("\n")));
+        }
         if !run.left_out.is_empty() {
             details.push((format!("{} parts left out", run.left_out.len()), run.left_out.join("\n")));
         }

@@ -133,7 +133,7 @@ pub(super) fn admit(
         let judged = doubts.judge(quantity, value, || place(field));
         judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP })
     };
-    let is = |text: String| format!("is {text}");
+    let is = |text: String| text;
     judge(Quantity::Rate, "fps", s.fps, &is)?;
     judge(Quantity::LaneWidth, "lane_width", s.lane_width, &is)?;
     judge(Quantity::Speed, "ego.v0", s.ego.v0, &is)?;

@@ -202,10 +202,11 @@ pub(super) fn parameterizations(category: Category, has_reduction: bool) -> impl
     ParameterizationId::of(category).filter(move |id| id.kind == Kind::Kinematic || has_reduction)
 }
 
-/// Entries of all series at a time step of 0.1 s: so many for any file, and more for each value in it. Sparse series of
-/// long scenarios would make gigabytes of a short file.
-const MAX_ENTRIES: f64 = (8 << 20) as f64;
-const MAX_ENTRIES_PER_VALUE: f64 = 8.0;
+/// Entries of all series at the paper's time step: so many for any file, and more for each value in it, enough for any
+/// number of scenarios from 10 Hz on. Sparse series of long scenarios would make gigabytes of a short file.
+const MAX_ENTRIES: f64 = (4 << 20) as f64;
+const MAX_ENTRIES_PER_VALUE: f64 = 15.0;
+const PAPER_DT_S: f64 = 0.04;
 /// Entries at any time step of so many scenarios, whose cases are in memory at once: 2 GiB.
 const LIMIT_ENTRIES: f64 = (1 << 28) as f64;
 const CASES_AT_ONCE: usize = 2048;
@@ -284,17 +285,17 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
 
 /// Bounds the tables before anything of them is made.
 fn check_size(at_once: f64, entries: f64, values: f64, dt_s: f64) -> Result<()> {
-    let refused = |item: &str, problem: String, help: &str| Err(Error::usage(Place::item(item), problem, help));
-    let steps = format!("{dt_s} s: the scenarios and their parameterizations have {entries:.1e} values");
+    let told = format!("the scenarios and their parameterizations have {entries:.1e} values at a step of {dt_s} s");
     if at_once > LIMIT_ENTRIES {
+        let problem = format!("{told}, the tables {LIMIT_ENTRIES:.1e}");
         let help = "use a longer time step, or study fewer or shorter scenarios at once";
-        return refused("`frame.dt_s`", format!("{steps}, the tables {LIMIT_ENTRIES:.1e}"), help);
+        return Err(Error::usage(Place::item("`frame.dt_s`"), problem, help));
     }
     // A finer time step is the user's choice and not the file's.
-    if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (0.1 / dt_s).max(1.0) {
-        let help =
-            "their sample rates are low for so long scenarios: give more samples, shorter scenarios, or fewer at once";
-        return refused("`frame.dt_s`", format!("{steps}, but {values:.1e} were recorded"), help);
+    if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (PAPER_DT_S / dt_s).max(1.0) {
+        let problem = format!("{told}, but only {values:.1e} were recorded");
+        let help = "their sample rate is low for so many or so long ones: give more samples, or study fewer at once";
+        return Err(Error::input(Place::item("scenarios"), problem, help));
     }
     Ok(())
 }
