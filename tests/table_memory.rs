@@ -21,6 +21,7 @@ use parquet::basic::Compression;
 
 use lanesweep::report::lanes::{Digits, columns};
 use lanesweep::table::{Cell, Kind, TableFacts, TableFormat, TableWriter};
+use lanesweep::trajectory::highd;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 #[global_allocator]
@@ -156,4 +157,19 @@ fn no_small_file_of_scenarios_takes_more_than_200_mb() {
         let error = said(name);
         assert!(error.is_none(), "{name}: {error:?}");
     }
+}
+
+#[test]
+fn a_recording_that_announces_many_samples_takes_memory_for_those_that_it_has() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| std::fs::write(dir.path().join(name), text).unwrap();
+    write("01_recordingMeta.csv", "frameRate,upperLaneMarkings,lowerLaneMarkings\n25,8;12;16,\n".to_owned());
+    let vehicles: String = (0..70_000).map(|id| format!("{id},4,2,Car,1,4096\n")).collect();
+    write("01_tracksMeta.csv", format!("id,width,height,class,drivingDirection,numFrames\n{vehicles}"));
+    write("01_tracks.csv", "frame,id,x,y,xVelocity,yVelocity,xAcceleration\n1,1,0,9,-20,0,0\n".to_owned());
+    memory::begin(0);
+    let error = highd::read(&highd::HighdFiles::named(dir.path(), "01")).unwrap_err().to_string();
+    let bytes = memory::end();
+    println!("{:.1} MB: {error}", bytes as f64 / 1e6);
+    assert!(bytes < 100_000_000 && error.contains("69999 more vehicles"), "{bytes}, {error}");
 }

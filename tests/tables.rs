@@ -13,6 +13,7 @@ use std::path::Path;
 use lanesweep::density::{DataFacts, DensityModel, FitOptions, write_density};
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::ParameterizationId;
+use lanesweep::plausibility::LIMITS;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
 use lanesweep::trajectory::generator::GeneratorOptions;
 use made::{Read, read};
@@ -226,4 +227,19 @@ fn a_lane_table_must_not_replace_the_scenarios_it_is_of() {
     write_scenarios(&dir.path().join("s.parquet"), &synthetic()).unwrap();
     let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet", "--lanes", "s.parquet"]);
     assert!(code == 2 && text.contains("would be overwritten"), "{text}");
+}
+
+#[test]
+fn the_chapter_has_the_ranges_that_readers_apply() {
+    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/tables.md");
+    let chapter = std::fs::read_to_string(chapter).unwrap();
+    let section = chapter.split("\n## ").find(|part| part.starts_with("Plausible values")).unwrap();
+    let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
+    assert_eq!(rows.len(), LIMITS.len());
+    for (row, of) in rows.iter().zip(&LIMITS) {
+        let range = |(least, most): (f64, f64)| format!("{least} … {most}");
+        let (plausible, physical) = (range(of.plausible), range(of.physical));
+        let expected = format!("| {} | {} | {plausible} | {physical} |", of.name, of.unit);
+        assert!(row.starts_with(&expected), "{row} should begin with {expected}");
+    }
 }

@@ -136,8 +136,8 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
+        tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source.describe(collection.synthetic));
         tracing::info!("{}", source::counts(&collection.scenarios));
         let facts = fit::facts(&source, &collection, typed)?;
         if facts.driven.is_none() {

@@ -109,8 +109,8 @@ impl Fit {
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
         let files = self.files(&ids, configured)?;
+        tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source.describe(collection.synthetic));
         tracing::info!("{}", source::counts(&collection.scenarios));
         let facts = facts(&source, &collection, typed)?;
         if facts.driven.is_none() {

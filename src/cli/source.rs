@@ -61,6 +61,10 @@ impl Source {
             }
         };
         complain_of(&collection.problems, &collection.notes);
+        let data = self.describe(collection.synthetic);
+        if data != self.describe(false) {
+            tracing::info!("{data}");
+        }
         Ok(collection)
     }
 }

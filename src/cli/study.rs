@@ -188,11 +188,11 @@ impl Study {
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
+        tracing::info!("{}", source.describe(false));
         let mut timings = Timings::default();
         let collection =
             timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
         let data = source.describe(collection.synthetic);
-        tracing::info!("{data}");
         tracing::info!("{}", source::counts(&collection.scenarios));
         let planned = timed(&mut timings.plan_s, || outline_study(&collection.scenarios, &profile, &options))?;
         for left_out in &planned.left_out {

@@ -33,12 +33,15 @@ pub(super) struct Found {
     /// Errors that are not kept.
     more: u64,
     doubts: Doubts,
+    /// What to do about two scenarios of one id.
+    help: &'static str,
 }
 
 impl Found {
-    pub fn new(implausible: Implausible) -> Found {
+    /// `help` says what to do about two scenarios of one id.
+    pub fn new(implausible: Implausible, help: &'static str) -> Found {
         let doubts = Doubts::new(implausible);
-        Found { scenarios: Vec::new(), rows: HashMap::new(), problems: Vec::new(), more: 0, doubts }
+        Found { scenarios: Vec::new(), rows: HashMap::new(), problems: Vec::new(), more: 0, doubts, help }
     }
 
     /// Number of scenarios so far, good or not.
@@ -66,10 +69,9 @@ impl Found {
         }
         if let Some(first) = self.rows.get(&scenario.id) {
             let problem = format!("this id is that of {word} {first} too, but every scenario needs its own");
-            let help = "remove or rename one of the two; rows of one scenario stand together";
             // Nobody knows which of the two is meant, or the one is a piece of the other.
             self.scenarios.retain(|other| other.id != scenario.id);
-            return self.refuse(Error::input(place("id"), problem, help));
+            return self.refuse(Error::input(place("id"), problem, self.help));
         }
         self.rows.insert(scenario.id.clone(), row);
         self.doubts.add(doubts);

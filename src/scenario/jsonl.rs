@@ -22,7 +22,7 @@ use crate::plausibility::Implausible;
 pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
     let file = input_file::open(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
-    let mut found = Found::new(implausible);
+    let mut found = Found::new(implausible, "remove one of the two lines or rename one scenario");
     let mut line = Vec::new();
     for row in 1.. {
         line.clear();

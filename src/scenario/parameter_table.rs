@@ -113,7 +113,7 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
     if rows.chosen.iter().all(|column| COLUMNS[column.field].0 != "category") {
         return Err(Error::input(header, "no column `category`: this is no table of scenarios", HELP));
     }
-    let mut found = Found::new(implausible);
+    let mut found = Found::new(implausible, "rename one of the two; rows of one scenario stand together");
     let mut samples = 0.0;
     while let Some((row, map)) = rows.next_row()? {
         let count = found.count();

@@ -155,7 +155,7 @@ impl Reader {
             return Err(Error::input(table.header(), problem, HELP));
         }
         let may_change = chosen.iter().map(|column| names.get(column.known).is_none_or(|name| name.2)).collect();
-        let found = Found::new(implausible);
+        let found = Found::new(implausible, "rename one of the two; rows of one scenario stand together");
         Ok(Reader { table, leaves, chosen, may_change, found, open: None, refused: None })
     }
 

@@ -122,9 +122,8 @@ fn read_tracks(
     Ok(tracks)
 }
 
+/// Without room for the announced samples: a small file could announce any number.
 fn empty_track(vehicle: &Vehicle) -> Track {
-    // The announced length saves growing, up to a bound: a damaged number must not take the memory.
-    let samples = vehicle.samples.unwrap_or(0).min(1 << 12) as usize;
     Track {
         id: vehicle.id,
         class: vehicle.class,
@@ -132,12 +131,12 @@ fn empty_track(vehicle: &Vehicle) -> Track {
         width_m: vehicle.width_m,
         carriageway: vehicle.carriageway,
         first_frame: 0,
-        s_m: Vec::with_capacity(samples),
-        d_m: Vec::with_capacity(samples),
-        v_s_mps: Vec::with_capacity(samples),
-        v_d_mps: Vec::with_capacity(samples),
-        a_s_mps2: Vec::with_capacity(samples),
-        lane: Vec::with_capacity(samples),
+        s_m: Vec::new(),
+        d_m: Vec::new(),
+        v_s_mps: Vec::new(),
+        v_d_mps: Vec::new(),
+        a_s_mps2: Vec::new(),
+        lane: Vec::new(),
     }
 }
 
