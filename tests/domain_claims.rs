@@ -212,7 +212,7 @@ fn what_a_scenario_holds_beyond_the_time_cap_changes_no_lane_and_takes_no_memory
                 let mut tables = Tables::default();
                 LaneCase::encode(capped, &profile, &mut tables);
                 let longest = profile.step_cap() as usize + 2;
-                assert!(tables.speed.len() <= 3 * longest && tables.lateral.len() <= longest);
+                assert!(tables.speed.len() <= 3 * longest && tables.lateral.len() <= longest + 1);
                 for model in ModelId::ALL {
                     for thw in headways() {
                         let outcomes = [whole, capped].map(|case| format!("{:?}", run(&profile, case, model, thw)));

@@ -237,7 +237,10 @@ fn announced_vehicles_without_frames_are_left_out_and_strange_ones_are_noted() {
     let mut texts = small::Texts::small();
     texts.tracks_meta += "9,4.00,1.80,0,0,0,Car,2,0.00,0.00,0.00,0.00,-1.00,-1.00,-1.00,0\n";
     assert_eq!(texts.read().unwrap().recording, small::recording());
-    // All of vehicle 5 with the direction of the other half: backwards, and in no lane.
+    // All of vehicle 5 with the direction of the other half: its positions go backwards, and it is in no lane.
+    for line in 15..=22 {
+        texts.tracks = small::with_field(&texts.tracks, line, "xVelocity", "-25.00");
+    }
     texts.tracks_meta = small::with_field(&texts.tracks_meta, 4, "drivingDirection", "1");
     let notes = texts.read().unwrap().notes;
     assert_eq!(notes.len(), 2, "{notes:?}");
@@ -293,7 +296,7 @@ fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
     for (files, (vehicles, upper, lower)) in inventory.recordings.iter().zip(expected) {
         let loaded = highd::read(files).unwrap();
         let recording = &loaded.recording;
-        assert_eq!(loaded.notes, [""; 0]);
+        assert!(loaded.notes.iter().all(|note| note.contains("is taken as 0, 47 times")), "{:?}", loaded.notes);
         assert_eq!(recording.tracks.len(), vehicles);
         assert_eq!(recording.carriageways.iter().map(Carriageway::lane_count).collect::<Vec<_>>(), [upper, lower]);
         let samples: usize = recording.tracks.iter().map(Track::len).sum();

@@ -332,7 +332,8 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     assert!(text.contains("column `target_lateral_m[9]`, scenario s7: a jump to the side: -26 m/s"), "{text}");
     let run: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
-    assert_eq!((run["categories"][0]["kept"].as_u64(), run["left_out"].as_array().map(Vec::len)), (Some(29), Some(1)));
+    assert_eq!(run["categories"][0]["kept"].as_u64(), Some(29));
+    assert!(run["left_out"][0].as_str().unwrap().contains("scenario s7"), "{}", run["left_out"]);
     let (code, text) = study(&cut_ins(30, jump), &["--accept-implausible"]);
     assert!(code == 0 && text.contains("an implausible lateral speed is used as it is, once"), "{text}");
     let run: serde_json::Value =
@@ -402,8 +403,8 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert_eq!(simulate(&lvd("-0.5")).0, 2);
     let map = |speed: &str| {
         let set = format!("other_speed_mps={speed}");
-        let args = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", &set, "--out", "map"];
-        said(dir.path(), &args)
+        let map = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", "deceleration_mps2=1"];
+        said(dir.path(), &[&map[..], &["--set", &set, "--out", "map"]].concat())
     };
     let (code, text) = map("-0.01");
     assert!(code == 0 && text.contains("taken as 0, once: other_speed_mps = -0.01"), "{text}");
