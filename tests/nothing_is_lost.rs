@@ -83,7 +83,7 @@ fn values_that_no_lane_can_hold_are_refused_with_their_line() {
     std::fs::write(&scenarios, golden.replacen("\"v0\":34.39", "\"v0\":1e300", 1)).unwrap();
     let study = lanesweep(&["study", "--scenarios", text(&scenarios), "--out", text(&dir.path().join("out"))]);
     let said = String::from_utf8_lossy(&study.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert_eq!(study.status.code(), Some(3), "{said}");
+    assert_eq!(study.status.code(), Some(4), "{said}");
     assert!(said.contains("line 1") && said.contains("ego.v0"), "{said}");
     refused(&["simulate", "--category", "lvd", "--model", "FSM", "--ego-speed", "30", "--gap", "1e300"], "at most 1e6");
 }
@@ -128,8 +128,8 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     }
     std::fs::write(
         at("s.csv"),
-        "id,category,ego_speed,speed,lateral_speed,time_s,ego_length,ego_width,side,target_length,target_width,target_v,\
-         target_y,synthetic\na,cut-in,30,,,0,4,2,left,4,2,20,3.5,1\na,,,,,1,,,,,,20,2.5,\n",
+        "id,category,ego_speed,time_s,ego_length,ego_width,side,target_length,target_width,target_v,\
+         target_y,synthetic\na,cut-in,30,0,4,2,left,4,2,20,3.5,1\na,,,1,,,,,,20,2.5,\n",
     )
     .unwrap();
     files.push(at("s.csv"));

@@ -355,7 +355,7 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     };
     let (code, text) = study(&cut_ins(30, spoilt), &[]);
     assert_eq!(code, 3, "{text}");
-    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "one of \"left\"", "not equally spaced"] {
+    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "is \"left\", but \"up\"", "not equally spaced"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert_eq!(study(&cut_ins(50, spoilt), &[]).0, 4);
