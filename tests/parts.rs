@@ -196,7 +196,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
     let dir = dir.path();
     density(dir);
     for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
-        let shard = |shard: &str| [run, &["--out", name, "--shard", shard]].concat();
+        let shard = |shard: &'static str| [run, &["--out", name, "--shard", shard]].concat();
         ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
         for file in ["part-00001-of-00002.json", "plan.json"] {
             let path = dir.join(name).join(file);

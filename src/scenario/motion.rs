@@ -51,7 +51,7 @@ pub enum Lateral {
 }
 
 /// Series that many lanes share.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Tables<R> {
     /// Speeds, m/s, one per step.
     pub speed: Vec<R>,
@@ -82,7 +82,7 @@ pub const LATERAL_SAMPLED: u32 = 2;
 
 /// The record a lane decodes. 64 bytes in f32.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<R> {
     /// Bits [`SPEED_SAMPLED`] and [`LATERAL_SAMPLED`].
     pub kind: u32,

@@ -9,7 +9,7 @@ use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Table
 
 /// One other vehicle of a lane.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneOther<R> {
     /// Its motion.
     pub motion: Motion<R>,
@@ -34,7 +34,7 @@ pub struct LaneOther<R> {
 
 /// What all lanes of one case share.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneCase<R> {
     /// Principal vehicle, then the one ahead of it.
     pub others: [LaneOther<R>; 2],

@@ -1,5 +1,5 @@
-//! The lane plan: what is swept, in which order, and everything f64 that the host computed before the
-//! lanes. Made once, hashed, never recomputed.
+//! The lane plan: what is swept, in which order, with everything f64 that the host computes before the lanes, or what
+//! that follows from; and the hash of it.
 //!
 //! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by
 //! mixed radix from the plan's own counts. Ranges are intervals of units, so S and its S' never part.
