@@ -215,7 +215,7 @@ impl Grid {
         let mut profile = profile.clone();
         if self.style == CaseStyle::JrcComparison {
             profile.cchdm.abort_on_large_ttc = true;
-            let of = |cell| run_up(self.style, &self.point(cell));
+            let of = |cell| run_up(self.style, &self.point(cell), profile.frame.dt_s);
             let longest = (0..self.cell_count()).map(of).max().unwrap_or(0);
             profile.frame.time_cap_s += f64::from(longest) * profile.frame.dt_s;
         }
@@ -236,7 +236,9 @@ impl Grid {
             return point.plain_case(self.category, profile).case(profile.frame.time_cap_s);
         }
         Ok(match self.category {
-            Category::CutIn => jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point), dt_s),
+            Category::CutIn => {
+                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point, dt_s), dt_s)
+            }
             Category::Lvd => {
                 let (end, deceleration) = (value(Quantity::EndSpeed, 0.0), value(Quantity::Deceleration, 0.0));
                 jrc_case::lvd(ego_mps, end, deceleration)
@@ -266,14 +268,14 @@ impl Grid {
         let point = self.point(cell);
         let ego_mps = point.get(Quantity::EgoSpeed).unwrap_or(0.0);
         let other_mps = point.get(Quantity::OtherSpeed).unwrap_or(ego_mps);
-        jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point), dt_s)
+        jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s)
     }
 }
 
 /// Steps of a case's lateral run-up.
-fn run_up(style: CaseStyle, point: &Point) -> u32 {
+fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
     match (style, point.get(Quantity::LateralSpeed)) {
-        (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps),
+        (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps, dt_s),
         _ => 0,
     }
 }

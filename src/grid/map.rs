@@ -1,9 +1,11 @@
 //! A swept grid: the verdicts of every cell and model, shares, and the difference of two maps.
 
-use crate::Result;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
-use crate::sweep::{Backend, ONE_IN, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep};
+use crate::sweep::{
+    Backend, LanePlan, LaneRunner, ONE_IN, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
+};
+use crate::{Error, Place, Result};
 
 use super::grid::Grid;
 use super::plan::GridPlan;
@@ -71,7 +73,8 @@ impl GridMap {
     /// Sweeps a planned grid.
     ///
     /// # Errors
-    /// Of the backend; [`crate::Error::Verification`] where a checked lane differs.
+    /// Of the backend; [`Error::Verification`] where a checked lane differs; [`Error::Usage`] where every lane ends at
+    /// the time cap, so that the map says nothing.
     pub fn sweep(plan: &GridPlan, how: MapBackend) -> Result<(GridMap, SweepSummary)> {
         let cells = plan.grid.cell_count();
         let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
@@ -97,7 +100,29 @@ impl GridMap {
             })?;
             summary.add(&swept);
         }
-        Ok((GridMap { models: plan.models.clone(), verdicts }, summary))
+        let map = GridMap { models: plan.models.clone(), verdicts };
+        map.check_ends(plan)?;
+        Ok((map, summary))
+    }
+
+    /// Some lane must end before the time cap; under a profile whose runs all go on to it, another vehicle must come
+    /// into the ego's lane.
+    fn check_ends(&self, plan: &GridPlan) -> Result<()> {
+        let lanes = plan.lane_count();
+        let Some(frame) = plan.parts.first().map(|part| &part.plan.profile.frame) else { return Ok(()) };
+        let all_capped = self.verdicts.iter().flatten().all(|verdict| verdict.capped());
+        if lanes == 0 || !all_capped || !frame.end_when_settled && plan.parts.iter().any(|part| meets(&part.plan)) {
+            return Ok(());
+        }
+        let alone = if frame.end_when_settled { "" } else { ", and no vehicle comes into the ego's lane" };
+        let problem =
+            format!("all {lanes} lanes end at the time cap of {} s{alone}: the map is empty", frame.time_cap_s);
+        let help = format!(
+            "check the time step ({} s, --dt), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
+             and gaps",
+            frame.dt_s
+        );
+        Err(Error::usage(Place::item(format!("map {}", plan.grid.name())), problem, help))
     }
 
     /// Number of cells.
@@ -125,6 +150,13 @@ impl GridMap {
         let pairs = self.verdicts[first].iter().zip(&other.verdicts[second]);
         pairs.map(|(a, b)| Agreement::of(a.failed(criterion), b.failed(criterion))).collect()
     }
+}
+
+/// Is there a lane in which TTC and BTN look at another vehicle?
+fn meets(plan: &LanePlan) -> bool {
+    let runner = LaneRunner::<f32>::new(plan);
+    let keys = (0..plan.lane_count()).filter_map(|lane| plan.key(lane));
+    keys.map(|key| runner.run(&key)).any(|outcome| outcome.min_gap < f32::INFINITY)
 }
 
 /// Counts of the four agreements, in the order of [`Agreement::ALL`].
