@@ -39,9 +39,9 @@ fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MOST_PARAMETERS> {
     var words: array<u32, 16>;
     if generation.source == SOURCE_GIVEN {
         var given: array<f32, MOST_PARAMETERS>;
-        let row = select(generation.components - 1u, index.x, index.x < generation.components);
+        // A plan holds no index beyond the points.
         for (var j = 0u; j < d; j++) {
-            given[j] = number(generation.first_mean + row * d + j);
+            given[j] = number(generation.first_mean + index.x * d + j);
         }
         return given;
     }

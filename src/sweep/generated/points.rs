@@ -1,7 +1,7 @@
 //! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points, or
 //! a table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::random::{AliasTable, Sobol, Stream, choose, standard_normal};
+use crate::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Parameters of a point at most.
 pub const MOST_PARAMETERS: usize = 14;
@@ -63,7 +63,19 @@ impl Points {
         self.factor_of.len() as u32
     }
 
+    /// Number of points; `None` where every index has one. A [plan](crate::sweep::LanePlan) holds no sample beyond.
+    pub fn count(&self) -> Option<u64> {
+        match &self.source {
+            PointSource::Random(_) => None,
+            PointSource::Sobol(_) => Some(SOBOL_POINTS),
+            PointSource::Given => Some(u64::from(self.components())),
+        }
+    }
+
     /// The first valid draw of an index.
+    ///
+    /// # Panics
+    /// For an index beyond [`Points::count`]: there is no such point, and none may stand in for it.
     #[inline]
     pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> Drawn {
         let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
@@ -106,13 +118,13 @@ impl Points {
             }
             PointSource::Sobol(sobol) => {
                 for (dimension, word) in words.iter_mut().take(2 + d).enumerate() {
-                    // Beyond the last point there is none: a plan holds no such index.
-                    *word = sobol.word(index, dimension as u32).unwrap_or(0);
+                    // A plan holds no index beyond the points, and `Sobol` was made with 2 + d dimensions.
+                    *word = sobol.word(index, dimension as u32).expect("the sequence has this point");
                 }
             }
             PointSource::Given => {
                 let mut values = [0.0; MOST_PARAMETERS];
-                let first = (index as usize).min(self.factor_of.len() - 1) * d;
+                let first = index as usize * d;
                 values[..d].copy_from_slice(&self.means[first..first + d]);
                 return values;
             }
@@ -133,5 +145,37 @@ impl Points {
             values[j] = value;
         }
         values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(source: PointSource) -> Points {
+        let (means, factor_of) = (vec![1.0, 2.0, 3.0], vec![0, 0, 0]);
+        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0] }
+    }
+
+    #[test]
+    fn every_point_that_is_counted_can_be_drawn() {
+        let given = points(PointSource::Given);
+        let values = (0..given.count().unwrap()).map(|index| given.draw(index, |_| true).values[0]);
+        assert_eq!(values.collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+        let sobol = points(PointSource::Sobol(Sobol::new(7, 3).unwrap()));
+        assert!(!sobol.draw(sobol.count().unwrap() - 1, |_| true).is_void());
+        assert_eq!(points(PointSource::Random(Stream { seed: 7, purpose: 0 })).count(), None);
+    }
+
+    #[test]
+    #[should_panic(expected = "the sequence has this point")]
+    fn no_word_stands_in_for_a_sobol_point_that_there_is_not() {
+        points(PointSource::Sobol(Sobol::new(7, 3).unwrap())).draw(SOBOL_POINTS, |_| true);
+    }
+
+    #[test]
+    #[should_panic(expected = "out of range")]
+    fn no_given_point_stands_in_for_one_that_was_not_given() {
+        points(PointSource::Given).draw(3, |_| true);
     }
 }
