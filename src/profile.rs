@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::criterion::CriteriaProfile;
-use crate::driver::{self, Bound, DriverProfile};
+use crate::driver::{self, Bound, DriverProfile, ModelId};
 use crate::near_name::nearest;
 use crate::{Error, Place, Result, input_file, toml_file};
 
@@ -63,6 +63,9 @@ impl FrameProfile {
     }
 }
 
+/// Time step up to which no delay bounds it, s: that of the simulators that the models come from.
+const ALWAYS_SHORT_ENOUGH_S: f64 = 0.1;
+
 /// Makes [`Profile`] with one table per driver model of the registry.
 macro_rules! declare_profile {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
@@ -92,6 +95,19 @@ macro_rules! declare_profile {
                 $(
                     let table = stringify!($file);
                     all.extend(self.$file.bounds().into_iter().map(|(k, v, b)| (format!("{table}.{k}"), v, b)));
+                )+
+                all
+            }
+
+            /// What bounds the time step of these driver models: key, longest step, s.
+            fn driver_time_step_bounds(&self, models: &[ModelId]) -> Vec<(String, f64)> {
+                let mut all = Vec::new();
+                $(
+                    if models.contains(&ModelId::$model) {
+                        let table = stringify!($file);
+                        let bounds = self.$file.time_step_bounds();
+                        all.extend(bounds.into_iter().map(|(k, s)| (format!("{table}.{k}"), s)));
+                    }
                 )+
                 all
             }
@@ -184,6 +200,27 @@ impl Profile {
         Ok(())
     }
 
+    /// Is the time step short enough for these drivers and the TTC threshold? 0.1 s always is. Derivation:
+    /// docs/src/methods/lane.md, time step.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the longest time step and the key that bounds it.
+    pub fn check_time_step(&self, models: &[ModelId]) -> Result<()> {
+        let threshold = ("criteria.ttc_threshold_s".to_owned(), self.criteria.ttc_threshold_s);
+        let bounds = self.driver_time_step_bounds(models);
+        let (key, least_s) =
+            bounds.into_iter().fold(threshold, |least, next| if next.1 < least.1 { next } else { least });
+        let longest_s = least_s.max(ALWAYS_SHORT_ENOUGH_S);
+        if self.frame.dt_s <= longest_s {
+            return Ok(());
+        }
+        Err(Error::usage(
+            Place::item("`frame.dt_s`"),
+            format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
+            format!("use a time step (--dt) of at most {longest_s} s, or leave out the driver models that need it"),
+        ))
+    }
+
     /// The same profile at another time step.
     pub fn with_dt(mut self, dt_s: f64) -> Result<Profile> {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
@@ -226,5 +263,31 @@ mod tests {
             let error = Profile::load("paper").unwrap().with_dt(dt_s).unwrap_err();
             assert!(error.to_string().contains("--dt"), "{error}");
         }
+    }
+
+    /// Steps up to that of the reference simulators are allowed whatever the delays; beyond it the error says which
+    /// model bounds the step, and how long it may be.
+    #[test]
+    fn a_time_step_too_long_for_a_driver_is_refused_with_the_longest_that_is_allowed() {
+        let check = |name: &str, dt_s: f64, models: &[ModelId]| {
+            Profile::load(name).unwrap().with_dt(dt_s).unwrap().check_time_step(models)
+        };
+        for name in Profile::names() {
+            assert!(check(name, 0.1, &ModelId::ALL).is_ok(), "{name}");
+            let error = check(name, 0.101, &ModelId::ALL).unwrap_err();
+            let says = format!("{error} {}", error.help().unwrap());
+            assert!(says.contains("reg157.margin_s") && says.contains("at most 0.1 s"), "{name}: {says}");
+            assert!(check(name, 0.25, &[ModelId::Rss, ModelId::Fsm]).is_ok(), "{name}");
+            assert!(check(name, 0.251, &[ModelId::Fsm]).is_err(), "{name}");
+        }
+        assert!(check("paper", 0.2, &[ModelId::Cchdm]).is_ok());
+        let error = check("un-r157", 0.2, &[ModelId::Cchdm]).unwrap_err().to_string();
+        assert!(error.contains("cchdm.perception_time_s") && error.contains("0.1333 s"), "{error}");
+        // Without a delay the threshold bounds the step.
+        let mut profile = Profile::load("paper").unwrap().with_dt(0.5).unwrap();
+        profile.fsm.reaction_time_s = 0.0;
+        assert!(profile.check_time_step(&[ModelId::Fsm]).is_ok());
+        profile.criteria.ttc_threshold_s = 0.4;
+        assert!(profile.check_time_step(&[ModelId::Fsm]).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::criterion::{BrakeThreat, BtnForm, Criterion};
+use lanesweep::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
 use lanesweep::driver::ModelId;
 use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::profile::Profile;
@@ -362,4 +362,114 @@ fn jrc_2021_un_r157_and_paper_fit_run_every_category_and_differ_from_paper_where
     let soft = lvd(30.0, 0.0, 3.0);
     let un = run(&Profile::load("un-r157").unwrap(), &soft, ModelId::Cchdm, 1.0);
     assert_eq!(un.reaction_step, lanesweep::sweep::NO_STEP, "a soft deceleration never triggers it");
+}
+
+/// Time steps from fine to the longest that the profiles allow.
+const TIME_STEPS_S: [f64; 9] = [0.01, 0.04, 0.1, 0.13, 0.17, 0.2, 0.25, 0.3, 0.35];
+
+/// A case at a time step from a gap, in both arithmetics: they must agree on the contact.
+fn at_time_step(dt_s: f64, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
+    fn outcome<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
+        let mut tables = Tables::default();
+        let lane = LaneCase::encode(case, profile, &mut tables);
+        let constants = Constants::<R>::resolve(profile, case.category);
+        constants.run(model, &lane.cast(), &tables.cast(), Start::Gap(R::from_f64(gap_m)), &mut Silent).widen()
+    }
+    let profile = paper().with_dt(dt_s).unwrap();
+    let wide = outcome::<f64>(&profile, case, model, gap_m);
+    let narrow = outcome::<f32>(&profile, case, model, gap_m);
+    assert_eq!((wide.contact, wide.verdicts), (narrow.contact, narrow.verdicts), "{dt_s} s, {case:?}, {gap_m} m");
+    wide
+}
+
+fn fails_all(outcome: &Outcome<f64>) -> bool {
+    Criterion::ALL.into_iter().all(|criterion| outcome.verdicts.failed(criterion))
+}
+
+/// No driver brakes before 0.35 s are over, so a vehicle that is nearer than that is hit at every time step, however far
+/// a step leads past it: at the rear, with the closing speed, and TTC and BTN fail.
+#[test]
+fn a_vehicle_that_cannot_be_missed_is_hit_at_the_rear_at_every_time_step() {
+    for model in ModelId::ALL {
+        for v_ego in [12.0, 25.0, 33.0, 50.0, 60.0, 70.0] {
+            for v_other in [0.0, 5.0, 0.5 * v_ego] {
+                for time_s in [0.0, 0.02, 0.13, 0.2, 0.3] {
+                    let gap_m = (v_ego - v_other) * time_s;
+                    let case = Case { ego_speed_mps: v_ego, ..lvd(v_other, v_other, 1.0) };
+                    for dt_s in TIME_STEPS_S {
+                        let outcome = at_time_step(dt_s, &case, model, gap_m);
+                        let what = format!("{model:?}, {v_ego} and {v_other} m/s, {gap_m} m, {dt_s} s: {outcome:?}");
+                        assert_eq!(outcome.contact, Contact::Frontal, "{what}");
+                        assert!(fails_all(&outcome), "{what}");
+                        let late_s = f64::from(outcome.contact_step) * dt_s - time_s;
+                        assert!(late_s > -1e-9 && late_s < dt_s + 0.02, "{what}");
+                        // CCHDM's foot is off the accelerator meanwhile.
+                        assert!((outcome.impact_closing_speed - (v_ego - v_other)).abs() < 0.4, "{what}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A vehicle from behind hits the ego at every time step, from behind, even where a step leads it past the ego.
+#[test]
+fn a_vehicle_from_behind_hits_the_ego_from_behind_at_every_time_step() {
+    for (v_ego, v_other) in [(0.0, 40.0), (10.0, 55.0), (20.0, 30.0)] {
+        for time_s in [0.05, 0.21, 1.0] {
+            // Bumper to bumper behind the ego, 4.3 m long as the other.
+            let gap_m = -8.6 - (v_other - v_ego) * time_s;
+            let case = Case { ego_speed_mps: v_ego, horizon_s: 5.0, ..lvd(v_other, v_other, 1.0) };
+            let case = Case { horizon_s: 5.0, ..case };
+            for dt_s in TIME_STEPS_S {
+                let outcome = at_time_step(dt_s, &case, ModelId::Fsm, gap_m);
+                let what = format!("{v_ego} and {v_other} m/s, {time_s} s, {dt_s} s: {outcome:?}");
+                assert_eq!(outcome.contact, Contact::BySide, "{what}");
+                let late_s = f64::from(outcome.contact_step) * dt_s - time_s;
+                assert!(late_s > -1e-9 && late_s < dt_s + 1e-9, "{what}");
+            }
+        }
+    }
+}
+
+/// A number that is other for every word, 0 … 1.
+fn fraction(number: u32, word: u32) -> f64 {
+    f64::from(lanesweep::random::philox4x32_10([number, word, 0, 0], [21, 2])[0]) / 4_294_967_296.0
+}
+
+/// A collision that stays one when the vehicles are moved by what a coarse step moves them, is one at every coarser step
+/// too and of the same kind, and what passes by such a margin passes. On either side of the ego alike.
+#[test]
+fn a_collision_with_a_margin_is_the_same_collision_at_every_time_step() {
+    let (mut collided, mut passed) = (0, 0);
+    for number in 0..1500 {
+        let between = |word: u32, least: f64, most: f64| least + (most - least) * fraction(number, word);
+        let (v_ego, rate_mps) = (between(0, 10.0, 65.0), between(1, 0.3, 3.0));
+        let v_other = between(2, 0.0, 0.8 * v_ego);
+        let (start_m, closing) = (between(3, 1.9, 4.0), v_ego - v_other);
+        // Braking is later than this, so the paths are known: overlap across, then bumper to bumper and past.
+        let gap_m = closing * between(4, 0.0, 0.34);
+        let [meets_s, past_s] = [gap_m, gap_m + 8.6].map(|way_m| way_m / closing);
+        let overlaps_s = (start_m - 1.9) / rate_mps;
+        let case = |side: f64| {
+            let lateral = Lateral::Kinematic { start_m: side * start_m, rate_mps: -side * rate_mps, end_m: 0.0 };
+            let case = cut_in(v_ego, v_other, lateral);
+            let principal = Participant { width_m: 1.9, ..case.principal };
+            Case { ego_length_m: 4.3, principal, horizon_s: 2.0, ..case }
+        };
+        for dt_s in TIME_STEPS_S {
+            let outcome = at_time_step(dt_s, &case(1.0), ModelId::Rss, gap_m);
+            assert_eq!(outcome, at_time_step(dt_s, &case(-1.0), ModelId::Rss, gap_m), "mirrored: {number}");
+            let what = format!("{number} at {dt_s} s: {meets_s} to {past_s} s, {overlaps_s} s: {outcome:?}");
+            if overlaps_s < meets_s - 1e-6 && meets_s < 0.34 {
+                assert_eq!(outcome.contact, Contact::Frontal, "{what}");
+                assert!(fails_all(&outcome), "{what}");
+                collided += 1;
+            } else if past_s < 0.34 && overlaps_s > past_s + dt_s {
+                assert_eq!(outcome.contact, Contact::None, "{what}");
+                passed += 1;
+            }
+        }
+    }
+    assert!(collided > 500 && passed > 500, "{collided} collided, {passed} passed");
 }

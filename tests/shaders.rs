@@ -344,6 +344,7 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         "default",
         "resolve",
         "bounds",
+        "time_step_bounds",
         "attention",
         "abort_above_ttc_s",
         "safe_gap",

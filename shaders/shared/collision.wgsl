@@ -6,6 +6,15 @@ const CONTACT_BY_SIDE: u32 = 1u;
 // The ego's front hits the other vehicle.
 const CONTACT_FRONTAL: u32 = 2u;
 
+// The gap after a step between vehicles that overlap across the road at its end: held in the contact where the step
+// leads their centres past each other.
+fn held_in_contact(before: f32, after: f32, half_lengths: f32) -> f32 {
+    let was_behind = before + half_lengths + half_lengths <= 0.0;
+    let passes = after + half_lengths >= 0.0;
+    let from_behind = select(after, -(half_lengths * 1.5), was_behind & passes);
+    return select(larger(after, -half_lengths), from_behind, before < 0.0);
+}
+
 // Contact at one step, strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
 fn contact(gap: f32, half_lengths: f32, lateral_gap: f32) -> u32 {
     let overlap_along = (gap < 0.0) & (gap + half_lengths + half_lengths > 0.0);

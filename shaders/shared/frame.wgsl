@@ -1,8 +1,8 @@
 // The frame: one lane from start to end, the latched step once for all models. Twin of src/sweep/lane_step.rs and
 // src/sweep/lane.rs.
 //
-// Order inside a step: the state at i gives the criteria and the contact, then the check, then v[i+1]
-// (semi-implicit Euler). The state is the gap: positions never enter.
+// Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the
+// contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter.
 
 // s
 override frame_dt: f32;
@@ -57,16 +57,6 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
     let gap_start = select(start.value * lane.ego_speed, start.value, start.is_gap != 0u);
     var gap_0 = gap_start + lane.others[0].gap_offset;
     var gap_1 = gap_start + lane.others[1].gap_offset;
-    // The other vehicles' speeds at this step; the gap needs each of them one step ahead.
-    var v_0 = motion_speed(lane.others[0].motion, 0u);
-    var v_1 = 0.0;
-    if frame_paired {
-        v_1 = motion_speed(lane.others[1].motion, 0u);
-    }
-    if frame_start_shift {
-        gap_0 = gap_0 + (v_0 - lane.ego_speed) * frame_dt;
-        gap_1 = gap_1 + (v_1 - lane.ego_speed) * frame_dt;
-    }
     var state = initial();
     var v_ego = lane.ego_speed;
     var v_before = v_ego;
@@ -77,7 +67,8 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
     for (var index = 0u; index < frame_step_cap; index++) {
         let a_ego = (v_ego - v_before) * frame_inverse_dt;
         let ego = EgoState(v_ego, a_ego, lane.ego_width);
-        let first = see(ego, lane.others[0], v_0, gap_0, index);
+        let first = see(ego, lane.others[0], gap_0, index);
+        gap_0 = first.view.gap;
         record = judge(record, first);
         var hazard = attentive_check(first, lane.others[0], index);
         var touch = touches(first, lane.others[0]);
@@ -87,7 +78,8 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
         var touched_closing = closing(first.view);
         if frame_paired {
             if lane.pair != 0u {
-                let second = see(ego, lane.others[1], v_1, gap_1, index);
+                let second = see(ego, lane.others[1], gap_1, index);
+                gap_1 = second.view.gap;
                 record = judge(record, second);
                 let other_hazard = attentive_check(second, lane.others[1], index);
                 // The nearest unsafe vehicle drives the reaction.
@@ -122,21 +114,21 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
         state.delay_steps = select(state.delay_steps, reaction.state.delay_steps, hazard.is_unsafe);
         v_before = v_ego;
         v_ego = v_next;
-        v_0 = motion_speed(lane.others[0].motion, index + 1u);
-        gap_0 = gap_0 + (v_0 - v_ego) * frame_dt;
-        if frame_paired {
-            v_1 = motion_speed(lane.others[1].motion, index + 1u);
-            gap_1 = gap_1 + (v_1 - v_ego) * frame_dt;
-        }
     }
     return outcome(record, reaction_step, last);
 }
 
-fn see(ego: EgoState, other: LaneOther, v_other: f32, gap: f32, index: u32) -> Seen {
+// `before`: the gap one step before. Step 0 is the start itself, unless index 0 is one step after it.
+fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
+    let v_other = motion_speed(other.motion, index);
     let lateral = motion_lateral(other.motion, index);
     let lateral_gap = abs(lateral.position) - other.half_widths;
-    let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths);
     let present = (other.used != 0u) & (index >= other.present_from) & (index < other.present_until);
+    let moved = before + (v_other - ego.v) * frame_dt;
+    let stops = present & (other.judged != 0u) & (lateral_gap < 0.0);
+    let after = select(moved, held_in_contact(before, moved, other.half_lengths), stops);
+    let gap = select(before, after, (index > 0u) | frame_start_shift);
+    let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths);
     let judged = present & (other.judged != 0u)
         & criteria_sees(gap, other.half_lengths, lateral_gap, lateral.position, ego.width);
     return Seen(view, present, judged);

@@ -16,7 +16,8 @@ use crate::profile::{CutOutTarget, Profile};
 use crate::scalar::Real;
 use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
 use crate::sweep::{
-    EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, StudyOptions, Trace, plan_study,
+    EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, StudyOptions, Trace, check_time_step,
+    plan_study,
 };
 use crate::{Error, Place, Result};
 
@@ -190,6 +191,8 @@ pub(super) fn of_case(flags: &CaseFlags, profile: &Profile, extras: &Extras) -> 
     let described = flags.case(profile, extras.implausible)?;
     let mut tables = Tables::default();
     let case = LaneCase::encode(&described, profile, &mut tables);
+    profile.check_time_step(&flags.models()?)?;
+    check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
     let size = |length_m, width_m| VehicleSize { length_m, width_m };
     let sizes = Sizes {
         ego: size(described.ego_length_m, described.ego_width_m),

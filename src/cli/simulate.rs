@@ -18,7 +18,7 @@ use crate::report::records;
 use crate::report::trace_figure::{TraceFigure, TraceSeries};
 use crate::report::trace_table;
 use crate::scenario::Tables;
-use crate::sweep::{EndReason, LaneCase, NO_STEP, Outcome, Trace};
+use crate::sweep::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
 use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
@@ -119,6 +119,8 @@ impl Simulate {
         let flags = self.flags()?;
         let mut tables = Tables::default();
         let case = LaneCase::encode(&flags.case(&profile, self.plausibility.policy())?, &profile, &mut tables);
+        profile.check_time_step(&flags.models()?)?;
+        check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
         let (category, headway) = (flags.category()?, flags.headway()?);
         let traced = |model: ModelId| Traced {
             key: model.name().to_owned(),

@@ -42,6 +42,18 @@ pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
     gap.is_negative() & (gap + half_lengths + half_lengths).is_positive()
 }
 
+/// The gap after a step between vehicles that overlap across the road at its end, given the gaps before and after it.
+///
+/// Where the step leads their centres past each other, the vehicles are held in the contact: with the centres side by
+/// side if the other was wholly ahead before, half of that behind if it was wholly behind. Otherwise `after`.
+#[inline(always)]
+pub fn held_in_contact<R: Real>(before: R, after: R, half_lengths: R) -> R {
+    let was_behind = !(before + half_lengths + half_lengths).is_positive();
+    let passes = !(after + half_lengths).is_negative();
+    let from_behind = (was_behind & passes).choose(-(half_lengths * R::from_f64(1.5)), after);
+    before.is_negative().choose(from_behind, after.larger(-half_lengths))
+}
+
 /// Contact at one step.
 #[inline(always)]
 pub fn contact<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Contact {

@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_steps,
-    latched_braking,
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_bound_s,
+    delay_steps, latched_braking,
 };
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -85,6 +85,10 @@ impl DriverProfile for CchdmProfile {
             ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::AtLeast(0.0)),
             ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
         ]
+    }
+
+    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+        vec![("delay_s", delay_bound_s(self.delay_s)), ("perception_time_s", delay_bound_s(self.perception_time_s))]
     }
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {

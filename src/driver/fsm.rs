@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{
+    Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps, latched_braking,
+};
 use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
@@ -95,6 +97,10 @@ impl DriverProfile for FsmProfile {
             ("margin_m", self.margin_m, Bound::AtLeast(0.0)),
             ("lateral_gate_margin_s", self.lateral_gate_margin_s, Bound::AtLeast(0.0)),
         ]
+    }
+
+    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+        vec![("reaction_time_s", delay_bound_s(self.reaction_time_s))]
     }
 }
 

@@ -15,7 +15,7 @@ mod attention;
 mod profile;
 
 pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
-pub use profile::{Bound, DriverProfile};
+pub use profile::{Bound, DriverProfile, delay_bound_s};
 
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -182,7 +182,7 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     fn check(&self, view: &View<R>) -> Hazard<R>;
     /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.
     fn shader_constants(&self) -> Vec<(&'static str, f64)>;
-    /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0.
+    /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0 and not above `v_ego`.
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R);
 }
 

@@ -33,6 +33,15 @@ impl std::fmt::Display for Bound {
     }
 }
 
+/// Steps that a delay takes at least: rounded up to whole ones it is then longer by less than a third.
+const DELAY_STEPS: f64 = 3.0;
+
+/// Longest time step that a delay allows, s, in whole tenths of a millisecond; any where there is no delay.
+pub fn delay_bound_s(delay_s: f64) -> f64 {
+    // 0.6/3 lies below 0.2.
+    if delay_s > 0.0 { ((delay_s / DELAY_STEPS + 1e-9) * 1e4).floor() / 1e4 } else { f64::INFINITY }
+}
+
 /// Constants of a driver model as a profile gives them.
 pub trait DriverProfile {
     /// The model in a lane's arithmetic.
@@ -43,6 +52,11 @@ pub trait DriverProfile {
 
     /// Constants with a range: key, value, range.
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)>;
+
+    /// What bounds the time step: key, longest step that it allows, s. [`delay_bound_s`] gives that of a delay.
+    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
 
     /// What has to be seen of the principal vehicle before the driver may react; worked out in f64.
     fn attention(&self, _dt_s: f64, _category: Category) -> AttentionRule<f64> {

@@ -4,7 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking,
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps,
+    latched_braking,
 };
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -68,6 +69,16 @@ impl DriverProfile for Reg157Profile {
             ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::AtLeast(0.0)),
             ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
         ]
+    }
+
+    /// The margin has to make up for what whole steps add: the check sees a threshold up to a step late.
+    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+        let delays = [
+            ("reaction_time_s", self.reaction_time_s),
+            ("visible_lateral_movement_s", self.visible_lateral_movement_s),
+        ]
+        .map(|(key, delay_s)| (key, delay_bound_s(delay_s)));
+        delays.into_iter().chain([("margin_s", self.margin_s)]).collect()
     }
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {

@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
+use super::{
+    Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps, latched_braking,
+};
 use crate::flag::Flag;
 use crate::scalar::Real;
 use crate::scenario::Category;
@@ -88,6 +90,10 @@ impl DriverProfile for RssProfile {
             ("max_acceleration_mps2", self.max_acceleration_mps2, Bound::AtLeast(0.0)),
             ("lateral_margin_m", self.lateral_margin_m, Bound::AtLeast(0.0)),
         ]
+    }
+
+    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+        vec![("response_time_s", delay_bound_s(self.response_time_s))]
     }
 }
 

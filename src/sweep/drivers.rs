@@ -107,7 +107,7 @@ macro_rules! declare_constants {
             ) {
                 let model_index = id.index();
                 let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
-                let scene = Scene::of(stream.cases, model_index);
+                let scene = Scene::of(stream.cases, model_index, stream.may_cross);
                 match id {
                     $(ModelId::$model => {
                         let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };

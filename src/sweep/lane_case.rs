@@ -176,12 +176,18 @@ fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
     let shift = if profile.frame.start_shift { front.speed(tables, 0) - cutter.speed(tables, 0) } else { 0.0 };
     let mut distance = ahead.gap_m + overlap_lengths + shift * dt;
     let mut freeze = NEVER;
+    // How far it drives beyond the middle of the other one within the step, m.
+    let mut beyond = 0.0;
     for i in 0..cap {
+        let before = distance;
         if i > 0 {
             distance += (front.speed(tables, i) - cutter.speed(tables, i)) * dt;
         }
-        if distance.abs() < overlap_lengths && cutter.lateral(tables, i).position.abs() < overlap_widths {
+        let passes = before >= overlap_lengths && distance < 0.0;
+        let along = distance.abs() < overlap_lengths || passes;
+        if along && cutter.lateral(tables, i).position.abs() < overlap_widths {
             freeze = i;
+            beyond = if passes { -distance } else { 0.0 };
             break;
         }
     }
@@ -192,7 +198,7 @@ fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
         // Its position at the freeze holds the step it moved; its speed from there on is 0.
         let speed: Vec<f64> = (0..freeze).map(|i| cutter.speed(tables, i)).chain([0.0]).collect();
         let lateral = cutter.lateral(tables, freeze).position;
-        let moved = cutter.speed(tables, freeze) * dt;
+        let moved = cutter.speed(tables, freeze) * dt - beyond;
         let frozen = Lateral::Sampled { position_m: vec![lateral], towards_mps: vec![0.0] };
         others[0].motion = Motion::encode(&Speed::Sampled(speed), &frozen, dt, tables);
         others[0].gap_offset += moved;

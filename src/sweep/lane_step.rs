@@ -1,13 +1,13 @@
 //! One step of a lane as a pure function, written once for the scalar lane and for batches of lanes. The latched
 //! step stands here, once for all models.
 //!
-//! Order inside a step: the gap moves to i, the state at i gives the criteria and the contact, then the check,
+//! Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the contact, then the check,
 //! then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32 keeps millimetres.
 //!
 //! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
 //! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
 
-use crate::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, overlaps_along};
+use crate::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, held_in_contact, overlaps_along};
 use crate::driver::{DriverModel, DriverState, Hazard, View};
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -185,7 +185,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     // Step 0 is the start itself, unless index 0 is one step after it.
     let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
     let mut gaps = state.gaps;
-    gaps[0] = moves.choose(moved_gap(frame, &ego, gaps[0], &places[0]), gaps[0]);
+    gaps[0] = moves.choose(moved_gap(simulation, &ego, &lane.others[0], &places[0], gaps[0], index), gaps[0]);
     let first = see(simulation, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
     let mut record = judge(criteria, &state.record, &first);
     let mut hazard = check(simulation, &first, &lane.others[0], index);
@@ -194,7 +194,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let mut aborted = aborts(frame, &first);
     let mut second = first;
     if scene.is_pair {
-        gaps[1] = moves.choose(moved_gap(frame, &ego, gaps[1], &places[1]), gaps[1]);
+        gaps[1] = moves.choose(moved_gap(simulation, &ego, &lane.others[1], &places[1], gaps[1], index), gaps[1]);
         second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
         record = judge(criteria, &record, &second);
         let other_hazard = check(simulation, &second, &lane.others[1], index);
@@ -238,10 +238,29 @@ pub(super) struct Ego<R> {
     pub width: R,
 }
 
-/// The gap a step later.
+/// The gap a step later; a contact between the two steps holds it.
 #[inline(always)]
-fn moved_gap<R: Real>(frame: &Frame<R>, ego: &Ego<R>, gap: R, place: &Whereabouts<R>) -> R {
-    gap + (place.speed - ego.v) * frame.dt
+fn moved_gap<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    ego: &Ego<R>,
+    other: &OtherConstants<R>,
+    place: &Whereabouts<R>,
+    gap: R,
+    index: u32,
+) -> R {
+    let moved = gap + (place.speed - ego.v) * simulation.frame.dt;
+    if !simulation.scene.may_cross {
+        return moved;
+    }
+    let across = (place.position.abs() - other.half_widths).is_negative();
+    let stops = is_present(other, index) & other.judged & across;
+    stops.choose(held_in_contact(gap, moved, other.half_lengths), moved)
+}
+
+/// It exists for the ego.
+#[inline(always)]
+fn is_present<R>(other: &OtherConstants<R>, index: u32) -> Flag {
+    Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until)
 }
 
 /// `runs`: the lane is not over; else nothing is there to be seen.
@@ -273,7 +292,7 @@ pub(super) fn see<R: Real, M>(
     if scene.always_there {
         return Seen { view, lateral, present: runs, judged: runs & is_seen };
     }
-    let present = runs & Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until);
+    let present = runs & is_present(other, index);
     Seen { view, lateral, present, judged: present & other.judged & is_seen }
 }
 

@@ -18,6 +18,7 @@ use crate::{Error, Place, Result};
 use super::engine::Canonical;
 use super::generated::Generator;
 use super::lane_case::LaneCase;
+use super::time_step::check_cases;
 use super::units::Units;
 
 /// Headway of a lane.
@@ -131,6 +132,7 @@ impl LanePlan {
         source: Box<dyn CaseSource>,
     ) -> Result<LanePlan> {
         let mut plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks, source)?;
+        check_cases(&plan.profile, &plan.blocks, plan.source.as_ref(), plan.segments(0..plan.unit_count()))?;
         plan.hash = plan.content_hash()?;
         Ok(plan)
     }
@@ -148,6 +150,7 @@ impl LanePlan {
         if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
             return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
         }
+        profile.check_time_step(&models)?;
         let (mut unit, mut lane) = (0_u64, 0_u64);
         for block in &mut blocks {
             block.first_unit = unit;
@@ -159,6 +162,11 @@ impl LanePlan {
                 let problem = format!("{} units of {per_unit} lanes are more than can be counted", block.units.len());
                 Error::usage(Place::default(), problem, "sweep fewer at once: 2^63 lanes at most")
             })?;
+        }
+        let points = source.generator().and_then(|generator| generator.points.count());
+        if let Some(points) = points.filter(|points| unit > *points) {
+            let problem = format!("{unit} samples are asked for, {points} points there are");
+            return Err(Error::usage(Place::default(), problem, "ask for fewer, or use independent random points"));
         }
         Ok(LanePlan { profile, models, headways, blocks, source, hash })
     }

@@ -19,10 +19,11 @@ pub(super) struct Rules {
 
 impl Rules {
     /// Number of sets.
-    pub(super) const SETS: u32 = 22;
+    pub(super) const SETS: u32 = 26;
 
     const IN_LANE: u32 = 20;
     const AT_EASE: u32 = 21;
+    const CROSSING: u32 = 22;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: continuous ones are wanted, not verdicts alone.
@@ -36,7 +37,9 @@ impl Rules {
         let aborts = frame.abort_above_ttc > 0.0;
         // Seldom used rules have no loop of their own for verdicts alone.
         let is_verdict_only = !values && !is_ratio && !aborts;
-        let scene = Scene { in_lane: scene.in_lane && is_verdict_only, ..scene };
+        // Seldom used rules always look for contacts between two steps.
+        let may_cross = scene.may_cross || is_ratio || aborts;
+        let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
         Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
     }
 
@@ -55,11 +58,20 @@ impl Rules {
             return Rules::IN_LANE;
         }
         let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
+        if self.scene.may_cross && (seldom == 0 || seldom == 4) {
+            return Rules::CROSSING + (self.sees_overlap as u32 | (self.is_verdict_only as u32) << 1);
+        }
         self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
     }
 
     /// From that number.
     pub(super) const fn from_bits(bits: u32) -> Rules {
+        if bits >= Rules::CROSSING {
+            let scene = Scene { is_pair: true, always_there: false, in_lane: false, at_ease: false, may_cross: true };
+            let sees_overlap = (bits - Rules::CROSSING) & 1 != 0;
+            let is_verdict_only = (bits - Rules::CROSSING) & 2 != 0;
+            return Rules { scene, is_ratio: false, sees_overlap, aborts: false, is_verdict_only };
+        }
         if bits >= Rules::IN_LANE {
             let scene = Scene { at_ease: bits == Rules::AT_EASE, ..Scene::in_lane() };
             return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
@@ -67,7 +79,13 @@ impl Rules {
         let seldom = bits >> 2;
         let is_pair = bits & 1 != 0;
         Rules {
-            scene: Scene { is_pair, always_there: !is_pair, in_lane: false, at_ease: false },
+            scene: Scene {
+                is_pair,
+                always_there: !is_pair,
+                in_lane: false,
+                at_ease: false,
+                may_cross: seldom != 0 && seldom != 4,
+            },
             sees_overlap: bits & 2 != 0,
             is_ratio: seldom & 1 != 0,
             aborts: seldom & 2 != 0,

@@ -12,7 +12,7 @@ use super::lane::Silent;
 use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::plan::{LaneKey, LanePlan};
-use super::scene::Scene;
+use super::scene::{Scene, may_cross};
 use super::series::Series;
 use super::waiting::Lanes;
 use crate::driver::ModelId;
@@ -69,6 +69,10 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self.run_case(key.block, &case, &tables, self.starts[key.headway], self.plan.models[key.model])
     }
 
+    fn dt(&self) -> R {
+        R::from_f64(self.plan.profile.frame.dt_s)
+    }
+
     /// The plan whose lanes it runs.
     pub(super) fn plan(&self) -> &'p LanePlan {
         self.plan
@@ -109,7 +113,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         model: ModelId,
     ) -> Outcome<R> {
         let scene = if self.as_in_batches {
-            Scene::of(std::slice::from_ref(case), model.index())
+            let may_cross = may_cross(case, tables, self.dt());
+            Scene::of(std::slice::from_ref(case), model.index(), may_cross)
         } else {
             Scene::unknown(case.pair != 0)
         };
@@ -144,14 +149,16 @@ impl LaneRunner<'_, f32> {
         series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        let stream = Lanes { cases: &cases, tracks: &tracks, starts: &self.starts, every_step: self.every_step };
+        let may_cross = unrolled.iter().any(|case| may_cross(case, tables, self.dt()));
+        let (cases, tracks, starts) = (&cases[..], &tracks[..], &self.starts[..]);
+        let stream = Lanes { cases, tracks, starts, every_step: self.every_step, may_cross };
         let models = self.plan.models.len();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
             if in_batches {
                 constants.run_stream(model, instructions, &stream, series.entries(), each);
             } else {
-                self.one_by_one(block, &cases, tables, model, each);
+                self.one_by_one(block, cases, tables, model, each);
             }
         }
         if let Ok(mut spare) = self.spare.lock() {

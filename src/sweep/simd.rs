@@ -63,6 +63,10 @@ macro_rules! for_rules {
             19 => $burst::<$model, 19>,
             20 => $burst::<$model, 20>,
             21 => $burst::<$model, 21>,
+            22 => $burst::<$model, 22>,
+            23 => $burst::<$model, 23>,
+            24 => $burst::<$model, 24>,
+            25 => $burst::<$model, 25>,
             Rules::SETS.. => return None,
         }
     };

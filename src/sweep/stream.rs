@@ -82,7 +82,8 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         if !scene.is_pair {
             return single(scene, [0, 0]);
         }
-        let alone = leaves_out.then(|| single(Scene::of_second_alone(stream.cases), [1, 1]));
+        // The second vehicle alone may still be crossed, which batches of single vehicles do not look for.
+        let alone = (leaves_out && !scene.may_cross).then(|| single(Scene::of_second_alone(stream.cases), [1, 1]));
         stage(scene, rules_of(scene), [0, 1], alone)
     }
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::lane_case::LaneCase;
 use super::plan::{Block, CaseSource, Headway, LanePlan};
 use super::plan_file::{BlockHead, StudyHead};
+use super::time_step::check_cases;
 use super::unit_record;
 use super::units::Units;
 use crate::driver::ModelId;
@@ -134,7 +135,7 @@ impl Study {
     /// The plan with the cases of these units, which must be held.
     ///
     /// # Errors
-    /// [`Error::Internal`] for other units.
+    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case.
     pub fn window(&self, units: Range<u64>) -> Result<LanePlan> {
         let (plan, profile) = (&self.outline, &self.outline.profile);
         let none = |block: &Block| Units::Held(block.units.len(), 0, Arc::new([]));
@@ -145,7 +146,7 @@ impl Study {
             first: vec![0; held.len()],
             variants: plan.blocks.iter().map(|block| block.variants.len()).collect(),
         };
-        for (at, inside) in plan.segments(units) {
+        for (at, inside) in plan.segments(units.clone()) {
             let block = &plan.blocks[at];
             let names: Vec<String> = inside.clone().map(|unit| block.units.name(unit).into_owned()).collect();
             held[at] = Units::Held(block.units.len(), inside.start, names.into());
@@ -162,6 +163,7 @@ impl Study {
                 from = to;
             }
         }
+        check_cases(profile, &plan.blocks, &table, plan.segments(units))?;
         Ok(plan.holding(held, Box::new(table)))
     }
 

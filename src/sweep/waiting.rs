@@ -28,6 +28,8 @@ pub(super) struct Lanes<'c> {
     pub starts: &'c [Start<f32>],
     /// Calm steps are made as well, and no lane is set apart.
     pub every_step: bool,
+    /// A step of one of its lanes [may cross](super::scene::may_cross) another vehicle.
+    pub may_cross: bool,
 }
 
 /// Lanes that wait for slots of one kind of batches: the next ones of a stream, and those set apart.

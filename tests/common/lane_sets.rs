@@ -38,6 +38,22 @@ pub fn forms() -> Vec<Profile> {
     let mut shortest = paper.clone();
     shortest.frame.time_cap_s = 2.0 * paper.frame.dt_s;
     profiles.push(shortest);
+    // Steps in which vehicles drive past one another, up to the longest: with every gate and rule of its own.
+    let mut patient = paper.clone();
+    (patient.reg157.reaction_time_s, patient.reg157.margin_s, patient.cchdm.delay_s) = (1.2, 0.5, 1.8);
+    (patient.rss.response_time_s, patient.fsm.reaction_time_s) = (1.5, 1.2);
+    let mut overlap = patient.clone();
+    overlap.criteria.gate = LateralGate::Overlap;
+    let mut aborting = patient.clone();
+    aborting.cchdm.abort_on_large_ttc = true;
+    let mut shifted = overlap.clone();
+    shifted.frame.start_shift = true;
+    let mut exposed = shifted.clone();
+    exposed.frame.cut_out_target = CutOutTarget::Exposed;
+    profiles.extend(
+        [(&patient, 0.2), (&patient, 0.35), (&overlap, 0.35), (&aborting, 0.35), (&shifted, 0.35), (&exposed, 0.3)]
+            .map(|(profile, dt_s)| profile.clone().with_dt(dt_s).unwrap()),
+    );
     profiles
 }
 
