@@ -63,9 +63,6 @@ impl FrameProfile {
     }
 }
 
-/// Time step up to which no delay bounds it, s: that of the simulators that the models come from.
-const ALWAYS_SHORT_ENOUGH_S: f64 = 0.1;
-
 /// Makes [`Profile`] with one table per driver model of the registry.
 macro_rules! declare_profile {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
@@ -105,7 +102,7 @@ macro_rules! declare_profile {
                 $(
                     if models.contains(&ModelId::$model) {
                         let table = stringify!($file);
-                        let bounds = self.$file.time_step_bounds();
+                        let bounds = self.$file.time_step_bounds(self.frame.dt_s);
                         all.extend(bounds.into_iter().map(|(k, s)| (format!("{table}.{k}"), s)));
                     }
                 )+
@@ -200,24 +197,23 @@ impl Profile {
         Ok(())
     }
 
-    /// Is the time step short enough for these drivers and the TTC threshold? 0.1 s always is. Derivation:
-    /// docs/src/methods/lane.md, time step.
+    /// Is the time step short enough for these drivers and the TTC threshold? Derivation: docs/src/methods/lane.md, time
+    /// step.
     ///
     /// # Errors
     /// [`Error::Usage`] with the longest time step and the key that bounds it.
     pub fn check_time_step(&self, models: &[ModelId]) -> Result<()> {
-        let threshold = ("criteria.ttc_threshold_s".to_owned(), self.criteria.ttc_threshold_s);
-        let bounds = self.driver_time_step_bounds(models);
-        let (key, least_s) =
-            bounds.into_iter().fold(threshold, |least, next| if next.1 < least.1 { next } else { least });
-        let longest_s = least_s.max(ALWAYS_SHORT_ENOUGH_S);
+        let threshold_s = self.criteria.ttc_threshold_s.max(driver::SHORT_STEP_S);
+        let mut bounds = self.driver_time_step_bounds(models);
+        bounds.push(("criteria.ttc_threshold_s".to_owned(), threshold_s));
+        let Some((key, longest_s)) = bounds.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
         if self.frame.dt_s <= longest_s {
             return Ok(());
         }
         Err(Error::usage(
             Place::item("`frame.dt_s`"),
             format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
-            format!("use a time step (--dt) of at most {longest_s} s, or leave out the driver models that need it"),
+            format!("use a time step (--dt) of at most {longest_s} s, or leave out the driver model that needs it"),
         ))
     }
 
@@ -281,6 +277,13 @@ mod tests {
             assert!(check(name, 0.251, &[ModelId::Fsm]).is_err(), "{name}");
         }
         assert!(check("paper", 0.2, &[ModelId::Cchdm]).is_ok());
+        // Reg157's 0.35 s are rounded up to 0.425 s; half a step more is beyond its margin of 0.1 s.
+        let error = check("paper", 0.085, &[ModelId::Reg157]).unwrap_err().to_string();
+        assert!(error.contains("reg157.margin_s") && error.contains("0.07 s"), "{error}");
+        for dt_s in [0.001, 0.01, 0.02, 0.033, 0.04, 0.05, 0.066, 0.07, 0.08, 0.0875, 0.09, 0.1] {
+            assert!(check("paper", dt_s, &ModelId::ALL).is_ok(), "{dt_s}");
+            assert!(check("un-r157", dt_s, &ModelId::ALL).is_ok(), "{dt_s}");
+        }
         let error = check("un-r157", 0.2, &[ModelId::Cchdm]).unwrap_err().to_string();
         assert!(error.contains("cchdm.perception_time_s") && error.contains("0.1333 s"), "{error}");
         // Without a delay the threshold bounds the step.

@@ -4,6 +4,7 @@ mod common;
 
 use std::sync::OnceLock;
 
+use lanesweep::criterion::Criterion;
 use lanesweep::density::{DataFacts, DensityModel, FitOptions, Mixture};
 use lanesweep::driver::{MODELS, ModelId};
 use lanesweep::gpu::{GpuBackend, GpuOptions};
@@ -16,8 +17,8 @@ use lanesweep::sampling::{
 };
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, SweepOptions, Wanted, sweep,
-    words,
+    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, StudyOptions, SweepOptions,
+    Wanted, plan_study, sweep, words,
 };
 use lanesweep::trajectory::generator::GeneratorOptions;
 
@@ -255,4 +256,58 @@ fn verdicts_of_samples_come_without_their_values_too() {
     let valued: Vec<Outcome<f64>> = session.run(0..2000, Wanted::Outcomes).unwrap().outcomes;
     assert!(verdicts.iter().zip(&valued).all(|(v, o)| *v == o.verdicts));
     assert!(verdicts.iter().any(|v| v.0 != 0));
+}
+
+/// Failures of samples, and of the scenarios that they come from, at finer and coarser steps: none vanish.
+#[test]
+fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
+    let backend = CpuBackend::lane_arithmetic();
+    let failures = |plan: &LanePlan| -> Vec<f64> {
+        let mut counts = vec![[0_u64; 3]; plan.models.len()];
+        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
+        for (lane, verdict) in chunk.verdicts.iter().enumerate() {
+            let of_model = &mut counts[lane % plan.models.len()];
+            for criterion in Criterion::ALL {
+                of_model[criterion.index()] += u64::from(verdict.failed(criterion));
+            }
+        }
+        counts.iter().flatten().map(|&count| count as f64 / chunk.verdicts.len() as f64).collect()
+    };
+    let densities: Vec<DensityModel> = [(Category::CutIn, "1"), (Category::CutOut, "a"), (Category::Lvd, "i")]
+        .into_iter()
+        .map(|(category, key)| density(ParameterizationId::find(category, key).unwrap(), false))
+        .collect();
+    let shares = |dt_s: f64| -> Vec<Vec<f64>> {
+        let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
+        let sampled = densities.iter().map(|density| {
+            let mixture = density.mixture().unwrap();
+            failures(&plan_samples(density, &mixture, &profile, &options(4000, SampleSource::Random)).unwrap())
+        });
+        let studied = Category::ALL.into_iter().map(|category| {
+            let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
+            failures(&plan_study(scenarios(), &profile, &study).unwrap().plan)
+        });
+        sampled.chain(studied).collect()
+    };
+    let known = shares(0.1);
+    assert!(known.iter().flatten().filter(|share| **share > 0.02).count() > 20, "{known:?}");
+    for dt_s in [0.02, 0.04, 0.07] {
+        for (at, (ours, known)) in shares(dt_s).iter().zip(&known).enumerate() {
+            for (share, known) in ours.iter().zip(known) {
+                let what = format!("plan {at}: {share} at {dt_s} s, {known} at 0.1 s");
+                assert!((share - known).abs() <= 0.02 + 0.25 * known, "{what}");
+                assert!(*share > 0.0 || *known < 0.02, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_has_no_more_samples_than_points() {
+    let density = density(ParameterizationId::find(Category::CutIn, "1").unwrap(), false);
+    let profile = Profile::load("paper").unwrap();
+    let mixture = density.mixture().unwrap();
+    let plan = |samples| plan_samples(&density, &mixture, &profile, &options(samples, SampleSource::Sobol));
+    assert!(plan(1 << 32).is_ok());
+    assert!(plan((1 << 32) + 1).is_err());
 }

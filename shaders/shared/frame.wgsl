@@ -124,9 +124,13 @@ fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
     let lateral = motion_lateral(other.motion, index);
     let lateral_gap = abs(lateral.position) - other.half_widths;
     let present = (other.used != 0u) & (index >= other.present_from) & (index < other.present_until);
-    let moved = before + (v_other - ego.v) * frame_dt;
-    let stops = present & (other.judged != 0u) & (lateral_gap < 0.0);
-    let after = select(moved, held_in_contact(before, moved, other.half_lengths), stops);
+    let way = (v_other - ego.v) * frame_dt;
+    var after = before + way;
+    // A shorter way leads no centre past another.
+    if abs(way + way) > other.half_lengths {
+        let stops = present & (other.judged != 0u) & (lateral_gap < 0.0);
+        after = select(after, held_in_contact(before, after, other.half_lengths), stops);
+    }
     let gap = select(before, after, (index > 0u) | frame_start_shift);
     let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths);
     let judged = present & (other.judged != 0u)

@@ -87,7 +87,7 @@ impl DriverProfile for CchdmProfile {
         ]
     }
 
-    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+    fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
         vec![("delay_s", delay_bound_s(self.delay_s)), ("perception_time_s", delay_bound_s(self.perception_time_s))]
     }
 

@@ -99,7 +99,7 @@ impl DriverProfile for FsmProfile {
         ]
     }
 
-    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+    fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
         vec![("reaction_time_s", delay_bound_s(self.reaction_time_s))]
     }
 }

@@ -15,7 +15,7 @@ mod attention;
 mod profile;
 
 pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
-pub use profile::{Bound, DriverProfile, delay_bound_s};
+pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
 
 use crate::flag::Flag;
 use crate::scalar::Real;

@@ -36,10 +36,18 @@ impl std::fmt::Display for Bound {
 /// Steps that a delay takes at least: rounded up to whole ones it is then longer by less than a third.
 const DELAY_STEPS: f64 = 3.0;
 
-/// Longest time step that a delay allows, s, in whole tenths of a millisecond; any where there is no delay.
+/// Time step up to which no delay bounds it, s: that of the simulators that the models come from.
+pub const SHORT_STEP_S: f64 = 0.1;
+
+/// Longest time step that a delay allows, s; any where there is no delay.
 pub fn delay_bound_s(delay_s: f64) -> f64 {
+    if delay_s > 0.0 { rounded_down_s(delay_s / DELAY_STEPS).max(SHORT_STEP_S) } else { f64::INFINITY }
+}
+
+/// A time step in whole tenths of a millisecond.
+pub(super) fn rounded_down_s(step_s: f64) -> f64 {
     // 0.6/3 lies below 0.2.
-    if delay_s > 0.0 { ((delay_s / DELAY_STEPS + 1e-9) * 1e4).floor() / 1e4 } else { f64::INFINITY }
+    ((step_s + 1e-9) * 1e4).floor() / 1e4
 }
 
 /// Constants of a driver model as a profile gives them.
@@ -53,8 +61,9 @@ pub trait DriverProfile {
     /// Constants with a range: key, value, range.
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)>;
 
-    /// What bounds the time step: key, longest step that it allows, s. [`delay_bound_s`] gives that of a delay.
-    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+    /// What bounds the time step `dt_s`: key, longest step that it allows, s. [`delay_bound_s`] gives that of a delay.
+    /// Derivation: docs/src/methods/lane.md, time step.
+    fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
         Vec::new()
     }
 

@@ -3,9 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::profile::rounded_down_s;
 use super::{
-    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps,
-    latched_braking,
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, SHORT_STEP_S, View, delay_bound_s,
+    delay_steps, latched_braking,
 };
 use crate::flag::Flag;
 use crate::scalar::Real;
@@ -71,14 +72,19 @@ impl DriverProfile for Reg157Profile {
         ]
     }
 
-    /// The margin has to make up for what whole steps add: the check sees a threshold up to a step late.
-    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
-        let delays = [
-            ("reaction_time_s", self.reaction_time_s),
-            ("visible_lateral_movement_s", self.visible_lateral_movement_s),
+    /// The margin has to make up for what whole steps add: half a step and what the reaction time is rounded up by.
+    fn time_step_bounds(&self, dt_s: f64) -> Vec<(&'static str, f64)> {
+        let steps = f64::from(delay_steps(self.reaction_time_s, dt_s));
+        let late_s = steps * dt_s - self.reaction_time_s + dt_s / 2.0;
+        let longest_s = self.margin_s.max(SHORT_STEP_S);
+        // A margin below half a step is for something else, such as 0 for the regulation's text.
+        let is_late = dt_s <= longest_s && self.margin_s >= dt_s / 2.0 && late_s > self.margin_s + 1e-9;
+        let margin_bound_s = if is_late { rounded_down_s(self.reaction_time_s / steps) } else { longest_s };
+        vec![
+            ("reaction_time_s", delay_bound_s(self.reaction_time_s)),
+            ("visible_lateral_movement_s", delay_bound_s(self.visible_lateral_movement_s)),
+            ("margin_s", margin_bound_s),
         ]
-        .map(|(key, delay_s)| (key, delay_bound_s(delay_s)));
-        delays.into_iter().chain([("margin_s", self.margin_s)]).collect()
     }
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {

@@ -92,7 +92,7 @@ impl DriverProfile for RssProfile {
         ]
     }
 
-    fn time_step_bounds(&self) -> Vec<(&'static str, f64)> {
+    fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
         vec![("response_time_s", delay_bound_s(self.response_time_s))]
     }
 }
