@@ -174,6 +174,27 @@ fn conformance_passes_on_the_golden_tables_and_fails_with_code_5_on_a_wrong_one(
     assert!(stderr(&bad).contains("line 2"), "{}", stderr(&bad));
 }
 
+/// A standing vehicle 20 m ahead of 50 m/s: every time step ends in its rear, or is refused with the longest one.
+#[test]
+fn no_time_step_lets_the_ego_drive_through_a_vehicle() {
+    let simulate = |dt: &str, model: &str| {
+        let case = ["--category", "lvd", "--ego-speed", "50", "--speed", "0", "--gap", "20", "--acceleration", "0"];
+        lanesweep(&[&["-q", "simulate", "--dt", dt, "--model", model], &case[..]].concat())
+    };
+    for dt in ["0.04", "0.1", "0.17", "0.2", "0.25"] {
+        let run = simulate(dt, "FSM");
+        let said = stderr(&run);
+        assert!(code(&run) == 0 && said.contains("Collision FAIL, TTC FAIL, BTN FAIL"), "{dt} s: {said}");
+        let table = String::from_utf8(run.stdout).unwrap();
+        assert!(table.lines().last().unwrap().ends_with(",contact"), "{dt} s");
+    }
+    for (dt, model, longest) in [("0.3", "FSM", "0.25 s"), ("0.2", "all", "0.1 s"), ("0.085", "Reg157", "0.07 s")] {
+        let run = simulate(dt, model);
+        let said = stderr(&run);
+        assert!(code(&run) == 2 && said.contains(&format!("at most {longest}")), "{dt} s, {model}: {said}");
+    }
+}
+
 #[test]
 fn wrong_words_are_answered_with_what_to_write_instead() {
     let dir = tempfile::tempdir().unwrap();
