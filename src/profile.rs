@@ -86,7 +86,7 @@ macro_rules! declare_profile {
         }
 
         impl Profile {
-            /// The constants of every driver model that have a range: key, value, range.
+            /// The numbers of every driver model: key, value, range.
             fn driver_bounds(&self) -> Vec<(String, f64, Bound)> {
                 let mut all = Vec::new();
                 $(
@@ -159,19 +159,19 @@ impl Profile {
         Ok(profile)
     }
 
-    /// The constants that have a range: key, value, range.
+    /// Every constant that is a number: key, value, range.
     pub(crate) fn bounds(&self) -> Vec<(String, f64, Bound)> {
         let (frame, criteria) = (&self.frame, &self.criteria);
         let own = [
-            ("frame.dt_s", frame.dt_s, Bound::Above(0.0)),
-            ("frame.time_cap_s", frame.time_cap_s, Bound::Above(0.0)),
-            ("frame.default_length_m", frame.default_length_m, Bound::Above(0.0)),
-            ("frame.default_width_m", frame.default_width_m, Bound::Above(0.0)),
-            ("frame.exposure_m", frame.exposure_m, Bound::AtLeast(0.0)),
-            ("criteria.ttc_threshold_s", criteria.ttc_threshold_s, Bound::Above(0.0)),
-            ("criteria.btn_threshold", criteria.btn_threshold, Bound::Above(0.0)),
-            ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::Above(0.0)),
-            ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::Above(0.0)),
+            ("frame.dt_s", frame.dt_s, Bound::TIME_STEP),
+            ("frame.time_cap_s", frame.time_cap_s, Bound::TIME_CAP),
+            ("frame.default_length_m", frame.default_length_m, Bound::SIZE),
+            ("frame.default_width_m", frame.default_width_m, Bound::SIZE),
+            ("frame.exposure_m", frame.exposure_m, Bound::DISTANCE),
+            ("criteria.ttc_threshold_s", criteria.ttc_threshold_s, Bound::TIME),
+            ("criteria.btn_threshold", criteria.btn_threshold, Bound::RATIO),
+            ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::DECELERATION),
+            ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::JERK),
         ];
         let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
         own.chain(self.driver_bounds()).collect()
@@ -184,7 +184,7 @@ impl Profile {
             return Err(Error::usage(
                 place.clone().of(format!("`{key}`")),
                 format!("{value} is not usable; expected {expected}"),
-                "see configs/profiles/paper.toml for usual values",
+                "the chapter on profiles has the range of every key, configs/profiles/paper.toml usual values",
             ));
         }
         if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
@@ -237,6 +237,11 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::ModelId;
+    use crate::random::philox4x32_10;
+    use crate::scenario::Category;
+    use crate::sweep::Constants;
+    use serde_json::Value;
 
     #[test]
     fn every_built_in_profile_is_complete_and_named_as_it_is_called() {
@@ -249,6 +254,100 @@ mod tests {
     fn a_misspelt_profile_is_answered_with_the_nearest_name() {
         let error = Profile::load("papr").unwrap_err();
         assert!(error.help().unwrap().contains("did you mean `paper`"), "{error:?}");
+    }
+
+    /// The numbers below a table, with their keys.
+    fn numbers(value: &Value, key: &str, each: &mut dyn FnMut(&str)) {
+        match value {
+            Value::Object(fields) => fields.iter().for_each(|(name, inner)| {
+                numbers(inner, &if key.is_empty() { name.clone() } else { format!("{key}.{name}") }, each);
+            }),
+            Value::Number(_) => each(key),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn every_number_of_a_profile_has_a_range_and_the_profiles_chapter_has_it() {
+        let profile = Profile::load("paper").unwrap();
+        let bounds = profile.bounds();
+        let mut left: Vec<&str> = bounds.iter().map(|(key, ..)| key.as_str()).collect();
+        numbers(&serde_json::to_value(&profile).unwrap(), "", &mut |key| {
+            let at = left.iter().position(|known| *known == key).unwrap_or_else(|| panic!("`{key}` has no range"));
+            left.remove(at);
+        });
+        assert_eq!(left, Vec::<&str>::new());
+        let chapter = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/methods/profiles.md");
+        let chapter = std::fs::read_to_string(chapter).unwrap();
+        let rows: Vec<String> = bounds.iter().map(|(key, _, bound)| format!("| `{key}` | {bound} |\n")).collect();
+        assert!(chapter.contains(&rows.concat()), "the chapter needs these rows:\n{}", rows.concat());
+    }
+
+    /// Ends of the ranges, 0 where it is allowed, and numbers between, in every mixture.
+    #[test]
+    fn a_profile_that_passes_gives_finite_normal_numbers_in_binary32() {
+        let paper = Profile::load("paper").unwrap();
+        let bounds = paper.bounds();
+        let mut value = serde_json::to_value(&paper).unwrap();
+        let (mut word, mut passed) = (157, 0);
+        let mut drawn = || {
+            word = philox4x32_10([word, 0, 0, 0], [10, 0])[0];
+            f64::from(word) / 2_f64.powi(32)
+        };
+        for _ in 0..4000 {
+            for (key, _, bound) in &bounds {
+                let size = match drawn() {
+                    u if u < 0.3 => bound.smallest,
+                    u if u < 0.6 => bound.largest,
+                    u if u < 0.7 && bound.has_zero => 0.0,
+                    u => bound.smallest * libm::pow(bound.largest / bound.smallest, u),
+                };
+                let number = if bound.has_negative && drawn() < 0.5 { -size } else { size };
+                assert!(bound.holds(number), "{key}: {number}");
+                let (table, name) = key.split_once('.').unwrap();
+                value[table][name] = serde_json::json!(number);
+            }
+            let profile: Profile = serde_json::from_value(value.clone()).unwrap();
+            if profile.check(&Place::item("drawn")).is_err() {
+                // Too many steps.
+                continue;
+            }
+            passed += 1;
+            for category in Category::ALL {
+                let constants = Constants::<f32>::resolve(&profile, category);
+                let of_models = ModelId::ALL.into_iter().flat_map(|id| constants.driver_shader_constants(id));
+                let of_frames = constants.frames.iter().flat_map(|frame| frame.shader_constants());
+                for (name, number) in of_models.chain(of_frames).chain(constants.criteria.shader_constants()) {
+                    let narrow = number as f32;
+                    assert!(narrow == 0.0 || narrow.is_normal(), "{name} = {number}: {profile:?}");
+                }
+            }
+        }
+        assert!(passed > 1000, "{passed}");
+    }
+
+    /// Key, value and range of what binary32 has no normal number for.
+    #[test]
+    fn constants_outside_binary32_are_refused_by_key() {
+        for (key, value) in [
+            ("fsm.comfortable_deceleration_mps2", 1e-300),
+            ("fsm.comfortable_deceleration_mps2", 1e300),
+            ("rss.lateral_margin_m", 1e-40),
+            ("cchdm.lateral_gate_m", -1e-42),
+            ("criteria.jerk_mps3", 1e-30),
+            ("frame.default_length_m", f64::INFINITY),
+        ] {
+            let mut table = toml::Value::try_from(Profile::load("paper").unwrap()).unwrap();
+            let (of, name) = key.split_once('.').unwrap();
+            table[of][name] = toml::Value::Float(value);
+            let text = toml::to_string(&table).unwrap();
+            let error = Profile::parse(&text, &Place::file(Path::new("own.toml"))).unwrap_err().to_string();
+            let bound =
+                Profile::load("paper").unwrap().bounds().into_iter().find(|(known, ..)| known == key).unwrap().2;
+            for part in ["own.toml", key, &value.to_string(), &bound.to_string()] {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+        }
     }
 
     #[test]

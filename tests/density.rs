@@ -553,13 +553,17 @@ fn white_space_may_change_but_lengths_must_fit() {
         ("/scale", serde_json::json!([1.0, 1.0]), "2 numbers"),
         ("/scale/1", serde_json::json!(-1.0), "not above 0"),
         ("/bandwidth/value", serde_json::json!(0.0), "bandwidth 0"),
+        ("/bandwidth/value", serde_json::json!(1e308), "1e308; expected 1e-9 to 1000"),
+        ("/scale/1", serde_json::json!(1e-300), "`c2` is 1e-300 1; expected 1e-9 to 1000000 1"),
+        ("/kernels/2/0", serde_json::json!(1e308), "kernel 3: `c1` is 1e308 1; expected −1000000 to 1000000 1"),
+        ("/sizes/target/width_m", serde_json::json!(1e39), "expected 0.1 to 100 m"),
         ("/basis/mean", serde_json::json!([1.0]), "a row of 1 numbers"),
         ("/basis/weights/7", serde_json::json!(0.0), "a weight is not above 0"),
         ("/basis", Value::Null, "needs a decomposition"),
         ("/parameterization", serde_json::json!("9"), "there is no `9`"),
         ("/parameters/0/unit", serde_json::json!("km"), "unit and bounds"),
         ("/p_valid/estimate", serde_json::json!(1.5), "no share"),
-        ("/sizes/ego/length_m", serde_json::json!(0.0), "no size"),
+        ("/sizes/ego/length_m", serde_json::json!(0.0), "expected 0.1 to 100 m"),
     ] {
         let mut file = good.clone();
         *file.pointer_mut(pointer).unwrap() = value;

@@ -56,10 +56,10 @@ impl DriverProfile for AebProfile {
 
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
         vec![
-            ("trigger_ttc_s", self.trigger_ttc_s, Bound::Above(0.0)),
-            ("delay_s", self.delay_s, Bound::AtLeast(0.0)),
-            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
-            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
+            ("trigger_ttc_s", self.trigger_ttc_s, Bound::TIME),
+            ("delay_s", self.delay_s, Bound::DELAY),
+            ("jerk_mps3", self.jerk_mps3, Bound::JERK),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
         ]
     }
 }

@@ -4,6 +4,7 @@
 //! The SHA-256 is that of the same object as compact JSON in the order of [`File`], with an empty
 //! `content_sha256`: white space may change, numbers may not.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,12 @@ const VERSION: u64 = 1;
 
 /// Largest file that is read: 10⁶ kernels of ten parameters fit.
 pub const LARGEST_FILE_BYTES: u64 = 256 << 20;
+
+/// Bandwidths of kernels whose scales are those of the parameters.
+const BANDWIDTHS: RangeInclusive<f64> = 1e-9..=1e3;
+
+/// Lengths and widths of vehicles, m.
+const SIZES_M: RangeInclusive<f64> = 0.1..=100.0;
 
 const REFIT: &str = "make the file again with `lanesweep fit`";
 
@@ -143,6 +150,24 @@ impl File {
             return wrong("scale", problem);
         }
         let kde = Kde::from_parts(self.kernels, self.scale, self.bandwidth).map_err(below)?;
+        for (j, parameter) in space.parameters().iter().enumerate() {
+            let ([smallest, largest], unit) = (parameter.physical_range(), &parameter.unit);
+            let of = |value: f64| format!("`{}` is {value:e} {unit}", parameter.name);
+            let scale = kde.scale()[j];
+            if !(smallest..=largest).contains(&scale) {
+                return wrong("scale", format!("{}; expected {smallest:e} to {largest} {unit}", of(scale)));
+            }
+            let kernel = kde.points().iter().enumerate().find(|(_, point)| point[j].abs() > largest);
+            if let Some((i, point)) = kernel {
+                let expected = format!("expected −{largest} to {largest} {unit}");
+                return wrong("kernels", format!("kernel {}: {}; {expected}", i + 1, of(point[j])));
+            }
+        }
+        if !BANDWIDTHS.contains(&kde.bandwidth().value) {
+            let problem =
+                format!("{:e}; expected {:e} to {}", kde.bandwidth().value, BANDWIDTHS.start(), BANDWIDTHS.end());
+            return wrong("bandwidth", problem);
+        }
         let outside = kde.points().iter().enumerate().find_map(|(i, p)| Some((i, space.check(p).err()?)));
         if let Some((i, invalid)) = outside {
             return wrong("kernels", format!("kernel {} is outside the valid region: {invalid}", i + 1));
@@ -153,8 +178,8 @@ impl File {
         }
         let sizes = [Some(self.sizes.ego), Some(self.sizes.target), self.sizes.lead];
         let lengths = sizes.into_iter().flatten().flat_map(|s| [s.length_m, s.width_m]);
-        if let Some(length) = lengths.into_iter().find(|v| !(v.is_finite() && *v > 0.0)) {
-            return wrong("sizes", format!("{length} m is no size"));
+        if let Some(length) = lengths.into_iter().find(|v| !SIZES_M.contains(v)) {
+            return wrong("sizes", format!("{length} m; expected {} to {} m", SIZES_M.start(), SIZES_M.end()));
         }
         if self.category == Category::CutOut && self.sizes.lead.is_none() {
             return wrong("sizes", "a cut-out needs the size of the vehicle ahead (`lead`)".to_owned());

@@ -8,6 +8,11 @@ use crate::parameterization::{LEAST_DURATION_S, ParameterizationOptions};
 /// series short where a deceleration comes out near 0.
 pub const LONGEST_DURATION_S: f64 = 600.0;
 
+/// Physical ranges of a density's numbers: unit, smallest scale of a parameter, largest size of a value or scale. Beyond,
+/// nothing drives, and the lane arithmetic (binary32) has no normal number.
+pub const PHYSICAL_RANGES: [(&str, f64, f64); 5] =
+    [("m/s", 1e-9, 200.0), ("m/s²", 1e-9, 100.0), ("m", 1e-9, 10_000.0), ("s", 1e-9, 1000.0), ("1", 1e-9, 1e6)];
+
 /// Meaning of one dimension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -64,6 +69,12 @@ impl Parameter {
             None => true,
         };
         value.is_finite() && above && self.upper.is_none_or(|upper| value <= upper)
+    }
+
+    /// Smallest scale and largest size of a value or scale, in its unit.
+    pub fn physical_range(&self) -> [f64; 2] {
+        let of_unit = PHYSICAL_RANGES.iter().find(|(unit, ..)| *unit == self.unit);
+        of_unit.map_or([f64::MIN_POSITIVE, f64::MAX], |&(_, smallest, largest)| [smallest, largest])
     }
 
     /// The bounds in words: `≥ 0`, `> 0`, `0.1 … 600`, `any`.

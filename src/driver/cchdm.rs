@@ -74,16 +74,16 @@ impl DriverProfile for CchdmProfile {
 
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
         vec![
-            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
-            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
-            ("ttc_s", self.ttc_s, Bound::AtLeast(0.0)),
-            ("delay_s", self.delay_s, Bound::AtLeast(0.0)),
-            ("coasting_mps2", self.coasting_mps2, Bound::AtLeast(0.0)),
-            ("wandering_m", self.wandering_m, Bound::AtLeast(0.0)),
-            ("perception_time_s", self.perception_time_s, Bound::AtLeast(0.0)),
-            ("perception_travel_m", self.perception_travel_m, Bound::AtLeast(0.0)),
-            ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::AtLeast(0.0)),
-            ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
+            ("jerk_mps3", self.jerk_mps3, Bound::JERK),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
+            ("ttc_s", self.ttc_s, Bound::DELAY),
+            ("delay_s", self.delay_s, Bound::DELAY),
+            ("coasting_mps2", self.coasting_mps2, Bound::ACCELERATION),
+            ("wandering_m", self.wandering_m, Bound::DISTANCE),
+            ("perception_time_s", self.perception_time_s, Bound::DELAY),
+            ("perception_travel_m", self.perception_travel_m, Bound::DISTANCE),
+            ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::ACCELERATION),
+            ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
         ]
     }
 

@@ -88,14 +88,14 @@ impl DriverProfile for FsmProfile {
 
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
         vec![
-            ("comfortable_deceleration_mps2", self.comfortable_deceleration_mps2, Bound::Above(0.0)),
-            ("max_surrogate_deceleration_mps2", self.max_surrogate_deceleration_mps2, Bound::Above(0.0)),
-            ("lead_deceleration_mps2", self.lead_deceleration_mps2, Bound::Above(0.0)),
-            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
-            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
-            ("reaction_time_s", self.reaction_time_s, Bound::AtLeast(0.0)),
-            ("margin_m", self.margin_m, Bound::AtLeast(0.0)),
-            ("lateral_gate_margin_s", self.lateral_gate_margin_s, Bound::AtLeast(0.0)),
+            ("comfortable_deceleration_mps2", self.comfortable_deceleration_mps2, Bound::DECELERATION),
+            ("max_surrogate_deceleration_mps2", self.max_surrogate_deceleration_mps2, Bound::DECELERATION),
+            ("lead_deceleration_mps2", self.lead_deceleration_mps2, Bound::DECELERATION),
+            ("jerk_mps3", self.jerk_mps3, Bound::JERK),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
+            ("reaction_time_s", self.reaction_time_s, Bound::DELAY),
+            ("margin_m", self.margin_m, Bound::DISTANCE),
+            ("lateral_gate_margin_s", self.lateral_gate_margin_s, Bound::DELAY),
         ]
     }
 

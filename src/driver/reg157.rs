@@ -64,11 +64,11 @@ impl DriverProfile for Reg157Profile {
 
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
         vec![
-            ("deceleration_mps2", self.deceleration_mps2, Bound::Above(0.0)),
-            ("reaction_time_s", self.reaction_time_s, Bound::AtLeast(0.0)),
-            ("margin_s", self.margin_s, Bound::AtLeast(0.0)),
-            ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::AtLeast(0.0)),
-            ("lateral_gate_m", self.lateral_gate_m, Bound::AtLeast(-100.0)),
+            ("deceleration_mps2", self.deceleration_mps2, Bound::DECELERATION),
+            ("reaction_time_s", self.reaction_time_s, Bound::DELAY),
+            ("margin_s", self.margin_s, Bound::DELAY),
+            ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::DELAY),
+            ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
         ]
     }
 

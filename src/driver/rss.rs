@@ -81,14 +81,14 @@ impl DriverProfile for RssProfile {
 
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
         vec![
-            ("ego_deceleration_mps2", self.ego_deceleration_mps2, Bound::Above(0.0)),
-            ("other_deceleration_mps2", self.other_deceleration_mps2, Bound::Above(0.0)),
-            ("lateral_acceleration_mps2", self.lateral_acceleration_mps2, Bound::Above(0.0)),
-            ("jerk_mps3", self.jerk_mps3, Bound::Above(0.0)),
-            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::Above(0.0)),
-            ("response_time_s", self.response_time_s, Bound::AtLeast(0.0)),
-            ("max_acceleration_mps2", self.max_acceleration_mps2, Bound::AtLeast(0.0)),
-            ("lateral_margin_m", self.lateral_margin_m, Bound::AtLeast(0.0)),
+            ("ego_deceleration_mps2", self.ego_deceleration_mps2, Bound::DECELERATION),
+            ("other_deceleration_mps2", self.other_deceleration_mps2, Bound::DECELERATION),
+            ("lateral_acceleration_mps2", self.lateral_acceleration_mps2, Bound::DECELERATION),
+            ("jerk_mps3", self.jerk_mps3, Bound::JERK),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
+            ("response_time_s", self.response_time_s, Bound::DELAY),
+            ("max_acceleration_mps2", self.max_acceleration_mps2, Bound::ACCELERATION),
+            ("lateral_margin_m", self.lateral_margin_m, Bound::DISTANCE),
         ]
     }
 

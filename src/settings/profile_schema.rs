@@ -50,10 +50,10 @@ fn of(values: &[&Value], files: &[&Value], name: &str, bounds: &[(String, Bound)
                 Value::Number(_) => "integer",
                 _ => "string",
             }});
-            match bounds.iter().find(|(key, _)| key == name) {
-                Some((_, Bound::Above(limit))) => schema["exclusiveMinimum"] = json!(limit),
-                Some((_, Bound::AtLeast(limit))) => schema["minimum"] = json!(limit),
-                None => (),
+            if let Some((_, bound)) = bounds.iter().find(|(key, _)| key == name) {
+                let [least, most] = bound.ends();
+                (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
+                schema["description"] = json!(bound.to_string());
             }
             let mut examples: Vec<&Value> = Vec::new();
             for value in values {
