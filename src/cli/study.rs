@@ -235,9 +235,9 @@ impl Study {
         forecast.lanes = plan.lane_count();
         // The counts of every unit, in the ledger and joined; every draw's counts of every cell.
         let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
-        let cell = size_of::<Confusion>() as u64;
-        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (cell + 2) + 100);
-        let draws = |block: &Block| study.facts.score.bootstrap_draws as u64 * cells_of(block) * cell;
+        let (of_unit, of_draw) = (size_of::<Confusion<u32>>() as u64, size_of::<Confusion>() as u64);
+        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
+        let draws = |block: &Block| study.facts.score.bootstrap_draws as u64 * cells_of(block) * of_draw;
         DryRun {
             data: study.facts.data.clone(),
             parts: dry_run::parts(plan),

@@ -93,7 +93,7 @@ fn units<'a>(
     partial: &'a Partial,
     block: usize,
     variant: usize,
-) -> Result<impl Iterator<Item = &'a [Confusion]>> {
+) -> Result<impl Iterator<Item = &'a [Confusion<u32>]>> {
     let of = &plan.blocks[block];
     if !partial.is_complete(plan) || variant >= of.variants.len() {
         return Err(Error::Internal("a comparison needs every lane of the study".to_owned()));
@@ -104,9 +104,9 @@ fn units<'a>(
     Ok(units.iter().map(move |unit| &unit.cells[variant * width..][..width]))
 }
 
-fn failures(confusion: &Confusion, variant: usize) -> u64 {
+fn failures(confusion: &Confusion<u32>, variant: usize) -> u64 {
     // Variant 0 is S against itself.
-    u64::from(if variant == 0 { confusion.both } else { confusion.both + confusion.only_s_prime })
+    u64::from(confusion.both) + if variant == 0 { 0 } else { u64::from(confusion.only_s_prime) }
 }
 
 /// Which of the category's kept scenarios each kernel of a density is.

@@ -38,7 +38,7 @@ impl ScoreOptions {
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
         let bad = |key: &str, problem: String, help: &str| Err(Error::usage(Place::item(key), problem, help));
-        // Every draw's counts are kept, about 1.5 kB each.
+        // Every draw's counts are kept, about 3 kB each.
         if !(20..=100_000).contains(&self.bootstrap_draws) {
             return bad("score.bootstrap_draws", format!("{} draws", self.bootstrap_draws), "use 20 to 100000");
         }
@@ -125,6 +125,15 @@ mod tests {
     fn a_cell_paired_with_its_equal_never_differs() {
         let draws = bootstrap_draws(&units(), 2, Category::CutIn, &ScoreOptions::default());
         assert!(draws.iter().all(|draw| draw[0] == draw[1]));
+    }
+
+    #[test]
+    fn the_counts_of_a_draw_pass_2_to_the_32() {
+        let cell = Confusion { both: u32::MAX, only_s: 1 << 31, only_s_prime: 3, neither: 0 };
+        let units: Vec<_> = (0..5).map(|unit| UnitCounts { unit, cells: vec![cell], capped: vec![] }).collect();
+        let all = Confusion { both: 5 * u64::from(u32::MAX), only_s: 5 << 31, only_s_prime: 15, neither: 0 };
+        let draws = bootstrap_draws(&units, 1, Category::Lvd, &ScoreOptions::default());
+        assert!(draws.iter().all(|draw| draw[0] == all), "every draw has five units");
     }
 
     #[test]

@@ -290,7 +290,7 @@ mod tests {
 
     /// Cut-out scores in which S fails as given per model (same for every criterion) and b and d differ from it
     /// as given; every draw equals the sample.
-    fn table(failures: [u32; 4], b: Confusion, d: Confusion) -> ScoreTable {
+    fn table(failures: [u64; 4], b: Confusion, d: Confusion) -> ScoreTable {
         let variants = ["S", "a", "b", "c", "d", "e", "f", "g"];
         let mut cells = Vec::new();
         for (variant, name) in variants.iter().enumerate() {

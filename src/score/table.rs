@@ -11,12 +11,12 @@ use crate::{Error, Place, Result};
 
 /// Recall TP/(TP + FN); `None` where S never fails.
 pub fn recall(c: &Confusion) -> Option<f64> {
-    ratio(c.both, c.both + c.only_s)
+    ratio(c.both as f64, c.both as f64 + c.only_s as f64)
 }
 
 /// Precision TP/(TP + FP); `None` where S' never fails.
 pub fn precision(c: &Confusion) -> Option<f64> {
-    ratio(c.both, c.both + c.only_s_prime)
+    ratio(c.both as f64, c.both as f64 + c.only_s_prime as f64)
 }
 
 /// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
@@ -30,11 +30,13 @@ pub fn precision(c: &Confusion) -> Option<f64> {
 /// assert_eq!(f1(&Confusion { both: 0, only_s: 0, only_s_prime: 0, neither: 100 }), None);
 /// ```
 pub fn f1(c: &Confusion) -> Option<f64> {
-    ratio(2 * c.both, 2 * c.both + c.only_s + c.only_s_prime)
+    let twice = 2.0 * c.both as f64;
+    ratio(twice, twice + c.only_s as f64 + c.only_s_prime as f64)
 }
 
-fn ratio(numerator: u32, denominator: u32) -> Option<f64> {
-    (denominator > 0).then(|| f64::from(numerator) / f64::from(denominator))
+/// In f64, where no sum wraps; sums below 2^53 are exact.
+fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
+    (denominator > 0.0).then(|| numerator / denominator)
 }
 
 /// One cell of the table.
@@ -168,6 +170,14 @@ mod tests {
         assert_eq!(recall(&c), Some(0.75));
         assert_eq!(precision(&c), Some(0.6));
         assert_eq!(f1(&c), Some(12.0 / 18.0));
+    }
+
+    #[test]
+    fn counts_past_2_to_the_32_score_as_their_shares_do() {
+        let c = Confusion { both: 6 << 40, only_s: 2 << 40, only_s_prime: 4 << 40, neither: 88 << 40 };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
+        let most = Confusion { both: u64::MAX, ..Confusion::default() };
+        assert_eq!(f1(&most), Some(1.0));
     }
 
     #[test]

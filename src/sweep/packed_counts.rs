@@ -14,10 +14,10 @@ const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz
 #[serde(untagged)]
 enum Packed {
     Text(String),
-    Numbers(Vec<Confusion>),
+    Numbers(Vec<Confusion<u32>>),
 }
 
-pub(super) fn serialize<S: Serializer>(cells: &[Confusion], serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn serialize<S: Serializer>(cells: &[Confusion<u32>], serializer: S) -> Result<S::Ok, S::Error> {
     let counts = || cells.iter().flat_map(|cell| <[u32; 4]>::from(*cell));
     let text: Option<String> = counts().map(|count| DIGITS.get(count as usize).map(|&digit| digit as char)).collect();
     match text {
@@ -26,7 +26,7 @@ pub(super) fn serialize<S: Serializer>(cells: &[Confusion], serializer: S) -> Re
     }
 }
 
-pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Confusion>, D::Error> {
+pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Confusion<u32>>, D::Error> {
     let text = match Packed::deserialize(deserializer)? {
         Packed::Numbers(cells) => return Ok(cells),
         Packed::Text(text) => text,
@@ -49,7 +49,7 @@ mod tests {
     #[derive(Debug, PartialEq, Serialize, Deserialize)]
     struct Unit {
         #[serde(with = "super")]
-        cells: Vec<Confusion>,
+        cells: Vec<Confusion<u32>>,
     }
 
     fn unit(counts: &[[u32; 4]]) -> Unit {

@@ -22,33 +22,37 @@ const VERSION: u64 = 3;
 
 /// Agreement of S' with S over the headways of one unit, variant, model and criterion. For variant 0 (S
 /// against itself) `both` counts the failures of S and `neither` its passes.
+///
+/// Sums are u64. The counts of one unit are u32, half the memory: they are at most its headways
+/// ([`Partial::from_chunk`] refuses a plan with more than u32 holds).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "[u32; 4]", into = "[u32; 4]")]
-pub struct Confusion {
+#[serde(from = "[N; 4]", into = "[N; 4]")]
+#[serde(bound(serialize = "N: Copy + Serialize", deserialize = "N: Deserialize<'de>"))]
+pub struct Confusion<N = u64> {
     /// TP: S and S' fail.
-    pub both: u32,
+    pub both: N,
     /// FN: only S fails.
-    pub only_s: u32,
+    pub only_s: N,
     /// FP: only S' fails.
-    pub only_s_prime: u32,
+    pub only_s_prime: N,
     /// TN: both pass.
-    pub neither: u32,
+    pub neither: N,
 }
 
 // Four numbers instead of four names: a unit of a study has a hundred of them.
-impl From<[u32; 4]> for Confusion {
-    fn from([both, only_s, only_s_prime, neither]: [u32; 4]) -> Confusion {
+impl<N> From<[N; 4]> for Confusion<N> {
+    fn from([both, only_s, only_s_prime, neither]: [N; 4]) -> Confusion<N> {
         Confusion { both, only_s, only_s_prime, neither }
     }
 }
 
-impl From<Confusion> for [u32; 4] {
-    fn from(c: Confusion) -> [u32; 4] {
+impl<N> From<Confusion<N>> for [N; 4] {
+    fn from(c: Confusion<N>) -> [N; 4] {
         [c.both, c.only_s, c.only_s_prime, c.neither]
     }
 }
 
-impl Confusion {
+impl Confusion<u32> {
     /// Counts one lane of S' against its lane of S.
     pub fn count(&mut self, s: bool, s_prime: bool) {
         match (s, s_prime) {
@@ -58,13 +62,15 @@ impl Confusion {
             (false, false) => self.neither += 1,
         }
     }
+}
 
-    /// Sum.
-    pub fn add(&mut self, other: &Confusion) {
-        self.both += other.both;
-        self.only_s += other.only_s;
-        self.only_s_prime += other.only_s_prime;
-        self.neither += other.neither;
+impl Confusion {
+    /// Adds the counts of a unit.
+    pub fn add(&mut self, unit: &Confusion<u32>) {
+        self.both += u64::from(unit.both);
+        self.only_s += u64::from(unit.only_s);
+        self.only_s_prime += u64::from(unit.only_s_prime);
+        self.neither += u64::from(unit.neither);
     }
 }
 
@@ -75,7 +81,7 @@ pub struct UnitCounts {
     pub unit: u64,
     /// One per variant × model × criterion.
     #[serde(with = "super::packed_counts")]
-    pub cells: Vec<Confusion>,
+    pub cells: Vec<Confusion<u32>>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u32>,
 }
@@ -138,6 +144,9 @@ impl Partial {
         chunk.check(plan)?;
         if !chunk.counts.is_empty() {
             return Err(Error::Internal("a chunk of counts has no lanes to compare".to_owned()));
+        }
+        if u32::try_from(plan.headways.len()).is_err() {
+            return Err(Error::Internal("a unit has more headways than u32 counts".to_owned()));
         }
         Ok(Partial::empty_keeping(plan, worst_limit).counting(plan, chunk))
     }
