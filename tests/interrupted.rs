@@ -2,11 +2,15 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lanesweep::interrupt;
+use lanesweep::profile::Profile;
+use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, Session, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::verify::{RandomOptions, random_plan};
 
 /// Longest wait for anything here; an unloaded machine needs a second or two.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -123,4 +127,66 @@ fn a_time_limit_and_a_request_are_seen_until_they_are_withdrawn() {
     interrupt::request();
     assert!(interrupt::requested());
     interrupt::withdraw();
+}
+
+/// Says what it was asked for and computes nothing; its chunks are those of the CPU.
+struct Asked(Box<dyn Backend>);
+
+struct AskedSession<'p>(&'p LanePlan, Box<dyn Session + 'p>);
+
+impl Backend for Asked {
+    fn describe(&self) -> String {
+        "a backend that computes nothing".to_owned()
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> lanesweep::Result<Box<dyn Session + 'p>> {
+        Ok(Box::new(AskedSession(plan, self.0.prepare(plan)?)))
+    }
+}
+
+impl Session for AskedSession<'_> {
+    fn run(&mut self, units: Range<u64>, _: Wanted) -> lanesweep::Result<Chunk> {
+        let first_lane = self.0.first_lane_of(units.start);
+        let verdicts = vec![Verdicts::default(); (self.0.first_lane_of(units.end) - first_lane) as usize];
+        Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), counts: Vec::new() })
+    }
+
+    fn chunk_lanes(&self, wanted: Wanted) -> u64 {
+        self.1.chunk_lanes(wanted)
+    }
+}
+
+/// A run looks between two chunks whether it is to end. The work of a chunk is bounded in lane-steps, whatever the time
+/// step: per thread 2^29 in batches and 2^25 of single lanes, or one unit where it has more.
+#[test]
+fn the_work_between_two_looks_is_bounded_whatever_the_time_step() {
+    let backends: [(fn() -> Box<dyn Backend>, u64); 3] = [
+        (|| Box::new(CpuBackend::lane_arithmetic()), 1 << 29),
+        (|| Box::new(CpuBackend::scalar()), 1 << 25),
+        (|| Box::new(CpuBackend::reference()), 1 << 25),
+    ];
+    for dt_s in [1.0, 0.1, 0.04, 0.01, 0.001, 0.0001] {
+        let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
+        let options = RandomOptions { lanes_per_model_and_category: 50, ..Default::default() };
+        let plan = random_plan(&profile, &options).unwrap();
+        let steps = u64::from(plan.profile.step_cap());
+        for (backend, bound) in &backends {
+            for threads in [1, 2] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut units = 0;
+                let run = || {
+                    let how = SweepOptions::plain(Wanted::Verdicts);
+                    sweep(&plan, 0..plan.unit_count(), &Asked(backend()), &how, |chunk| {
+                        let work = chunk.lanes() * steps;
+                        let in_chunk = chunk.units.end - chunk.units.start;
+                        assert!(work <= bound * threads as u64 || in_chunk == 1, "{dt_s} s: {work} lane-steps");
+                        units += in_chunk;
+                        Ok(())
+                    })
+                };
+                pool.install(run).unwrap();
+                assert_eq!(units, plan.unit_count());
+            }
+        }
+    }
 }

@@ -165,8 +165,7 @@ impl Compare {
         }
         make_folder(&self.out)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
-        let recheck = opened.device().map(|_| self.seed);
-        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck };
+        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: self.seed };
         let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
 
         let run = Run {
@@ -355,9 +354,8 @@ impl Run<'_> {
             headways: SampleHeadways::Each(self.headways.clone()),
         };
         let plan = plan_samples(&density, &density.mixture()?, self.profile, &options)?;
-        let recheck = self.opened.device().map(|_| Recheck::new(&plan, self.flags.seed, ONE_IN));
-        let lanes =
-            Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: recheck.as_ref() };
+        let recheck = Recheck::new(&plan, self.flags.seed, ONE_IN);
+        let lanes = Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: Some(&recheck) };
         let kernels = kernel_scenarios(&density, self.scenarios)?;
         let scenarios = self.study.blocks[block].units.len() as usize;
         let exposure = density.exposure.as_ref();

@@ -151,8 +151,7 @@ impl Map {
         if self.dry_run {
             return forecast_maps(&planned, backend, self.format);
         }
-        let recheck_seed = opened.device().map(|_| RECHECK_SEED);
-        let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed };
+        let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed: Some(RECHECK_SEED) };
         let is_jrc = self.preset.is_some()
             && criterion == Criterion::Collision
             && profile == Profile::load(presets::JRC_PROFILE)?;

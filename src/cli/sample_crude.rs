@@ -72,8 +72,8 @@ pub(super) fn run(
     // Rows are written on the way: a run that writes them begins anew.
     let is_journalled = flags.rows.is_none();
     let mut work = desk.begin::<SampleTally>(&checkpoints(plan.unit_count()), is_journalled)?;
-    let recheck = opened.device().map(|_| Recheck::new(plan, planned.facts.seed, ONE_IN));
-    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+    let recheck = Recheck::new(plan, planned.facts.seed, ONE_IN);
+    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: Some(&recheck) };
     let counting = planned.counting();
     tracing::info!("{} samples on {}", count(work.units.end - work.units.start), lanes.backend.describe());
     if work.units.is_empty() {

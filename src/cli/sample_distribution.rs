@@ -109,8 +109,8 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     make_folder(&flags.out)?;
     sample_lanes::check_writable(&flags.out)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
-    let recheck = opened.device().map(|_| Recheck::new(&plan, seed, ONE_IN));
-    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: recheck.as_ref() };
+    let recheck = Recheck::new(&plan, seed, ONE_IN);
+    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: Some(&recheck) };
     let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
     let options = CrudeOptions {
         stop: StopRule {

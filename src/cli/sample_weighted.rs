@@ -20,14 +20,25 @@ use crate::readable::count;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
-use crate::sweep::Forecast;
+use crate::sweep::{Forecast, lanes_within_seconds};
 use crate::{Error, Place, Result, interrupt};
 
 /// Memory of a sample while it is judged (point, case, motion, outcome), bytes, measured.
 const BYTES_PER_SAMPLE: u64 = 280;
 
-/// Samples that are judged between two looks at the journal.
+/// Samples that are judged between two looks at the journal, at most.
 const CHUNK: u64 = 1 << 16;
+
+/// Kernels up to which weighing so many samples takes about a second.
+const KERNELS: u64 = 1 << 10;
+
+/// Samples between two looks at the journal and at a signal: so few that they take seconds, whatever a lane costs. A
+/// power of two, as the sums' tree has it.
+fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
+    let judged = lanes_within_seconds(step_cap) / models.max(1);
+    let weighed = CHUNK / (kernels / KERNELS).max(1);
+    1 << judged.min(weighed).min(CHUNK).max(1).ilog2()
+}
 
 /// Samples what was planned: the whole run, or a shard of it.
 pub(super) fn run(
@@ -76,10 +87,18 @@ pub(super) fn run(
     Ok(Exit::Ok)
 }
 
+impl PlannedWeighted {
+    fn chunk_samples(&self) -> u64 {
+        let facts = &self.facts;
+        let kernels = self.density.kde.points().len();
+        chunk_samples(facts.profile.step_cap(), facts.models.len() as u64, kernels as u64)
+    }
+}
+
 /// What the run would be: drawing and weighing cost more than the lanes, so all of it is measured.
 fn forecast(planned: &PlannedWeighted, opened: &Opened, format: FormatFlag) -> Result<Exit> {
     let (facts, density) = (&planned.facts, &planned.density);
-    let most = facts.samples.min(CHUNK);
+    let most = facts.samples.min(planned.chunk_samples());
     let (mut samples, mut took) = (most.min(256), 0.0);
     loop {
         let started = Instant::now();
@@ -134,11 +153,11 @@ fn sample(
         backend: opened.backend(),
         fallback: opened.fallback(),
     };
-    let units = ledger.units();
+    let (units, chunk) = (ledger.units(), planned.chunk_samples());
     for missing in ledger.missing(units)? {
         let mut at = missing.start;
         while at < missing.end {
-            let next = (at / CHUNK + 1).saturating_mul(CHUNK).min(missing.end);
+            let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
             let sums_of = |&model: &ModelId| {
                 Ok((model, importance_sums(&nominal, &proposal, &lanes_of(model), facts.seed, at..next)?))
             };
@@ -194,4 +213,22 @@ fn write_run(
     format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A look at the signal comes after a bounded number of lane-steps and of weighed kernels, whatever the time step.
+    #[test]
+    fn a_chunk_is_bounded_by_its_work() {
+        for step_cap in [1, 349, 3000, 120_000, 1_200_000, 4_000_000] {
+            for (models, kernels) in [(1, 10), (4, 300), (4, 1_000_000)] {
+                let samples = chunk_samples(step_cap, models, kernels);
+                let lanes = lanes_within_seconds(step_cap);
+                assert!(samples.is_power_of_two() && (samples * models <= lanes || samples == 1), "{samples}");
+                assert!(samples * kernels <= CHUNK * 2 * KERNELS, "{samples}");
+            }
+        }
+    }
 }

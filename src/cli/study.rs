@@ -267,8 +267,7 @@ impl Study {
         let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let recheck = opened.device().map(|_| study.facts.score.seed);
-        let how = How { backend, fallback: opened.fallback(), recheck };
+        let how = How { backend, fallback: opened.fallback(), recheck: study.facts.score.seed };
         let desk =
             Desk { out: &self.out, run_sha256: &run_sha256, shard: self.shards.shard, unit_count: plan.unit_count() };
         if desk.is_done::<Partial>()? {

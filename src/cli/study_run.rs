@@ -32,7 +32,7 @@ pub(super) struct How<'a> {
     pub backend: &'a dyn Backend,
     pub fallback: Option<&'a dyn Backend>,
     /// Seed of the lanes that are checked.
-    pub recheck: Option<u64>,
+    pub recheck: u64,
 }
 
 impl How<'_> {
@@ -50,8 +50,8 @@ impl How<'_> {
     ) -> Result<SweepSummary> {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         study.in_windows(units, self.window(), |plan, units| {
-            let recheck = self.recheck.map(|seed| Recheck::new(plan, seed, ONE_IN));
-            let options = SweepOptions { wanted, fallback: self.fallback, recheck: recheck.as_ref() };
+            let recheck = Recheck::new(plan, self.recheck, ONE_IN);
+            let options = SweepOptions { wanted, fallback: self.fallback, recheck: Some(&recheck) };
             summary.add(&sweep(plan, units, self.backend, &options, |chunk| each(plan, chunk))?);
             Ok(())
         })?;
@@ -63,8 +63,8 @@ impl How<'_> {
 pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
-    let recheck = how.recheck.map(|seed| Recheck::new(plan, seed, ONE_IN));
-    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
+    let recheck = Recheck::new(plan, how.recheck, ONE_IN);
+    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: Some(&recheck) };
     let summary = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         parts.push(Partial::from_chunk(plan, &chunk)?);

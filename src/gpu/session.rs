@@ -16,8 +16,12 @@ use crate::scenario::{Category, Tables};
 use crate::sweep::{CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::{Error, Result};
 
-/// A chunk is several jobs long, so that the ring stays full.
+/// A chunk is several jobs long, so that the ring stays full: about three seconds with four models. Until a job has been
+/// timed it is one job.
 const JOBS_PER_CHUNK: u64 = 8;
+
+/// Steps per model of the first job, should each lane make every step.
+const FIRST_STEPS: u64 = 1 << 26;
 
 pub(super) struct GpuSession<'p> {
     plan: &'p LanePlan,
@@ -64,7 +68,7 @@ impl<'p> GpuSession<'p> {
         let (reply, answer) = mpsc::channel();
         commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
         let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
-        let pacer = Pacer::new(first_lanes);
+        let pacer = Pacer::new(first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
         Ok(GpuSession { plan, device, commands, prepared, constants, pacer, window: None, device_s: 0.0 })
     }
 
@@ -201,7 +205,8 @@ impl Session for GpuSession<'_> {
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {
         let most = if wanted == Wanted::Outcomes { 1 << 20 } else { 1 << 27 };
-        (self.pacer.lanes() * self.plan.models.len() as u64 * JOBS_PER_CHUNK).clamp(1 << 17, most)
+        let jobs = if self.device_s > 0.0 { JOBS_PER_CHUNK } else { 1 };
+        (self.pacer.lanes() * self.plan.models.len() as u64 * jobs).clamp(1, most)
     }
 
     fn device_seconds(&self) -> Option<f64> {

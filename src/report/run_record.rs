@@ -71,7 +71,7 @@ impl DeviceRecord {
 /// How the sweep went.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepRecord {
-    /// Lanes of the device that the CPU computed again, all equal.
+    /// Lanes that the CPU computed again with every step made, all equal.
     pub rechecked_lanes: u64,
     /// Seed of their choice.
     pub recheck_seed: u64,

@@ -103,7 +103,7 @@ pub struct HostRecord {
     pub backend: String,
     /// The device, where one did.
     pub device: Option<DeviceRecord>,
-    /// Lanes that were computed again on the CPU, all equal.
+    /// Lanes that were computed again on the CPU with every step made, all equal.
     pub rechecked_lanes: u64,
     /// Wall clock, s.
     pub seconds: f64,

@@ -201,8 +201,8 @@ impl StudyReport {
         host.push((
             "checked".to_owned(),
             match run.sweep.rechecked_lanes {
-                0 => "no lane of a device".to_owned(),
-                lanes => format!("{} lanes of the device computed again on the CPU, all equal", count(lanes)),
+                0 => "no lane: every one made every step by itself".to_owned(),
+                lanes => format!("{} lanes computed again on the CPU with every step made, all equal", count(lanes)),
             },
         ));
         let seconds = &run.timings;

@@ -130,8 +130,23 @@ impl Chunk {
     }
 }
 
+/// How one lane in so many of a backend is [computed again](super::Recheck).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecheckBy {
+    /// Not at all: its lanes are single lanes of the CPU or make every step in its batches.
+    Nothing,
+    /// In batches of the CPU that make every step, some of them as single lanes: what steps are left out by is checked.
+    Batches,
+    /// As single lanes of the CPU, which take no promise of a driver model.
+    Lanes,
+}
+
 /// A place where lanes are computed.
 pub trait Backend: Send + Sync {
+    /// How a sample of its lanes is checked where a sweep is given a [`Recheck`](super::Recheck).
+    fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
+        RecheckBy::Lanes
+    }
     /// One line: what computes, with how many threads or on which device, in which arithmetic.
     fn describe(&self) -> String;
     /// Uploads or casts what the plan holds, once.
@@ -142,11 +157,9 @@ pub trait Backend: Send + Sync {
 pub trait Session {
     /// Computes all lanes of an interval of units. On an error the interval can be given to another session.
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk>;
-    /// Lanes that one call should hold: enough to keep the backend busy, little enough to show progress.
-    /// Results do not depend on it.
-    fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
-        1 << 17
-    }
+    /// Lanes that one call should hold: enough to keep the backend busy, and so few that it ends within seconds, because
+    /// a run looks between its calls whether it is to end. Results do not depend on it.
+    fn chunk_lanes(&self, _wanted: Wanted) -> u64;
     /// Time that the device itself has computed so far, s, where it can tell.
     fn device_seconds(&self) -> Option<f64> {
         None

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::backend::{Backend, CellCounts, Chunk, Session, Wanted};
+use super::backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
 use super::instructions::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
@@ -24,6 +24,23 @@ const SMALL_TASK: u64 = 2048;
 const TASKS_PER_THREAD: u64 = 4;
 /// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
 const TASK_ENTRIES: u64 = 1 << 24;
+
+/// Steps per thread of the lanes of a chunk, should each make every step: about two seconds in batches, one or two as
+/// single lanes, up to five where their criterion iterates.
+const CHUNK_STEPS: u64 = 1 << 29;
+const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
+/// Lanes of a chunk at most.
+const CHUNK_LANES: u64 = 1 << 17;
+
+/// Lanes, of so many steps at most, that all threads together compute in batches within seconds; at least one.
+pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
+    lanes_of_steps(CHUNK_STEPS, step_cap)
+}
+
+fn lanes_of_steps(steps_per_thread: u64, step_cap: u32) -> u64 {
+    let threads = rayon::current_num_threads() as u64;
+    (steps_per_thread.saturating_mul(threads) / u64::from(step_cap.max(1))).clamp(1, CHUNK_LANES)
+}
 
 /// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
 #[derive(Debug)]
@@ -76,6 +93,12 @@ impl<R: Real> CpuBackend<R> {
 }
 
 impl Backend for CpuBackend<f32> {
+    /// Steps are left out for verdicts alone.
+    fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
+        let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
+        if wanted == Wanted::Verdicts && !makes_every_step { RecheckBy::Batches } else { RecheckBy::Nothing }
+    }
+
     fn describe(&self) -> String {
         self.description()
     }
@@ -85,12 +108,17 @@ impl Backend for CpuBackend<f32> {
         if instructions == Instructions::Scalar {
             return Ok(Box::new(lane_by_lane(plan, runner)));
         }
+        let in_batches = runner.runs_in_batches(instructions);
         let run = InBatches { runner, instructions };
-        Ok(Box::new(CpuSession { plan, run, in_batches: true, arithmetic: PhantomData }))
+        Ok(Box::new(CpuSession { plan, run, in_batches, arithmetic: PhantomData }))
     }
 }
 
 impl Backend for CpuBackend<f64> {
+    fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
+        RecheckBy::Nothing
+    }
+
     fn describe(&self) -> String {
         self.description()
     }
@@ -177,6 +205,11 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
 }
 
 impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
+    fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
+        let steps = if self.in_batches { CHUNK_STEPS } else { CHUNK_STEPS_OF_SINGLE_LANES };
+        lanes_of_steps(steps, self.plan.profile.step_cap())
+    }
+
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
         let run = &self.run;

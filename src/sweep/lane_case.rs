@@ -5,7 +5,7 @@ pub use crate::driver::NEVER;
 use crate::driver::{AttentionRule, DriverProfile, MODELS};
 use crate::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::scalar::Real;
-use crate::scenario::{Case, Category, Lateral, Motion, Participant, Speed, Tables};
+use crate::scenario::{Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables};
 
 /// One other vehicle of a lane.
 #[repr(C)]
@@ -96,6 +96,24 @@ impl LaneCase<f64> {
             horizon: self.horizon,
             pair: self.pair,
         }
+    }
+
+    /// The same; the series that it takes from `all` go to the end of `tables`.
+    pub(super) fn cast_with_series<R: Real>(&self, all: &Tables<f64>, tables: &mut Tables<R>) -> LaneCase<R> {
+        let mut case: LaneCase<R> = self.cast();
+        for LaneOther { motion, .. } in &mut case.others {
+            if motion.kind & SPEED_SAMPLED != 0 {
+                let series = &all.speed[motion.speed_offset as usize..][..motion.speed_len as usize];
+                motion.speed_offset = tables.speed.len() as u32;
+                tables.speed.extend(series.iter().map(|&v| R::from_f64(v)));
+            }
+            if motion.kind & LATERAL_SAMPLED != 0 {
+                let series = &all.lateral[motion.lateral_offset as usize..][..motion.lateral_len as usize];
+                motion.lateral_offset = tables.lateral.len() as u32;
+                tables.lateral.extend(series.iter().map(|state| state.map(R::from_f64)));
+            }
+        }
+        case
     }
 }
 

@@ -42,8 +42,9 @@ mod units;
 mod waiting;
 mod window;
 
-pub use backend::{Backend, CellCounts, Chunk, Session, Wanted};
+pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
 pub use cpu::CpuBackend;
+pub(crate) use cpu::lanes_within_seconds;
 pub use drivers::Constants;
 pub use ending::Ending;
 pub use engine::ENGINE_VERSION;

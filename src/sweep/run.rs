@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::backend::{Backend, Chunk, Session, Wanted};
+use super::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
 use super::plan::LanePlan;
 use super::recheck::Recheck;
 use crate::{Error, Result};
@@ -15,7 +15,7 @@ pub struct SweepOptions<'a> {
     pub wanted: Wanted,
     /// Computes what the first backend cannot.
     pub fallback: Option<&'a dyn Backend>,
-    /// Checks a sample of the first backend's lanes.
+    /// Checks a sample of the lanes, as [`Backend::rechecked_by`] says.
     pub recheck: Option<&'a Recheck<'a>>,
 }
 
@@ -31,11 +31,11 @@ impl SweepOptions<'_> {
 pub struct SweepSummary {
     /// Lanes computed.
     pub lanes: u64,
-    /// Chunks that the first backend could not compute and the fallback did.
+    /// Chunks of the fallback, of what the first backend could not compute.
     pub redone_chunks: u64,
     /// Their lanes.
     pub redone_lanes: u64,
-    /// Lanes of the first backend that were computed again on the CPU, all equal.
+    /// Lanes that were computed again on the CPU with every step made, all equal.
     pub rechecked_lanes: u64,
     /// Time that the device itself computed, s, where it can tell.
     pub device_s: Option<f64>,
@@ -77,46 +77,55 @@ pub fn sweep(
         (Err(error), None) => return Err(error),
     };
     let mut from = units.start;
+    // The backend is not asked for units before this one.
+    let mut redo_until = if session.is_some() { units.start } else { units.end };
     while from < units.end {
-        let lanes = session.as_ref().or(redo.as_ref()).map_or(1 << 17, |s| s.chunk_lanes(wanted));
-        let range = from..next_cut(plan, from, units.end, lanes);
-        from = range.end;
-        let computed = session.as_mut().map(|s| chunk_and_samples(plan, s.as_mut(), range.clone(), wanted, recheck));
-        let chunk = match (computed, fallback) {
-            (Some(Ok((chunk, samples))), _) => {
-                if let Some(recheck) = recheck {
-                    let device = backend.describe();
-                    summary.rechecked_lanes += recheck.check(&chunk, &device)?;
-                    for sample in &samples {
-                        summary.rechecked_lanes += recheck.check_all(sample, &device)?;
+        if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
+            let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted));
+            let by = backend.rechecked_by(wanted);
+            match (chunk_and_samples(plan, session.as_mut(), range.clone(), wanted, recheck, by), fallback) {
+                (Ok((chunk, samples)), _) => {
+                    if let Some(recheck) = recheck {
+                        let name = backend.describe();
+                        summary.rechecked_lanes += recheck.check(&chunk, &name, by)?;
+                        for sample in &samples {
+                            summary.rechecked_lanes += recheck.check_all(sample, &name, by)?;
+                        }
                     }
+                    summary.lanes += chunk.lanes();
+                    each(chunk)?;
+                    from = range.end;
+                    continue;
                 }
-                chunk
+                (Err(error), Some(fallback)) => {
+                    if redo.is_none() {
+                        let name = fallback.describe();
+                        tracing::warn!("{error}; {name} computes this part, and what else the device cannot");
+                    }
+                    redo_until = range.end;
+                }
+                (Err(error), None) => return Err(error),
             }
-            (failed, Some(fallback)) => {
-                if let Some(Err(error)) = failed
-                    && redo.is_none()
-                {
-                    let name = fallback.describe();
-                    tracing::warn!("{error}; {name} computes this part, and what else the device cannot");
-                }
-                if redo.is_none() {
-                    redo = Some(fallback.prepare(plan)?);
-                }
-                let Some(session) = redo.as_mut() else {
-                    return Err(Error::Internal("the fallback has no session".to_owned()));
-                };
-                let chunk = session.run(range.clone(), wanted)?;
-                chunk.check_asked(plan, &range, wanted)?;
-                summary.redone_chunks += 1;
-                summary.redone_lanes += chunk.lanes();
-                chunk
-            }
-            (Some(Err(error)), None) => return Err(error),
-            (None, None) => return Err(Error::Internal("the sweep has no backend".to_owned())),
+        }
+        let Some(fallback) = fallback else {
+            return Err(Error::Internal("the sweep has no backend".to_owned()));
         };
+        let session = match &mut redo {
+            Some(session) => session,
+            none => none.insert(fallback.prepare(plan)?),
+        };
+        let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted));
+        let chunk = session.run(range.clone(), wanted)?;
+        chunk.check_asked(plan, &range, wanted)?;
+        if let Some(recheck) = recheck {
+            let by = fallback.rechecked_by(wanted);
+            summary.rechecked_lanes += recheck.check(&chunk, &fallback.describe(), by)?;
+        }
+        summary.redone_chunks += 1;
+        summary.redone_lanes += chunk.lanes();
         summary.lanes += chunk.lanes();
         each(chunk)?;
+        from = range.end;
     }
     summary.device_s = session.as_ref().and_then(|s| s.device_seconds());
     Ok(summary)
@@ -130,10 +139,12 @@ fn chunk_and_samples(
     units: Range<u64>,
     wanted: Wanted,
     recheck: Option<&Recheck>,
+    by: RecheckBy,
 ) -> Result<(Chunk, Vec<Chunk>)> {
     let chunk = session.run(units.clone(), wanted)?;
     chunk.check_asked(plan, &units, wanted)?;
-    let Some(recheck) = recheck.filter(|_| wanted == Wanted::Counts) else { return Ok((chunk, Vec::new())) };
+    let has_no_lane = wanted == Wanted::Counts && by != RecheckBy::Nothing;
+    let Some(recheck) = recheck.filter(|_| has_no_lane) else { return Ok((chunk, Vec::new())) };
     let samples = recheck.units(units).map(|unit| session.run(unit..unit + 1, Wanted::Verdicts));
     Ok((chunk, samples.collect::<Result<_>>()?))
 }

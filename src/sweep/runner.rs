@@ -10,7 +10,7 @@ use super::frame::Start;
 use super::instructions::Instructions;
 use super::lane::Silent;
 use super::lane_case::LaneCase;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
 use super::scene::{Scene, may_cross};
 use super::series::Series;
@@ -22,10 +22,12 @@ use crate::scenario::Tables;
 /// Runs lanes of a plan one by one, in the arithmetic `R`.
 pub struct LaneRunner<'p, R> {
     plan: &'p LanePlan,
+    /// All series, rounded; empty where each case brings its own.
     tables: Tables<R>,
     /// One per block.
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
+    has_tables: bool,
     /// Lanes do no more than batches for verdicts.
     as_in_batches: bool,
     /// Batches spare nothing.
@@ -37,9 +39,16 @@ pub struct LaneRunner<'p, R> {
 impl<'p, R: Real> LaneRunner<'p, R> {
     /// Rounds what the plan holds, once.
     pub fn new(plan: &'p LanePlan) -> Self {
+        let tables = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
+        LaneRunner { tables, has_tables: true, ..LaneRunner::of_few(plan) }
+    }
+
+    /// Rounds what each lane needs when it runs: for a few lanes, whose plan's series need not lie in memory twice.
+    pub(super) fn of_few(plan: &'p LanePlan) -> Self {
         LaneRunner {
             plan,
-            tables: if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() },
+            tables: Tables::default(),
+            has_tables: false,
             constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
             starts: plan.headways.iter().map(|h| h.start()).collect(),
             as_in_batches: false,
@@ -80,13 +89,19 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
     /// A case and the tables that it points into.
     pub(crate) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+        if self.has_tables && self.plan.generator().is_none() {
+            return (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables));
+        }
+        let mut tables = Tables::default();
+        let case = self.case_with_series(block, unit, variant, &mut tables);
+        (case, Cow::Owned(tables))
+    }
+
+    /// A case whose series go to the end of `tables`.
+    fn case_with_series(&self, block: usize, unit: u64, variant: usize, tables: &mut Tables<R>) -> LaneCase<R> {
         match self.plan.generator() {
-            Some(generator) => {
-                let mut tables = Tables::default();
-                let case = generator.case(unit, &mut tables);
-                (case, Cow::Owned(tables))
-            }
-            None => (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables)),
+            Some(generator) => generator.case(unit, tables),
+            None => self.plan.case(block, unit, variant).cast_with_series(self.plan.tables(), tables),
         }
     }
 
@@ -150,8 +165,8 @@ impl LaneRunner<'_, f32> {
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
         let may_cross = unrolled.iter().any(|case| may_cross(case, tables, self.dt()));
-        let (cases, tracks, starts) = (&cases[..], &tracks[..], &self.starts[..]);
-        let stream = Lanes { cases, tracks, starts, every_step: self.every_step, may_cross };
+        let (starts, every_step) = (&self.starts[..], self.every_step);
+        let stream = Lanes { cases: &cases, tracks: &tracks, starts, one_start_each: false, every_step, may_cross };
         let models = self.plan.models.len();
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
@@ -164,6 +179,31 @@ impl LaneRunner<'_, f32> {
         if let Ok(mut spare) = self.spare.lock() {
             spare.push(series);
         }
+    }
+
+    /// Do all lanes run in batches on these instructions? Some criteria iterate and run lane by lane.
+    pub(super) fn runs_in_batches(&self, instructions: Instructions) -> bool {
+        self.constants.iter().all(|constants| constants.run_in_batches(instructions))
+    }
+
+    /// Chosen lanes of one block and model in a batch that makes every step; one by one where they do not run in
+    /// batches. Gives the verdicts with their position in `keys`.
+    pub(super) fn run_keys(&self, instructions: Instructions, keys: &[LaneKey], mut each: impl FnMut(usize, Verdicts)) {
+        let Some(&LaneKey { block, model, .. }) = keys.first() else { return };
+        let constants = &self.constants[block];
+        if !constants.run_in_batches(instructions) {
+            return keys.iter().enumerate().for_each(|(at, key)| each(at, self.run(key).verdicts));
+        }
+        let mut tables = Tables::default();
+        let case = |key: &LaneKey| self.case_with_series(key.block, key.unit, key.variant, &mut tables);
+        let cases: Vec<LaneCase<f32>> = keys.iter().map(case).collect();
+        let starts: Vec<Start<f32>> = keys.iter().map(|key| self.starts[key.headway]).collect();
+        let (mut series, step_cap) = (Series::default(), self.plan.profile.step_cap());
+        let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, step_cap)).collect();
+        let may_cross = cases.iter().any(|case| may_cross(case, &tables, self.dt()));
+        let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
+        let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
+        constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
     }
 
     /// All lanes of a model, each for itself.

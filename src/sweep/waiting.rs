@@ -26,10 +26,20 @@ pub(super) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
+    /// Every case has one start, that of its number, instead of all of them.
+    pub one_start_each: bool,
     /// Calm steps are made as well, and no lane is set apart.
     pub every_step: bool,
     /// A step of one of its lanes [may cross](super::scene::may_cross) another vehicle.
     pub may_cross: bool,
+}
+
+impl<'c> Lanes<'c> {
+    /// The starts of a case.
+    #[inline(always)]
+    fn starts_of(&self, case: usize) -> &'c [Start<f32>] {
+        if self.one_start_each { &self.starts[case..=case] } else { self.starts }
+    }
 }
 
 /// Lanes that wait for slots of one kind of batches: the next ones of a stream, and those set apart.
@@ -147,7 +157,8 @@ impl Waiting {
             None => NEVER_LEAVES,
         };
         let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
-        let starts = &stream.starts[self.start..];
+        let all = stream.starts_of(self.case);
+        let starts = &all[self.start..];
         let starts = &starts[..starts.len().min(MOST - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
@@ -159,7 +170,7 @@ impl Waiting {
             }
         }
         self.start += starts.len();
-        if self.start == stream.starts.len() {
+        if self.start == all.len() {
             (self.start, self.case) = (0, self.case + 1);
         }
     }
