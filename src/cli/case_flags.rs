@@ -141,6 +141,7 @@ impl CaseFlags {
         parameters.settle(&mut doubts, str::to_owned);
         let wrong = |key: &str, problem| Error::usage(Place::item(key), problem, HELP);
         let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
+        self.headway()?;
         parameters.judge(&mut doubts)?;
         for (key, quantity, value) in [("gap", Quantity::Gap, self.gap), ("thw", Quantity::Headway, self.thw)] {
             let judged = value.map_or(Ok(()), |value| doubts.judge(quantity, value, || key.to_owned()));
