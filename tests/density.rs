@@ -11,12 +11,30 @@ use lanesweep::density::{
 };
 use lanesweep::mining::{MiningOptions, mine_generated};
 use lanesweep::parameterization::{
-    Kind, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale, Sizes, SvdLateral, fit_svd,
+    CutInParameters, CutOutParameters, Kind, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale,
+    Sizes, SvdLateral, fit_svd,
 };
 use lanesweep::random::Stream;
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
 use lanesweep::trajectory::generator::GeneratorOptions;
 use serde_json::Value;
+
+#[test]
+fn a_case_that_needs_a_lateral_speed_is_not_made_without_one() {
+    let sizes = |s: &Scenario| Sizes::of(s);
+    let options = ParameterizationOptions::default();
+    let first = |category: Category| scenarios().iter().find(|s| s.category == category && s.kept).unwrap();
+    let (cut_in, cut_out) = (first(Category::CutIn), first(Category::CutOut));
+    let without = CutInParameters { lateral_speed_mps: None, ..CutInParameters::of(cut_in, &options) };
+    for (key, is_made) in [("1", false), ("2", false), ("3", true), ("4", true)] {
+        assert_eq!(without.case(key, &sizes(cut_in), &options).is_ok(), is_made, "cut-in {key}");
+    }
+    let of = CutOutParameters::of(cut_out, &options).unwrap();
+    let without = CutOutParameters { lateral_speed_mps: None, ..of };
+    for (key, is_made) in [("a", false), ("b", false), ("c", true), ("d", true)] {
+        assert_eq!(without.case(key, &sizes(cut_out), &options).is_ok(), is_made, "cut-out {key}");
+    }
+}
 
 fn golden(name: &str) -> Value {
     // Python writes infinities, which JSON does not know; they are the scores that underflow.

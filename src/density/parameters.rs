@@ -227,7 +227,7 @@ impl ParameterSpace {
                 let p = CutInParameters::of(scenario, &self.options);
                 let value = |q: &Q| match q {
                     Q::TargetSpeed => Ok(p.v_target_mps),
-                    Q::LateralSpeed => Ok(p.lateral_speed_mps),
+                    Q::LateralSpeed => p.lateral_speed_mps.ok_or_else(|| of_none(*q)),
                     Q::EgoSpeed => Ok(p.v_ego_mps),
                     Q::TargetAcceleration => Ok(p.acceleration_target_mps2),
                     Q::Duration => Ok(p.duration_s),
@@ -239,7 +239,7 @@ impl ParameterSpace {
                 let p = CutOutParameters::of(scenario, &self.options)?;
                 let value = |q: &Q| match q {
                     Q::TargetSpeed => Ok(p.v_target_mps),
-                    Q::LateralSpeed => Ok(p.lateral_speed_mps),
+                    Q::LateralSpeed => p.lateral_speed_mps.ok_or_else(|| of_none(*q)),
                     Q::EgoSpeed => Ok(p.v_ego_mps),
                     Q::LeadSpeed => Ok(p.v_lead_mps),
                     Q::LeadGap => Ok(p.gap_lead_m),
@@ -320,7 +320,7 @@ impl ParameterSpace {
         };
         // What a parameterization does not have, its case does not use.
         let of = |quantity| value(quantity).unwrap_or(0.0);
-        let lateral_speed_mps = value(Quantity::LateralSpeed).unwrap_or(1.0);
+        let lateral_speed_mps = value(Quantity::LateralSpeed);
         match self.id.category {
             Category::CutIn => CutInParameters {
                 v_target_mps: of(Quantity::TargetSpeed),

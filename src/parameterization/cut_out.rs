@@ -14,8 +14,8 @@ pub struct CutOutParameters {
     pub v_target_mps: f64,
     /// b, d: its acceleration over [0, T], m/s².
     pub acceleration_target_mps2: f64,
-    /// a, b: size of its lateral speed, m/s, > 0.
-    pub lateral_speed_mps: f64,
+    /// a, b: size of its lateral speed, m/s, > 0; `None` where the parameterization has none.
+    pub lateral_speed_mps: Option<f64>,
     /// Speed of the ego, m/s, ≥ 0.
     pub v_ego_mps: f64,
     /// Speed of the vehicle ahead at t = 0, m/s, ≥ 0.
@@ -37,7 +37,7 @@ impl CutOutParameters {
         Ok(CutOutParameters {
             v_target_mps: target.v[0],
             acceleration_target_mps2: mean_acceleration(target, duration_s),
-            lateral_speed_mps: lateral_speed(scenario, options),
+            lateral_speed_mps: Some(lateral_speed(scenario, options)),
             v_ego_mps: scenario.ego.v0,
             v_lead_mps: lead.v[0],
             acceleration_lead_mps2: mean_acceleration(lead, duration_s),
@@ -47,20 +47,33 @@ impl CutOutParameters {
     }
 
     /// The case under the parameterization `key`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a or b without a lateral speed, and for another key; [`Error::Input`] without the size of
+    /// the vehicle ahead.
     pub fn case(&self, key: &str, sizes: &Sizes, options: &ParameterizationOptions) -> Result<Case> {
         let CutOutParameters { v_target_mps, lateral_speed_mps, v_lead_mps, duration_s, .. } = *self;
         let end_m = options.lane_change_m;
-        let moving = Lateral::Kinematic { start_m: 0.0, rate_mps: lateral_speed_mps, end_m };
+        let changes_lane = || -> Result<(Lateral, f64)> {
+            let missing = || Error::Internal(format!("cut-out {key} has no lateral speed"));
+            let speed_mps = lateral_speed_mps.ok_or_else(missing)?;
+            Ok((Lateral::Kinematic { start_m: 0.0, rate_mps: speed_mps, end_m }, end_m / speed_mps))
+        };
         let gone = Lateral::Kinematic { start_m: end_m, rate_mps: 0.0, end_m };
-        let change_s = end_m / lateral_speed_mps;
         let constant = (Speed::constant(v_target_mps), Speed::constant(v_lead_mps));
         let changing = (
             accelerated(v_target_mps, self.acceleration_target_mps2, duration_s, options),
             accelerated(v_lead_mps, self.acceleration_lead_mps2, duration_s, options),
         );
         let ((speed, lead_speed), lateral, horizon_s) = match key {
-            "a" => (constant, moving, change_s),
-            "b" => (changing, moving, change_s.max(duration_s)),
+            "a" => {
+                let (moving, change_s) = changes_lane()?;
+                (constant, moving, change_s)
+            }
+            "b" => {
+                let (moving, change_s) = changes_lane()?;
+                (changing, moving, change_s.max(duration_s))
+            }
             "c" => (constant, gone, 0.0),
             "d" => (changing, gone, duration_s),
             _ => return Err(Error::Internal(format!("cut-out parameterization {key} is not kinematic"))),
