@@ -148,7 +148,9 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let dir = tempfile::tempdir().unwrap();
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let file = dir.path().join("one.json");
-    let cases: [(&[&str], i32, &str); 9] = [
+    let cases: [(&[&str], i32, &str); 11] = [
+        (&["fit", "--valid-draws", "0"], 2, "out of range (1 to 1000000000)"),
+        (&["fit", "--valid-draws", "1000000001"], 2, "out of range (1 to 1000000000)"),
         (&["fit", "--parameterization", "9"], 2, "there is no parameterization `9`"),
         (&["fit", "--parameterization", "9"], 2, "LVD: i ii iii iv v"),
         (&["fit", "--category", "cut-in", "--parameterization", "ii"], 2, "of cut-in"),

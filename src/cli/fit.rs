@@ -23,6 +23,9 @@ use crate::scenario::write_scenarios_to;
 use crate::settings::BandwidthInterval;
 use crate::{Error, Place, Result, input_file};
 
+/// Draws for P_valid at most, as in the configuration.
+const MAX_VALID_DRAWS: u64 = 1_000_000_000;
+
 /// How are the parameters of scenarios distributed?
 ///
 /// Fits a kernel density to the kept scenarios of each category under each parameterization, counts which share
@@ -96,10 +99,10 @@ impl Fit {
             seed: self.seed,
             representativeness: !self.no_comparison,
         };
-        if self.valid_draws == 0 {
+        if !(1..=MAX_VALID_DRAWS).contains(&self.valid_draws) {
             return Err(Error::usage(
                 Place::item("--valid-draws"),
-                "0 draws count nothing",
+                format!("{} is out of range (1 to {MAX_VALID_DRAWS})", self.valid_draws),
                 "give 100000, for instance",
             ));
         }
