@@ -90,8 +90,8 @@ fn rates_are_those_of_study_and_of_fit_and_sample() {
         let estimate = estimates.iter().find(is_cell).unwrap();
         for (ours, theirs) in [
             ("density_rate", "probability"),
-            ("density_low", "low"),
-            ("density_high", "high"),
+            ("density_low", "draws_low"),
+            ("density_high", "draws_high"),
             ("density_per_hour", "risk_per_hour"),
         ] {
             assert_eq!(cell[ours], estimate[theirs], "{ours}");

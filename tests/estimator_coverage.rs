@@ -5,11 +5,16 @@
 //! cargo test --release --test estimator_coverage -- --ignored --nocapture
 //! ```
 
-use lanesweep::density::Mixture;
+use lanesweep::density::{Mixture, normal_quantile};
 use lanesweep::estimate::{
-    BinomialInterval, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot, StandardNormal,
-    Subset, Technique, Truncated, Verdict, balance_heuristic, cross_entropy, from_pilot, monte_carlo, subset,
+    BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot,
+    StandardNormal, StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy,
+    from_counts, from_pilot, monte_carlo, subset,
 };
+use lanesweep::score::{ScoreOptions, f1, f1_interval};
+use lanesweep::sweep::Confusion;
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
 #[path = "common/reliability.rs"]
@@ -231,4 +236,128 @@ fn one_in_a_million_is_reached_with_a_hundred_thousand_runs() {
         missed.extend(rows.into_iter().filter(|r| r.runs > 1e5 || r.median_error > 0.2).map(|r| r.name));
     }
     assert!(missed.is_empty(), "more than 100,000 runs, or a median error above 20 %: {missed:?}");
+}
+
+/// Draws of a scenario: hardness is Φ(μ + σZ), which has the mean Φ(μ/√(1 + σ²)).
+fn sampled_scenarios(n: usize, [mean, spread]: [f64; 2], seed: u64) -> (Vec<u64>, Vec<u64>) {
+    const DRAWS: u64 = 4000;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let hardness: Vec<f64> = (0..n).map(|_| tail(-(mean + spread * normal_quantile(uniform().max(1e-12))))).collect();
+    let (mut runs, mut failures) = (vec![0; n], vec![0; n]);
+    for _ in 0..DRAWS {
+        let kernel = (uniform() * n as f64) as usize;
+        runs[kernel] += 1;
+        failures[kernel] += u64::from(uniform() < hardness[kernel]);
+    }
+    (runs, failures)
+}
+
+/// Lanes in which S, S' and either of them fail, of one scenario.
+fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion {
+    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let s = if uniform() < failing { 1 + (uniform() * uniform() * 10.0) as i32 } else { 0 };
+    let shift = 1 + (uniform() * 2.0) as i32;
+    let shift = if uniform() < 0.5 { shift } else { -shift };
+    let is_wrong = uniform() < if s > 0 { wrong } else { 0.2 * wrong * failing };
+    let s_prime = if is_wrong { (s + shift).clamp(0, 10) } else { s };
+    let count = |n: i32| n.max(0) as u32;
+    Confusion {
+        both: count(s.min(s_prime)).into(),
+        only_s: count(s - s_prime).into(),
+        only_s_prime: count(s_prime - s).into(),
+        neither: count(10 - s.max(s_prime)).into(),
+    }
+}
+
+/// The interval that resampling the scenarios gives.
+fn percentiles(n: usize, seed: u64, of: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(1);
+    let mut draw = || -> Vec<usize> { (0..n).map(|_| (random.next_u64() % n as u64) as usize).collect() };
+    let mut values: Vec<f64> = (0..200).filter_map(|_| of(&draw())).collect();
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
+    (!values.is_empty()).then(|| (at(0.025), at(0.975)))
+}
+
+fn held(truth: f64, intervals: &[(f64, f64)]) -> f64 {
+    let n = intervals.iter().filter(|(low, high)| *low <= truth && truth <= *high).count();
+    100.0 * n as f64 / intervals.len().max(1) as f64
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test estimator_coverage -- --ignored --nocapture"]
+fn intervals_over_scenarios_hold() {
+    println!("{:>9} {:>8} | coverage of: draws alone, resampled scenarios, ours", "scenarios", "P");
+    let mut missed = Vec::new();
+    for n in [9, 30, 100, 300] {
+        for population in [[-2.3, 0.7], [-3.0, 1.0], [-1.5, 1.5], [0.5, 1.0], [-4.0, 1.5]] {
+            let truth = tail(-population[0] / (1.0_f64 + population[1] * population[1]).sqrt());
+            let of = |seed: u64| {
+                let (runs, failures) = sampled_scenarios(n, population, seed);
+                let (all, failed) = (runs.iter().sum(), failures.iter().sum());
+                let counts = Counts { runs: all, failures: failed, voids: 0, tries: all };
+                let draws = from_counts(&counts, BinomialInterval::Wilson, 0.95, StopReason::Samples).interval;
+                let ours = cluster_rate(Clusters { runs: &runs, failures: &failures }, 0.95).interval;
+                let sum = |of: &[u64], drawn: &[usize]| drawn.iter().map(|at| of[*at]).sum::<u64>() as f64;
+                let rate = |drawn: &[usize]| Some(sum(&failures, drawn) / sum(&runs, drawn).max(1.0));
+                let resampled = percentiles(n, seed, rate).expect("a rate");
+                [(draws.low, draws.high), resampled, (ours.low, ours.high)]
+            };
+            let all: Vec<[(f64, f64); 3]> = (0..REPEATS).into_par_iter().map(of).collect();
+            let coverage = [0, 1, 2].map(|way| held(truth, &all.iter().map(|i| i[way]).collect::<Vec<_>>()));
+            println!("{n:9} {truth:8.4} | {:6.1} % {:6.1} % {:6.1} %", coverage[0], coverage[1], coverage[2]);
+            if coverage[2] < 91.0 {
+                missed.push((n, truth, coverage));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "below 91 %: {missed:?}");
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test estimator_coverage -- --ignored --nocapture"]
+fn intervals_of_f1_hold() {
+    println!("{:>9} {:>7} {:>8} | coverage of: resampled scenarios, ours; mean width", "scenarios", "F1", "S fails");
+    let mut missed = Vec::new();
+    for n in [9, 30, 100] {
+        for failing in [0.03, 0.1, 0.3] {
+            for wrong in [0.02, 0.1, 0.3] {
+                let total = |units: &[Confusion]| {
+                    let mut sum = Confusion::default();
+                    units.iter().for_each(|unit| sum.add(unit));
+                    sum
+                };
+                let mut random = ChaCha8Rng::seed_from_u64(1);
+                let population: Vec<Confusion> = (0..200_000).map(|_| confusion(&mut random, failing, wrong)).collect();
+                let truth = f1(&total(&population)).expect("failures");
+                let of = |seed: u64| {
+                    let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+                    let units: Vec<Confusion> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
+                    // None below ten failures of S.
+                    let ours = f1_interval(units.iter(), &ScoreOptions::default())?;
+                    let score = |drawn: &[usize]| f1(&total(&drawn.iter().map(|at| units[*at]).collect::<Vec<_>>()));
+                    let value = f1(&total(&units)).expect("failures");
+                    assert!(ours.low <= value && value <= ours.high, "{ours:?} excludes {value}");
+                    let sum = total(&units);
+                    let failures = u64::from(sum.both) + u64::from(sum.only_s);
+                    Some(([percentiles(n, seed, score)?, (ours.low, ours.high)], failures))
+                };
+                let all: Vec<([(f64, f64); 2], u64)> = (0..REPEATS).into_par_iter().filter_map(of).collect();
+                if all.len() < 100 {
+                    continue;
+                }
+                let fails = all.iter().map(|(_, failures)| *failures as f64).sum::<f64>() / all.len() as f64;
+                let ways = [0, 1].map(|way| all.iter().map(|(i, _)| i[way]).collect::<Vec<_>>());
+                let coverage = [held(truth, &ways[0]), held(truth, &ways[1])];
+                let width = ways[1].iter().map(|(low, high)| high - low).sum::<f64>() / all.len() as f64;
+                println!("{n:9} {truth:7.4} {fails:8.1} | {:6.1} % {:6.1} %   {width:.2}", coverage[0], coverage[1]);
+                if coverage[1] < 94.0 {
+                    missed.push((n, truth, coverage));
+                }
+            }
+        }
+    }
+    assert!(missed.is_empty(), "below 94 %: {missed:?}");
 }

@@ -42,6 +42,60 @@ fn ended(child: &mut Child) -> Option<i32> {
     status.unwrap().code()
 }
 
+/// Estimates of a folder, without what belongs to the machine.
+fn estimates(dir: &Path) -> serde_json::Value {
+    let text = std::fs::read(dir.join("estimate.json")).unwrap();
+    let mut file: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    file.as_object_mut().unwrap().remove("host").unwrap();
+    file
+}
+
+#[test]
+fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() {
+    let dir = tempfile::tempdir().unwrap();
+    let lanesweep = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+        command.current_dir(dir.path()).args(["-q", "--threads", "1"]).args(args).stdout(Stdio::null());
+        command
+    };
+    let fit = ["fit", "--synth-recordings", "2", "--category", "cut-in", "--parameterization", "2", "--valid-draws"];
+    let fit = [&fit[..], &["1000", "--no-comparison", "--out", "d.json"]].concat();
+    assert!(lanesweep(&fit).status().unwrap().success());
+    let run = ["sample", "d.json", "--estimator", "is", "--models", "FSM,RSS", "--thw", "0.6", "--samples", "200000"];
+    let run = |out| [&run[..], &["--backend", "cpu", "--out", out]].concat();
+    assert!(lanesweep(&run("whole")).status().unwrap().success());
+    let (killed, pilot) = (dir.path().join("killed"), dir.path().join("killed/pilot.json"));
+    let journal = || {
+        let names = std::fs::read_dir(&killed).into_iter().flatten().flatten().map(|entry| entry.path());
+        names.into_iter().find(|path| path.extension().is_some_and(|extension| extension == "journal"))
+    };
+    let (mut kills, mut found) = (0, Vec::new());
+    loop {
+        let mut child = lanesweep(&run("killed")).stderr(Stdio::null()).spawn().unwrap();
+        let before = journal().and_then(|path| std::fs::metadata(path).ok()).map_or(0, |file| file.len());
+        let mut status = None;
+        wait_until("the journal grows, or the run ends", || {
+            status = child.try_wait().unwrap();
+            let now = journal().and_then(|path| std::fs::metadata(path).ok()).map_or(0, |file| file.len());
+            status.is_some() || (kills < 2 && now > before.max(100))
+        });
+        if let Some(status) = status {
+            assert!(status.success());
+            break;
+        }
+        send("KILL", child.id());
+        child.wait().unwrap();
+        kills += 1;
+        found.push(std::fs::read(&pilot).unwrap());
+    }
+    assert!(kills > 0, "the run ended before its journal was seen");
+    assert!(found.windows(2).all(|two| two[0] == two[1]), "the pilot is kept");
+    assert_eq!(estimates(&killed), estimates(&dir.path().join("whole")));
+    assert!(!pilot.exists() && journal().is_none(), "nothing of the run is left");
+    let proposal = |dir: &Path| std::fs::read(dir.join("proposal-RSS.json")).unwrap();
+    assert_eq!(proposal(&killed), proposal(&dir.path().join("whole")));
+}
+
 /// A study that is sent `signal` while it writes its lanes.
 fn study_interrupted_by(signal: &str) -> Option<i32> {
     let dir = tempfile::tempdir().unwrap();

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions, read_density, write_density};
+use lanesweep::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
 use lanesweep::driver::{MODELS, ModelId};
 use lanesweep::gpu::{GpuBackend, GpuOptions};
 use lanesweep::mining::{MiningOptions, mine_generated};
@@ -215,6 +215,81 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     }
 }
 
+/// The density over the first scenarios only, scale and bandwidth held.
+fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
+    let kde = &density.kde;
+    let points = kde.points()[..scenarios].to_vec();
+    let kde = Kde::from_parts(points, kde.scale().to_vec(), *kde.bandwidth()).unwrap();
+    DensityModel { kde, ..density.clone() }
+}
+
+/// A folder with the density over nine scenarios and that over all.
+fn few_and_all() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let all = density(Category::CutIn, "2");
+    write_density(&dir.path().join("nine.json"), &of_few(&all, 9)).unwrap();
+    write_density(&dir.path().join("all.json"), &all).unwrap();
+    dir
+}
+
+/// The record of a run of Reg157, and what it printed.
+fn estimated(dir: &Path, density: &str, more: &[&str]) -> (serde_json::Value, String) {
+    let args = ["-q", "sample", density, "--models", "Reg157", "--backend", "cpu", "--worst", "0"];
+    let (code, text, err) = lanesweep(dir, &[&args[..], more].concat());
+    assert_eq!(code, 0, "{more:?}: {err}");
+    let file = std::fs::read(dir.join("lanesweep-sample/estimate.json")).unwrap();
+    (serde_json::from_slice(&file).unwrap(), text)
+}
+
+/// Ends of a row's interval.
+fn interval(row: &serde_json::Value) -> [f64; 2] {
+    ["low", "high"].map(|end| row["estimate"]["interval"][end].as_f64().unwrap())
+}
+
+#[test]
+fn few_scenarios_are_doubtful_and_their_interval_is_that_of_other_data_too() {
+    let dir = few_and_all();
+    let ends = |value: &serde_json::Value| [0, 1].map(|end| value[end].as_f64().unwrap());
+    let bootstrap = ["--samples", "6000", "--thw", "1,0.4", "--bootstrap", "40", "--bootstrap-samples", "1000"];
+    for (density, is_sound) in [("nine.json", false), ("all.json", true)] {
+        let (file, text) = estimated(dir.path(), density, &bootstrap);
+        for (row, replicates) in (0..3).map(|at| (&file["estimates"][3 * at], &file["bootstrap"]["rows"][at])) {
+            assert_eq!((&row["criterion"], &row["headway"]), (&replicates["criterion"], &"all".into()));
+            let ([low, high], draws) = (interval(row), ends(&row["draws"]));
+            let resampled = ends(&replicates["probability"]);
+            // Scenarios tell much less than draws, and both ways agree in how much less.
+            assert!(high - low > 2.0 * (draws[1] - draws[0]), "{row}");
+            // 95 % of a normal distribution are 3.92 standard deviations; the replicates' own draws are few.
+            let deviation = row["estimate"]["variance"].as_f64().unwrap().sqrt();
+            let ratio = 3.92 * deviation / (resampled[1] - resampled[0]);
+            assert!((0.6..1.6).contains(&ratio), "{ratio}: {low} … {high} beside {resampled:?}");
+            let warnings = row["estimate"]["trust"]["warnings"].as_array().unwrap();
+            assert_eq!(warnings.iter().all(|w| w["warning"] != "few_scenarios"), is_sound, "{row}");
+        }
+        assert!(text.contains("all 2") && text.contains("P is the mean over 1s, 0.4s"), "{text}");
+        assert_eq!(text.contains("sound"), is_sound, "{text}");
+    }
+}
+
+#[test]
+fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
+    let dir = few_and_all();
+    for estimator in ["is", "ce"] {
+        let how = ["--thw", "0.4", "--estimator", estimator, "--samples", "3000"];
+        let crude = estimated(dir.path(), "all.json", &["--thw", "0.4", "--samples", "6000"]).0["estimates"][0].clone();
+        let row = estimated(dir.path(), "all.json", &how).0["estimates"][0].clone();
+        let [a, b] = [&crude, &row].map(|row| row["failing_scenarios"].as_f64().unwrap());
+        assert!((0.6..1.7).contains(&(b / a)), "{estimator}: {b} failing scenarios beside {a}");
+        let width = |row| libm::log(interval(row)[1] / interval(row)[0]);
+        let ratio = width(&row) / width(&crude);
+        assert!((0.6..1.7).contains(&ratio), "{estimator}: {ratio}");
+        let few = estimated(dir.path(), "nine.json", &how).0["estimates"][0].clone();
+        assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
+    }
+    let subset = estimated(dir.path(), "all.json", &["--thw", "0.4", "--estimator", "subset", "--samples", "500"]);
+    assert!(subset.1.contains("of the draws alone") && !subset.1.contains("sound"), "{}", subset.1);
+}
+
 #[test]
 fn bad_input_is_told_with_its_place_and_what_to_do() {
     let (dir, path) = folder();
@@ -224,7 +299,9 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
     std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();
     let d = "density.json";
-    let cases: [(&[&str], i32, &str); 25] = [
+    let cases: [(&[&str], i32, &str); 27] = [
+        (&[d, "--estimator", "is", "--thw", "1", "--samples", "99"], 2, "at least 100 and at most 100000000"),
+        (&[d, "--estimator", "is", "--thw", "1", "--samples", "100000001"], 2, "at least 100 and at most 100000000"),
         (&[d, "--samples", "0"], 2, "0 samples"),
         (&[d, "--samples", "9223372036854775808"], 2, "2^63"),
         (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),

@@ -45,15 +45,25 @@ fn a_study_that_never_fails_has_no_score() {
 }
 
 #[test]
-fn a_failure_in_one_of_four_scenarios_is_undefined_in_about_a_third_of_the_draws() {
+fn f1_of_few_failures_has_no_interval_and_its_undefined_draws_are_counted() {
     let plan = plan(&[(Category::Lvd, 4, LVD)]);
-    let table = table(&plan, &|lane| Verdicts(u8::from(plan.key(lane).unwrap().unit == 2)));
+    let fails = |least: usize| {
+        table(&plan, &|lane| {
+            let key = plan.key(lane).unwrap();
+            Verdicts(u8::from(key.unit == 2 && key.headway >= least))
+        })
+    };
+    let table = fails(1);
     let scores = &table.categories[0];
     let cell = &scores.cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()];
     // (3/4)^4 = 0.316 of the draws miss it; sigma = 15 draws.
     assert!((250..390).contains(&cell.undefined_draws), "{}", cell.undefined_draws);
-    let interval = cell.f1_interval.unwrap();
-    assert_eq!((f1(&cell.counts), interval.low, interval.high), (Some(1.0), 1.0, 1.0));
+    // Nine failures: no interval. Ten: one scenario never makes [1, 1].
+    assert_eq!((f1(&cell.counts), cell.counts.both, cell.f1_interval), (Some(1.0), 9, None));
+    let interval =
+        fails(0).categories[0].cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()].f1_interval;
+    let interval = interval.unwrap();
+    assert!(interval.high == 1.0 && interval.low < 0.5, "{interval:?}");
 }
 
 #[test]

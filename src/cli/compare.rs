@@ -182,7 +182,11 @@ impl Compare {
             profile: &profile,
             models: models.clone(),
             headways: headways.clone(),
-            enough: Enough { failures: config.score.least_failures.into(), ..Enough::default() },
+            enough: Enough {
+                failures: config.score.least_failures.into(),
+                margin: config.compare.margin,
+                ..Enough::default()
+            },
             opened: &opened,
             study: plan,
             partial: &partial,

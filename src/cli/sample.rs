@@ -23,7 +23,7 @@ use super::{Exit, ProfileFlags};
 use crate::criterion::Criterion;
 use crate::density::{DensityModel, read_density};
 use crate::driver::ModelId;
-use crate::estimate::{Checkpoints, StopRule};
+use crate::estimate::{Checkpoints, Pilot, StopRule};
 use crate::openscenario::Rename;
 use crate::parts::kind_of;
 use crate::profile::Profile;
@@ -205,6 +205,11 @@ impl Sample {
             let stop = run.stop(self.samples.unwrap_or(100_000));
             return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
         }
+        if self.has_pilot() && !self.dry_run && self.until.is_none() && self.time_limit.is_none() {
+            make_folder(&self.out)?;
+            sample_lanes::check_writable(&self.out)?;
+            return sample_weighted::run(self, &run.planned_after_pilot()?, &opened, started, verbosity);
+        }
         if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
             return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);
         }
@@ -277,6 +282,11 @@ impl Sample {
     /// Importance sampling of one given proposal: its samples are independent, so the run can be split and continued.
     pub(super) fn is_weighted(&self) -> bool {
         self.estimator == EstimatorFlag::Is && self.proposal.len() == 1
+    }
+
+    /// Importance sampling of what a pilot finds.
+    fn has_pilot(&self) -> bool {
+        self.estimator == EstimatorFlag::Is && self.proposal.is_empty()
     }
 
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {
@@ -354,25 +364,46 @@ impl Run<'_> {
 
     /// Importance sampling of one given proposal, a fixed number of samples.
     fn planned_weighted(self) -> Result<PlannedWeighted> {
+        let proposal = read_proposal(&self.flags.proposal[0], &self.density)?;
+        let facts = self.weighted_facts(None)?;
+        PlannedWeighted::new(self.density, vec![proposal], facts)
+    }
+
+    /// Importance sampling of what a pilot finds for each driver model, a fixed number of samples.
+    fn planned_after_pilot(self) -> Result<PlannedWeighted> {
+        let flags = self.flags;
+        let pilot = Pilot {
+            worst: flags.worst_share,
+            broad: flags.broad,
+            defence: flags.defence,
+            ..Pilot::guarded(flags.pilot)
+        };
+        let facts = self.weighted_facts(Some(pilot))?;
+        let density = self.density.clone();
+        PlannedWeighted::after_pilot(density, facts, &flags.out, || self.pilots(&pilot))
+    }
+
+    /// What both have in common; the proposals are added to it.
+    fn weighted_facts(&self, pilot: Option<Pilot>) -> Result<WeightedFacts> {
         let flags = self.flags;
         let headway = match &self.headways {
             SampleHeadways::Sampled => None,
             SampleHeadways::Each(list) => Some(one_headway(list, flags.estimator)?),
         };
-        let proposal = read_proposal(&flags.proposal[0], &self.density)?;
-        let facts = WeightedFacts {
+        Ok(WeightedFacts {
             density: String::new(),
-            proposal: String::new(),
+            proposals: Vec::new(),
+            pilot,
+            pilots: Vec::new(),
             defence: flags.defence,
-            profile: self.profile,
-            models: self.models,
+            profile: self.profile.clone(),
+            models: self.models.clone(),
             headway,
             criterion: self.criterion,
             samples: flags.samples.unwrap_or(100_000),
             seed: flags.seed(),
             level: flags.level,
-        };
-        PlannedWeighted::new(self.density, proposal, facts)
+        })
     }
 
     fn map(&self) -> Result<Option<MapAxes>> {

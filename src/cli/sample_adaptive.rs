@@ -10,12 +10,12 @@ use crate::Result;
 use crate::density::{BandwidthRule, Kde, Mixture};
 use crate::driver::ModelId;
 use crate::estimate::{
-    CrossEntropy, Defended, Density, Estimate, Importance, Pilot, Subset, Technique, balance_heuristic, cross_entropy,
-    defended, from_pilot_with_proposal, importance, subset,
+    CrossEntropy, Defended, Density, Estimate, Importance, Pilot, PilotCheck, Subset, Technique, balance_heuristic,
+    cross_entropy, defended, from_pilot_with_proposal, importance, pilot_proposal, subset,
 };
 use crate::report::sampling::{EstimateFile, Levels};
 use crate::sampling::{
-    EstimateRow, LaneLimitState, Risk, SampleHeadways, plan_points, read_proposal, truncated, write_proposal,
+    EstimateRow, LaneLimitState, SampleHeadways, plan_points, read_proposal, scenario_shares, truncated, write_proposal,
 };
 
 /// Draws that the valid share of each of several proposals is counted on.
@@ -39,9 +39,13 @@ impl Run<'_> {
         let (mut rows, mut levels) = (Vec::new(), Vec::new());
         for &model in &self.models {
             tracing::info!("{} on {}", model.name(), self.opened.backend().describe());
-            let (estimate, level) = self.estimate(&nominal, model, samples)?;
-            let risk = Risk::of(&estimate, self.density.exposure.as_ref());
-            rows.push(EstimateRow { model, criterion: self.criterion, headway: headway.clone(), estimate, risk });
+            let (estimate, level, proposal) = self.estimate(&nominal, model, samples)?;
+            let of =
+                |proposal| scenario_shares(&self.limit_state(model), proposal, self.flags.defence, self.flags.seed());
+            let shares = proposal.as_ref().map(of).transpose()?.flatten();
+            let exposure = self.density.exposure.as_ref();
+            let row = EstimateRow::of_draws(model, self.criterion, headway.clone(), estimate, exposure);
+            rows.push(row.with_data(shares.as_ref(), exposure));
             levels.extend(level);
         }
         let mut file = self.file(samples, rows)?;
@@ -104,7 +108,31 @@ impl Run<'_> {
         }
     }
 
-    fn estimate(&self, nominal: &dyn Density, model: ModelId, samples: u64) -> Result<(Estimate, Option<Levels>)> {
+    /// The kernels of a pilot's worst points.
+    fn fitted(&self, points: &[Vec<f64>]) -> Result<Mixture> {
+        let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
+        Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
+    }
+
+    /// The proposal of every driver model, with what its pilot counted.
+    pub(super) fn pilots(&self, pilot: &Pilot) -> Result<(Vec<Mixture>, Vec<PilotCheck>)> {
+        let nominal = truncated(&self.density)?;
+        let fit = |points: &[Vec<f64>]| self.fitted(points);
+        let search = |&model: &ModelId| {
+            tracing::info!("pilot of {} on {}", model.name(), self.opened.backend().describe());
+            pilot_proposal(&nominal, &self.limit_state(model), &fit, pilot, self.flags.seed())
+        };
+        let found: Vec<(Mixture, PilotCheck)> = self.models.iter().map(search).collect::<Result<_>>()?;
+        Ok(found.into_iter().unzip())
+    }
+
+    /// The estimate of one model, its levels, and the proposal that was sampled.
+    fn estimate(
+        &self,
+        nominal: &dyn Density,
+        model: ModelId,
+        samples: u64,
+    ) -> Result<(Estimate, Option<Levels>, Option<Mixture>)> {
         let flags = self.flags;
         let lanes = self.limit_state(model);
         let importance_options =
@@ -114,7 +142,7 @@ impl Run<'_> {
             EstimatorFlag::Subset => {
                 let options = Subset { level: flags.level, ..Subset::new(flags.seed(), samples) };
                 let run = subset(nominal, &lanes, &options)?;
-                Ok((run.estimate, Some(Levels::Subset(run.levels))))
+                Ok((run.estimate, Some(Levels::Subset(run.levels)), None))
             }
             EstimatorFlag::Ce => {
                 let options = CrossEntropy {
@@ -125,15 +153,13 @@ impl Run<'_> {
                 };
                 let run = cross_entropy(nominal, &lanes, &options)?;
                 write_proposal(&proposal_file, &self.density, &run.proposal)?;
-                Ok((run.estimate, Some(Levels::CrossEntropy(run.steps))))
+                Ok((run.estimate, Some(Levels::CrossEntropy(run.steps)), Some(run.proposal)))
             }
             EstimatorFlag::Mc | EstimatorFlag::Is if flags.proposal.is_empty() => {
-                let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-                let fit = |points: &[Vec<f64>]| Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture();
                 let (estimate, proposal) = from_pilot_with_proposal(
                     nominal,
                     &lanes,
-                    &fit,
+                    &|points: &[Vec<f64>]| self.fitted(points),
                     &Pilot {
                         worst: flags.worst_share,
                         broad: flags.broad,
@@ -143,12 +169,14 @@ impl Run<'_> {
                     &importance_options,
                 )?;
                 write_proposal(&proposal_file, &self.density, &proposal)?;
-                Ok((estimate, None))
+                Ok((estimate, None, Some(proposal)))
             }
             EstimatorFlag::Mc | EstimatorFlag::Is => {
                 let read = |path: &PathBuf| read_proposal(path, &self.density);
                 let mixtures: Vec<Mixture> = flags.proposal.iter().map(read).collect::<Result<_>>()?;
                 let is_one = mixtures.len() == 1;
+                let equal: Vec<(f64, &Mixture)> = mixtures.iter().map(|m| (1.0 / mixtures.len() as f64, m)).collect();
+                let all = Mixture::join(&equal)?;
                 let prepared = |mixture| {
                     let proposal = defended(mixture, nominal, flags.defence)?;
                     // One proposal's valid share comes out of its own draws.
@@ -164,7 +192,7 @@ impl Run<'_> {
                         balance_heuristic(nominal, &techniques, &lanes, flags.seed(), flags.level)?
                     }
                 };
-                Ok((estimate, None))
+                Ok((estimate, None, Some(all)))
             }
         }
     }

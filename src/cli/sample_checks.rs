@@ -6,6 +6,9 @@ use crate::{Error, Place, Result};
 /// Points that an adaptive estimator holds at once, at most.
 pub(super) const MOST_HELD: u64 = 10_000_000;
 
+/// Samples of a run that can be split and resumed, at most: as of `compare`.
+const MAX_SPLIT: u64 = (1 << 48) - 1;
+
 /// The complaint about a flag that the weighing estimators do not have.
 pub(super) fn only_crude(flag: &str) -> Error {
     let problem = "this belongs to crude Monte Carlo";
@@ -60,7 +63,13 @@ impl Sample {
             Err(Error::usage(Place::item(flag), format!("{value} does not do"), help))
         };
         match self.estimator {
-            EstimatorFlag::Is if self.proposal.is_empty() => least("--pilot", self.pilot, 500, MOST_HELD)?,
+            EstimatorFlag::Is if self.is_weighted() => {
+                least("--samples", self.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
+            }
+            EstimatorFlag::Is => {
+                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?;
+                least("--pilot", self.pilot, 500, MOST_HELD)?;
+            }
             EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MOST_HELD)?,
             EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?,
             _ => (),

@@ -1,4 +1,4 @@
-//! Importance sampling of one given proposal: in one piece, as a shard, from a plan, and merged.
+//! Importance sampling of one given proposal, or of those of a pilot: in one piece, as a shard, from a plan, and merged.
 
 use std::path::Path;
 use std::time::Instant;
@@ -12,15 +12,18 @@ use super::merge::read_parts;
 use super::sample::Sample;
 use super::sample_lanes;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
-use super::weighted_plan::PlannedWeighted;
+use super::weighted_plan::{PILOT_FILE, PlannedWeighted};
+use crate::density::Mixture;
 use crate::driver::ModelId;
-use crate::estimate::{BlockSums, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
+use crate::estimate::{BlockSums, Defended, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
 use crate::parts::{Countable, Ledger};
 use crate::readable::count;
 use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::sampling::{EstimateRow, LaneLimitState, Risk, WeightedTally, truncated};
-use crate::sweep::{Forecast, lanes_within_seconds};
+use crate::sampling::{
+    EstimateRow, LaneLimitState, WeightedTally, scenario_shares, truncated, write_proposal,
+};
+use crate::sweep::{CpuBackend, Forecast, lanes_within_seconds};
 use crate::{Error, Place, Result, interrupt};
 
 /// Memory of a sample while it is judged (point, case, motion, outcome), bytes, measured.
@@ -83,6 +86,11 @@ pub(super) fn run(
     let host = opened.host(0, started);
     let tally = work.ledger.counts(0..samples)?;
     write_run(planned, tally, host, out, flags.format)?;
+    if planned.facts.pilot.is_some() {
+        // The journal that needs it goes next; without it the next run's pilot has the same bits.
+        let path = out.join(PILOT_FILE);
+        std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove", e))?;
+    }
     work.forget()?;
     Ok(Exit::Ok)
 }
@@ -143,7 +151,8 @@ fn sample(
 ) -> Result<()> {
     let (facts, density) = (&planned.facts, &planned.density);
     let nominal = truncated(density)?;
-    let proposal = defended(planned.proposal.clone(), &nominal, facts.defence)?;
+    let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, facts.defence);
+    let proposals: Vec<Defended> = planned.proposals.iter().map(prepared).collect::<Result<_>>()?;
     let lanes_of = |model: ModelId| LaneLimitState {
         density,
         profile: &facts.profile,
@@ -158,10 +167,12 @@ fn sample(
         let mut at = missing.start;
         while at < missing.end {
             let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
-            let sums_of = |&model: &ModelId| {
-                Ok((model, importance_sums(&nominal, &proposal, &lanes_of(model), facts.seed, at..next)?))
+            // One proposal serves all models, or each has its own.
+            let sums_of = |(&model, proposal): (&ModelId, &Defended)| {
+                Ok((model, importance_sums(&nominal, proposal, &lanes_of(model), facts.seed, at..next)?))
             };
-            ledger.add(WeightedTally { sums: facts.models.iter().map(sums_of).collect::<Result<_>>()? })?;
+            let pairs = facts.models.iter().zip(proposals.iter().cycle());
+            ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? })?;
             each(next - at);
             at = next;
         }
@@ -198,17 +209,35 @@ fn write_run(
         let problem = "the parts do not hold every sample of every driver model";
         return Err(Error::input(Place::file(out), problem, "make them again"));
     };
-    let row = |(model, sums): &(ModelId, BlockSums<WeightSums>)| {
+    let (cpu, exposure) = (CpuBackend::lane_arithmetic(), density.exposure.as_ref());
+    let row = |(at, (model, sums)): (usize, &(ModelId, BlockSums<WeightSums>))| {
         let total = sums.total().unwrap_or_default();
-        let estimate = from_weight_sums(&total, false, facts.level, StopReason::Samples);
-        let risk = Risk::of(&estimate, density.exposure.as_ref());
-        EstimateRow { model: *model, criterion: facts.criterion, headway: planned.headway_name(), estimate, risk }
+        let mut estimate = from_weight_sums(&total, false, facts.level, StopReason::Samples);
+        facts.pilots.get(at).into_iter().for_each(|pilot| pilot.add_to(&mut estimate));
+        let row = EstimateRow::of_draws(*model, facts.criterion, planned.headway_name(), estimate, exposure);
+        // A few lanes more, on the CPU: a merge has no other backend, and all have the same bits.
+        let lanes = LaneLimitState {
+            density,
+            profile: &facts.profile,
+            model: *model,
+            criterion: facts.criterion,
+            headway: planned.headways(),
+            backend: &cpu,
+            fallback: None,
+        };
+        let proposal = &planned.proposals[at % planned.proposals.len()];
+        let shares = scenario_shares(&lanes, proposal, facts.defence, facts.seed)?;
+        Ok(row.with_data(shares.as_ref(), exposure))
     };
-    let file = EstimateFile::new(density, planned.run_facts(), tally.sums.iter().map(row).collect(), host)?;
+    let rows = tally.sums.iter().enumerate().map(row).collect::<Result<_>>()?;
+    let file = EstimateFile::new(density, planned.run_facts(), rows, host)?;
     // It was there before the work; where it vanished meanwhile, the result is worth another one.
     make_folder(out)?;
     // A proposal in this folder may be the one that was given.
     sample_lanes::clear(out, &["proposal-"])?;
+    for (model, proposal) in facts.models.iter().zip(&planned.proposals).filter(|_| facts.pilot.is_some()) {
+        write_proposal(&out.join(format!("proposal-{}.json", model.name())), density, proposal)?;
+    }
     sample_lanes::write_estimates(out, density, &file, Vec::new())?;
     format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());

@@ -1,4 +1,4 @@
-//! A run over one given proposal as a plan file: density, proposal and everything that was asked for, so that every
+//! Importance sampling as a plan file, over one given proposal or over those of a pilot: density, proposals and everything that was asked for, so that every
 //! shard and the merge know the same run.
 
 use std::path::Path;
@@ -8,13 +8,17 @@ use serde::{Deserialize, Serialize};
 use crate::criterion::Criterion;
 use crate::density::{DensityModel, Mixture};
 use crate::driver::ModelId;
+use crate::estimate::{Pilot, PilotCheck};
 use crate::parts::{read_sealed, seal};
 use crate::profile::Profile;
+use crate::report::files::{make_folder, write_atomically};
 use crate::report::sampling::RunFacts;
 use crate::sampling::{SampleHeadways, plan_points, proposal_from_text, proposal_text};
 use crate::sweep::Headway;
 use crate::{Error, Place, Result};
 
+/// What a run with a pilot of its own keeps until it ends.
+pub(super) const PILOT_FILE: &str = "pilot.json";
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "weighted sampling plan";
 /// Largest plan that is read: a density and a mixture.
@@ -22,14 +26,18 @@ const LARGEST_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposal FILE --plan-only --out DIR` of this \
                      version";
 
-/// Importance sampling of one given proposal, a fixed number of samples.
+/// Importance sampling of one given proposal, or of one per driver model that a pilot found; a fixed number of samples.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WeightedFacts {
     /// The density file's text.
     pub density: String,
-    /// The proposal file's text.
-    pub proposal: String,
+    /// The proposal file's text: one for all driver models, or one for each.
+    pub proposals: Vec<String>,
+    /// How the proposals were looked for; `None` for a given one.
+    pub pilot: Option<Pilot>,
+    /// What the pilot of each driver model counted; empty for a given proposal.
+    pub pilots: Vec<PilotCheck>,
     /// Share of the density in the proposal.
     pub defence: f64,
     pub profile: Profile,
@@ -46,7 +54,8 @@ pub(super) struct WeightedFacts {
 pub(super) struct PlannedWeighted {
     pub facts: WeightedFacts,
     pub density: DensityModel,
-    pub proposal: Mixture,
+    /// One for all driver models, or one for each.
+    pub proposals: Vec<Mixture>,
 }
 
 impl PlannedWeighted {
@@ -54,11 +63,11 @@ impl PlannedWeighted {
     ///
     /// # Errors
     /// [`Error::Usage`] where density, headway and models give no lanes.
-    pub fn new(density: DensityModel, proposal: Mixture, mut facts: WeightedFacts) -> Result<PlannedWeighted> {
+    pub fn new(density: DensityModel, proposals: Vec<Mixture>, mut facts: WeightedFacts) -> Result<PlannedWeighted> {
         let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
         facts.density = String::from_utf8(density.to_json()?).map_err(unreadable)?;
-        facts.proposal = proposal_text(&density, &proposal)?;
-        let planned = PlannedWeighted { facts, density, proposal };
+        facts.proposals = proposals.iter().map(|proposal| proposal_text(&density, proposal)).collect::<Result<_>>()?;
+        let planned = PlannedWeighted { facts, density, proposals };
         planned.check_lanes()?;
         Ok(planned)
     }
@@ -90,10 +99,43 @@ impl PlannedWeighted {
             return Err(wrong("its number of samples cannot be"));
         }
         let density = DensityModel::from_json(facts.density.as_bytes(), &place)?;
-        let proposal = proposal_from_text(facts.proposal.as_bytes(), &density, &place)?;
-        let planned = PlannedWeighted { facts, density, proposal };
+        let proposal = |text: &String| proposal_from_text(text.as_bytes(), &density, &place);
+        let proposals: Vec<Mixture> = facts.proposals.iter().map(proposal).collect::<Result<_>>()?;
+        let (models, pilots) = (facts.models.len(), facts.pilots.len());
+        if proposals.len() != if pilots > 0 { models } else { 1 } || (pilots > 0 && pilots != models) {
+            return Err(wrong("its proposals are not one for all driver models or one for each"));
+        }
+        let planned = PlannedWeighted { facts, density, proposals };
         planned.check_lanes()?;
         Ok((planned, run_sha256))
+    }
+
+    /// The same run with the proposals of a pilot: those that an interrupted run left in the folder, or new ones, which
+    /// are left there. Both have the same bits; a pilot takes its time.
+    ///
+    /// # Errors
+    /// Of `search` and [`PlannedWeighted::new`]; [`Error::Io`].
+    pub fn after_pilot(
+        density: DensityModel,
+        facts: WeightedFacts,
+        out: &Path,
+        search: impl FnOnce() -> Result<(Vec<Mixture>, Vec<PilotCheck>)>,
+    ) -> Result<PlannedWeighted> {
+        let path = out.join(PILOT_FILE);
+        let mut planned = PlannedWeighted::new(density, Vec::new(), facts)?;
+        if let Ok((kept, _)) = PlannedWeighted::read(&path) {
+            let asked = WeightedFacts { proposals: Vec::new(), pilots: Vec::new(), ..kept.facts.clone() };
+            if seal(KIND, &asked)?.1 == planned.seal()?.1 {
+                tracing::info!("the pilot is done already");
+                return Ok(kept);
+            }
+        }
+        let (proposals, pilots) = search()?;
+        planned.facts.pilots = pilots;
+        let planned = PlannedWeighted::new(planned.density, proposals, planned.facts)?;
+        make_folder(out)?;
+        write_atomically(&path, &planned.seal()?.0)?;
+        Ok(planned)
     }
 
     /// The headway of every lane, or the density's own.

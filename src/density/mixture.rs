@@ -217,6 +217,19 @@ impl Mixture {
         top + libm::log(near.map(libm::exp).sum::<f64>())
     }
 
+    /// The share of each component in the density at a point, summing to 1; all 0 where the density is 0.
+    pub(crate) fn responsibilities(&self, point: &[f64]) -> Vec<f64> {
+        let mut parts = Vec::new();
+        let top = self.log_parts(point, &mut parts);
+        if top == f64::NEG_INFINITY {
+            return vec![0.0; parts.len()];
+        }
+        parts.iter_mut().for_each(|part| *part = libm::exp(*part - top));
+        let sum: f64 = parts.iter().sum();
+        parts.iter_mut().for_each(|part| *part /= sum);
+        parts
+    }
+
     /// ln of each component's weighted density at a point, into `parts`; gives the largest.
     pub(super) fn log_parts(&self, point: &[f64], parts: &mut Vec<f64>) -> f64 {
         let (d, n) = (self.dimensions, self.weights.len());

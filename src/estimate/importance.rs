@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
 use super::draws::{batches, draw, judged};
@@ -119,7 +120,8 @@ impl Density for Defended<'_> {
 }
 
 /// Failures of a sample of the density itself, to compare an estimate with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PilotCheck {
     /// Runs of the pilot.
     pub runs: u64,
@@ -128,6 +130,12 @@ pub struct PilotCheck {
 }
 
 impl PilotCheck {
+    /// Adds the pilot to an estimate that follows it: its runs, and the warning where the two disagree.
+    pub fn add_to(&self, estimate: &mut Estimate) {
+        estimate.set_runs(estimate.runs + self.runs);
+        self.check(estimate);
+    }
+
     /// The warning where the pilot's failures are too unlikely under an estimate.
     pub(crate) fn check(&self, estimate: &mut Estimate) {
         let p = estimate.probability;
@@ -284,7 +292,8 @@ pub fn worst_share(points: &[Vec<f64>], values: &[f64], share: f64) -> Vec<Vec<f
 }
 
 /// How a pilot makes a proposal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Pilot {
     /// Draws of the density.
     pub runs: u64,
@@ -336,7 +345,26 @@ pub fn from_pilot_with_proposal(
     pilot: &Pilot,
     options: &Importance,
 ) -> Result<(Estimate, Mixture)> {
-    let stream = Stream { seed: options.seed, purpose: purpose::NOMINAL };
+    let (fitted, check) = pilot_proposal(nominal, limit_state, fit, pilot, options.seed)?;
+    let proposal = defended(fitted, nominal, pilot.defence)?;
+    let mut estimate = importance(nominal, &proposal, limit_state, options)?;
+    check.add_to(&mut estimate);
+    Ok((estimate, proposal.proposal().clone()))
+}
+
+/// The proposal that a pilot finds, without its defensive share, and what the pilot counted. Estimates of the draws of
+/// both are checked with [`PilotCheck::add_to`].
+///
+/// # Errors
+/// As [`from_pilot`].
+pub fn pilot_proposal(
+    nominal: &dyn Density,
+    limit_state: &dyn LimitState,
+    fit: &dyn FitProposal,
+    pilot: &Pilot,
+    seed: u64,
+) -> Result<(Mixture, PilotCheck)> {
+    let stream = Stream { seed, purpose: purpose::NOMINAL };
     let first = judged(nominal, limit_state, stream, 0..pilot.runs)?;
     if first.points.is_empty() {
         return Err(no_valid_point("pilot"));
@@ -350,13 +378,9 @@ pub fn from_pilot_with_proposal(
         let broad = Mixture::fit(&worst, &vec![1.0; worst.len()], &one)?.widened(&covariance, 0.25)?;
         fitted = Mixture::join(&[(1.0 - pilot.broad, &fitted), (pilot.broad, &broad)])?;
     }
-    let proposal = defended(fitted, nominal, pilot.defence)?;
-    let mut estimate = importance(nominal, &proposal, limit_state, options)?;
     let runs = first.points.len() as u64;
     let failures = first.values.iter().filter(|v| **v <= 0.0).count() as u64;
-    estimate.set_runs(estimate.runs + runs);
-    PilotCheck { runs, failures }.check(&mut estimate);
-    Ok((estimate, proposal.proposal().clone()))
+    Ok((fitted, PilotCheck { runs, failures }))
 }
 
 /// The error where no draw is valid.

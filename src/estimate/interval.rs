@@ -18,6 +18,8 @@ pub enum IntervalKind {
     RuleOfThree,
     /// Student's t on ln P.
     LogStudent,
+    /// Wilson's with the effective number of runs of clusters.
+    Clusters,
     /// Nothing was found and nothing bounds the probability from above but 1.
     Nothing,
 }
@@ -115,6 +117,12 @@ pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
         return quantile(p);
     }
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or_else(|_| quantile(p), |t| t.inverse_cdf(p))
+}
+
+/// The normal quantile over Student's at a level: at most 1.
+pub(super) fn student_factor(degrees_of_freedom: f64, level: f64) -> f64 {
+    let p = 0.5 + 0.5 * level;
+    quantile(p) / student_quantile(p, degrees_of_freedom)
 }
 
 /// x with I_x(a, b) = p, to the last digits that the regularised incomplete beta function has. Bisection of ln x:

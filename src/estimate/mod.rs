@@ -12,6 +12,7 @@ mod cross_entropy;
 mod draws;
 mod importance;
 mod interval;
+mod kernels;
 mod monte_carlo;
 mod problem;
 mod ratio;
@@ -28,9 +29,10 @@ pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
     Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_pilot_with_proposal,
-    from_weight_sums, importance, importance_sums, worst_share,
+    from_weight_sums, importance, importance_sums, pilot_proposal, worst_share,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
+pub use kernels::{KernelShares, kernel_shares};
 pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};

@@ -25,6 +25,8 @@ pub(crate) mod purpose {
     pub const CHAIN: u32 = 0x4553_2000;
     /// Draws of one of several techniques: its number is added.
     pub const TECHNIQUE: u32 = 0x4553_3000;
+    /// Draws that tell which kernels failures come from.
+    pub const SHARES: u32 = 0x4553_0004;
     /// The estimate of a validity share.
     pub const VALIDITY: u32 = 0x4553_0003;
 }

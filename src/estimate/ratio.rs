@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::interval::{Interval, rule_of_three, student_quantile, wilson};
+use super::interval::{Interval, IntervalKind, rule_of_three, student_factor, student_quantile, wilson};
 
 /// Runs and failures, one number per cluster; both slices are equally long.
 #[derive(Debug, Clone, Copy)]
@@ -48,37 +48,55 @@ pub struct ClusterRate {
     pub variance: f64,
     /// Its interval.
     pub interval: Interval,
+    /// Effective number of failing clusters, (Σk)²/Σk²; 0 without failures.
+    pub effective_failing: f64,
+}
+
+/// (Σx)²/Σx² (Kish): how many equal numbers these count as; 0 where all are 0.
+fn effective_number(values: impl Iterator<Item = u64>) -> f64 {
+    let (sum, squares) = values.fold((0.0, 0.0), |(sum, squares), x| (sum + x as f64, squares + x as f64 * x as f64));
+    if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
 /// The rate with the variance between clusters, N/(N − 1)·Σ((k_i − R·m_i)/Σm)² (the ultimate-cluster estimator: it
-/// holds what happens within clusters too; Cochran, "Sampling Techniques", 11.9). The interval is made as that of
-/// [`super::from_clusters`], which this is for clusters of equal size.
+/// holds what happens within clusters too; Cochran, "Sampling Techniques", 11.9).
+///
+/// The interval is Wilson's with the effective number of runs R(1 − R)/variance·(z/t)² (Korn and Graubard, Survey
+/// Methodology 24, 1998). It lies between the effective number of clusters, (Σm)²/Σm², which one fully correlated
+/// cluster of runs each would give, and the number of runs. t has one degree of freedom less than the smaller of the
+/// effective numbers of failing and of passing clusters: the variance is known from few clusters only.
 pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
     let n = clusters.runs.len() as f64;
     let (rate, total) = (clusters.rate(), clusters.runs.iter().sum::<u64>());
     let squares: f64 = clusters.influences().map(|z| z * z).sum();
     let variance = if n > 1.0 { n / (n - 1.0) * squares } else { rate * (1.0 - rate) };
+    let effective_failing = effective_number(clusters.failures.iter().copied());
+    let passed = clusters.runs.iter().zip(clusters.failures).map(|(runs, failures)| runs.saturating_sub(*failures));
+    let least = effective_number(clusters.runs.iter().copied()).max(1.0);
     let interval = if clusters.failed() == 0 {
-        rule_of_three(clusters.runs.len() as u64, level)
+        rule_of_three(least as u64, level)
     } else {
-        let binomial = rate * (1.0 - rate);
-        let effective = if variance > 0.0 { (binomial / variance).clamp(1.0, total as f64) } else { n };
-        wilson(rate * effective, effective, level)
+        let freedom = effective_failing.min(effective_number(passed)) - 1.0;
+        let factor = student_factor(freedom, level);
+        let effective = rate * (1.0 - rate) / variance * factor * factor;
+        // Without any variance the clusters alone bound the rate.
+        let effective = if variance > 0.0 { effective.clamp(least, (total as f64).max(least)) } else { least };
+        Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
     };
-    ClusterRate { rate, variance, interval }
+    ClusterRate { rate, variance, interval, effective_failing }
 }
 
 /// What a ratio says of its numerator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RatioVerdict {
-    /// The interval of the ratio holds 1.
+    /// The interval of the ratio lies within [1/margin, margin].
     Agrees,
-    /// The interval lies above 1.
+    /// The interval lies above 1, and reaches beyond the margin.
     TooHigh,
-    /// The interval lies below 1.
+    /// The interval lies below 1, and reaches beyond the margin.
     TooLow,
-    /// Too few failures to tell.
+    /// The interval holds 1 and reaches beyond the margin, or there are too few failures.
     Undecided,
 }
 
@@ -118,18 +136,22 @@ pub enum RatioMethod {
     Separate,
 }
 
-/// How many failures each side needs for the paired interval.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// What a verdict needs: failures on each side for the paired interval, and a margin for agreement.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Enough {
     /// Failed runs.
     pub failures: u64,
     /// Clusters with a failed run.
     pub clusters: u64,
+    /// Ratio up to which rates count as equal, above 1.
+    pub margin: f64,
 }
 
 impl Default for Enough {
     fn default() -> Self {
-        Enough { failures: 10, clusters: 5 }
+        // 0.8 … 1.25: the limits that two drugs must keep to be called equivalent (European Medicines Agency,
+        // CPMP/EWP/QWP/1401/98).
+        Enough { failures: 10, clusters: 5, margin: 1.25 }
     }
 }
 
@@ -154,7 +176,8 @@ pub struct Ratio {
 /// σ² = N/(N − 1)·Σ(z_i/P − y_i/S)², z and y being the clusters' influences on numerator and denominator: the delta
 /// method on the logarithm, which takes the covariance of the two with it. What varies within clusters (draws of a
 /// Monte Carlo sample) is in σ² as well. t has one degree of freedom less than the side with fewer failing clusters
-/// has of them. A numerator that equals the denominator cluster by cluster has the interval [1, 1].
+/// has of them. A numerator that equals the denominator cluster by cluster has the interval [1, 1]. Rates agree where
+/// the interval lies within the margin; an interval that holds 1 and is wider decides nothing.
 ///
 /// With too few failures the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]: 1 outside still decides,
 /// 1 inside is undecided, not agreement.
@@ -182,9 +205,10 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, 
     let ratio = p / s;
     let (low, high) = (ratio / factor, ratio * factor);
     let verdict = match () {
+        () if low >= 1.0 / enough.margin && high <= enough.margin => RatioVerdict::Agrees,
         () if low > 1.0 => RatioVerdict::TooHigh,
         () if high < 1.0 => RatioVerdict::TooLow,
-        () => RatioVerdict::Agrees,
+        () => RatioVerdict::Undecided,
     };
     Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method: RatioMethod::Paired, verdict }
 }
@@ -204,7 +228,41 @@ mod tests {
         let theirs = from_clusters(200, 10, failures.iter().sum(), squares, 0.95, StopReason::Samples);
         assert_eq!(ours.rate, theirs.probability);
         assert!((ours.variance / theirs.variance - 1.0).abs() < 1e-12);
-        assert!((ours.interval.high - theirs.interval.high).abs() < 1e-12);
+        // Student's t for the few clusters that the variance is known from.
+        assert!(ours.interval.low < theirs.interval.low && theirs.interval.high < ours.interval.high);
+        assert!((50.0..110.0).contains(&ours.effective_failing), "{}", ours.effective_failing);
+    }
+
+    #[test]
+    fn few_clusters_never_make_a_narrow_interval() {
+        let of =
+            |failures: &[u64]| cluster_rate(Clusters { runs: &vec![1000; failures.len()], failures }, 0.95).interval;
+        // All of one failing cluster's failures, or all runs of all: the number of clusters bounds the rate.
+        let one = of(&[0, 0, 0, 0, 0, 0, 0, 0, 30]);
+        assert!(one.low < 1e-4 && one.high > 0.04, "{one:?}");
+        let all = of(&[1000; 9]);
+        assert!(all.high == 1.0 && (0.6..0.8).contains(&all.low), "{all:?}");
+        assert!((of(&[0; 9]).high - 0.283).abs() < 1e-3);
+        let holds = |failures: &[u64]| {
+            let rate = failures.iter().sum::<u64>() as f64 / (1000.0 * failures.len() as f64);
+            of(failures).holds(rate)
+        };
+        assert!(holds(&[999, 1000]) && holds(&[1, 0, 0]) && holds(&[1000, 0]) && holds(&[1000]));
+    }
+
+    #[test]
+    fn an_interval_that_holds_one_and_is_wide_decides_nothing() {
+        let runs = vec![10; 40];
+        let denominator: Vec<u64> = (0..40).map(|k| [0, 6, 0, 0][k % 4]).collect();
+        let numerator: Vec<u64> = (0..40).map(|k| [0, 3, 0, 4][k % 4]).collect();
+        let of = |margin: f64| {
+            let enough = Enough { margin, ..Enough::default() };
+            let side = |failures| Clusters { runs: &runs, failures };
+            paired_ratio(side(&numerator), side(&denominator), enough, 0.95)
+        };
+        let (narrow, wide) = (of(1.25), of(3.0));
+        assert!(narrow.low < Some(1.0) && narrow.high > Some(1.25), "{narrow:?}");
+        assert_eq!((narrow.verdict, wide.verdict), (RatioVerdict::Undecided, RatioVerdict::Agrees));
     }
 
     #[test]

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::interval::Interval;
+use super::ratio::ClusterRate;
 use super::stop::StopReason;
-use super::trust::Trust;
+use super::trust::{Trust, Warning};
 
 /// A probability of failure with all that is known of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,7 +80,7 @@ impl Estimate {
     ) -> Estimate {
         let mut trust = Trust::default();
         trust.about_failures(failures);
-        trust.warn_if(!stopped.is_reproducible(), super::Warning::NotReproducible);
+        trust.warn_if(!stopped.is_reproducible(), Warning::NotReproducible);
         let mut estimate = Estimate {
             method: method.to_owned(),
             probability,
@@ -97,6 +98,24 @@ impl Estimate {
         };
         estimate.set_runs(runs);
         estimate
+    }
+
+    /// The same estimate with the uncertainty of the data in it: `clusters` are the draws around each scenario. Neither
+    /// variance nor interval gets smaller; the variance reduction stays that of the draws.
+    pub(crate) fn over_scenarios(mut self, clusters: &ClusterRate) -> Estimate {
+        let (own, with_data) = (self.interval, clusters.interval);
+        self.interval.low = own.low.min(with_data.low);
+        self.interval.high = own.high.max(with_data.high);
+        self.interval.kind = with_data.kind;
+        self.relative_half_width = self.interval.relative_half_width(self.probability);
+        self.variance = self.variance.max(clusters.variance);
+        if self.probability > 0.0 {
+            self.coefficient_of_variation = self.variance.sqrt() / self.probability;
+        }
+        let scenarios = clusters.effective_failing;
+        self.trust
+            .warn_if(self.failures > 0 && scenarios < Warning::LEAST_SCENARIOS, Warning::FewScenarios { scenarios });
+        self
     }
 
     /// Counts runs that were spent before the final sample too.

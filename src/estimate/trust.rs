@@ -15,6 +15,14 @@ pub enum Warning {
         /// How many.
         failures: u64,
     },
+    /// The failures come from effectively fewer than [`Warning::LEAST_SCENARIOS`] scenarios: other data would give
+    /// another probability, and how much so is itself badly known.
+    FewScenarios {
+        /// (Σk)²/Σk² over the failures around each scenario.
+        scenarios: f64,
+    },
+    /// The interval is that of the draws alone, but the density rests on data.
+    DataLeftOut,
     /// Effective sample size over the failures below [`Warning::LEAST_EFFECTIVE_SIZE`]: the variance itself is
     /// badly known.
     LowEffectiveSize {
@@ -82,6 +90,8 @@ pub enum Warning {
 impl Warning {
     /// Failures below which [`Warning::FewFailures`] is raised.
     pub const LEAST_FAILURES: u64 = 10;
+    /// Effective number of failing scenarios below which [`Warning::FewScenarios`] is raised.
+    pub const LEAST_SCENARIOS: f64 = 10.0;
     /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
     pub const LEAST_EFFECTIVE_SIZE: f64 = 30.0;
     /// Share of the estimate above which [`Warning::OneWeightDominates`] is raised.
@@ -124,6 +134,11 @@ impl fmt::Display for Warning {
             Warning::NoFailures => write!(f, "no failure was found: the probability is only bounded from above"),
             Warning::FewFailures { failures: 1 } => write!(f, "only 1 failure was found"),
             Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
+            Warning::FewScenarios { scenarios } => {
+                let least = Warning::LEAST_SCENARIOS;
+                write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {least} are needed")
+            }
+            Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
             Warning::LowEffectiveSize { effective_size } => {
                 write!(f, "the failures count as no more than {effective_size:.1} equally weighted ones")
             }

@@ -235,18 +235,19 @@ impl CompareFile {
 
     /// How to read a cell.
     fn rule(&self) -> String {
-        let Enough { failures, clusters } = self.enough;
+        let Enough { failures, clusters, margin } = self.enough;
         let text = format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
-             interval holds 1. > too high, < too low: it does not. ? undecided: fewer than {failures} failed lanes or \
-             {clusters} failing scenarios on one side, and the two intervals meet. S' is replayed, density is drawn. \
-             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
+             interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
+             beyond. ? undecided: it holds 1 and is wider, or fewer than {failures} failed lanes or {clusters} failing \
+             scenarios are on one side and the two intervals meet. S' is replayed, density is drawn. \
+             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, from headways that are imposed, not observed. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
-             says whether these scenarios are represented, not whether they are enough. A verdict says \
-             nothing of size: a ratio of 0.99 can be too low, agreement with a wide interval is weak. Of cells that do \
-             agree, 1 in 20 is marked otherwise by chance. Risks \
+             says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \
+             most 1 in 20 is marked too high or too low by chance. Risks \
              have the ratios of the rates: S and densities have the same exposure.",
-            100.0 * self.level
+            100.0 * self.level,
+            1.0 / margin
         );
         wrap(&text, WIDTH)
     }

@@ -2,7 +2,7 @@
 
 use crate::criterion::Criterion;
 use crate::parameterization::ParameterizationId;
-use crate::score::{ClaimResult, Interval, ScoreTable, f1, precision, recall};
+use crate::score::{Cell, ClaimResult, Interval, ScoreTable, f1, precision, recall};
 use crate::table::cell_text;
 use crate::{Error, Result};
 
@@ -68,6 +68,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
         "f1",
         "f1_low",
         "f1_high",
+        "f1_no_interval",
         "undefined_draws",
         "data",
     ])];
@@ -93,12 +94,22 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
                 number(f1(c)),
                 end(|i| i.low),
                 end(|i| i.high),
+                no_interval(cell),
                 cell.undefined_draws.to_string(),
                 data.to_owned(),
             ]);
         }
     }
     text(rows)
+}
+
+/// Why F1 has no interval; empty where it has one.
+fn no_interval(cell: &Cell) -> String {
+    match (f1(&cell.counts), cell.f1_interval) {
+        (_, Some(_)) => String::new(),
+        (None, None) => "undefined".to_owned(),
+        (Some(_), None) => "too few failures of S".to_owned(),
+    }
 }
 
 /// Claims: per claim one row over all cells (`model` and `criterion` empty), then one per cell.

@@ -29,6 +29,7 @@ pub mod sampled_rows;
 pub mod sampling;
 pub mod sampling_figures;
 mod sampling_page;
+mod sampling_rules;
 pub mod sampling_tables;
 pub mod study;
 mod study_document;

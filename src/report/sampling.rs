@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::run_record::DeviceRecord;
-use super::tables::{aligned, table};
+use super::tables::{WIDTH, aligned, table, wrap};
 use crate::density::{DensityModel, Provenance};
 use crate::driver::ModelId;
 use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
@@ -303,7 +303,7 @@ impl EstimateFile {
             let mut fields = vec![
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
-                row.headway.clone(),
+                self.headway_cell(row),
                 count(e.failures),
                 short(e.probability),
                 interval_text(e.interval.low, e.interval.high, e.interval.kind),
@@ -327,18 +327,22 @@ impl EstimateFile {
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
             text.push_str(&self.weights_text());
         }
-        if self.estimates.iter().any(|r| r.headway == "all") {
-            text.push_str("Means over all headways; every headway of its own is in estimates.csv\n");
+        if let Some(rule) = self.mean_rule() {
+            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
+        }
+        if let Some(rule) = self.exposure_rule() {
+            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         }
         if let Some(record) = &self.bootstrap {
             text.push_str(&bootstrap_text(record));
         }
         let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
-        let _ = writeln!(
-            text,
-            "Intervals at {} %; ± is the half-width of that of P over P; ≤ bounds from above where nothing failed",
-            value(100.0 * level)
+        let rule = format!(
+            "Intervals at {} %{}; ± is the half-width of that of P over P; ≤ bounds from above where nothing failed",
+            value(100.0 * level),
+            self.interval_rule()
         );
+        let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         // A density of N scenarios was never seen beyond them.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
         let is_fitted = self.density.kernels > 0;

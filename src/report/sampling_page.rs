@@ -63,7 +63,7 @@ impl EstimateFile {
             let mut fields = vec![
                 row.model.name().to_owned(),
                 row.criterion.label().to_owned(),
-                row.headway.clone(),
+                self.headway_cell(row),
                 count(e.runs),
                 count(e.failures),
                 short(e.probability),
@@ -92,8 +92,9 @@ impl EstimateFile {
         let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
         let mut tables = vec![PageTable {
             caption: format!(
-                "Probability of failure with its {} % interval, and risk where the exposure is known",
-                value(100.0 * level)
+                "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
+                value(100.0 * level),
+                self.interval_rule()
             ),
             header: header.map(str::to_owned).to_vec(),
             texts: 3,
@@ -134,7 +135,7 @@ impl EstimateFile {
             title: "Estimates".to_owned(),
             intro: format!(
                 "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
-                 {}Every headway of its own is in estimates.csv.",
+                 {}{}",
                 match self.density.kernels {
                     0 => String::new(),
                     kernels => format!(
@@ -143,7 +144,12 @@ impl EstimateFile {
                         short(1.0 / kernels as f64),
                         count_of(kernels)
                     ),
-                }
+                },
+                [self.mean_rule(), self.exposure_rule()]
+                    .into_iter()
+                    .flatten()
+                    .map(|rule| rule + ". ")
+                    .collect::<String>()
             ),
             tables,
             facts: said.collect(),

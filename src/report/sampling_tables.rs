@@ -28,6 +28,9 @@ impl EstimateFile {
             "high",
             "level",
             "interval",
+            "draws_low",
+            "draws_high",
+            "failing_scenarios",
             "relative_half_width",
             "coefficient_of_variation",
             "variance_reduction",
@@ -66,6 +69,7 @@ impl EstimateFile {
             let numbers = [Some(e.probability), Some(e.interval.low), Some(e.interval.high), Some(e.interval.level)];
             fields.extend(numbers.map(number));
             fields.push(kind_name(e.interval.kind).to_owned());
+            fields.extend([Some(row.draws[0]), Some(row.draws[1]), row.failing_scenarios].map(number));
             let numbers = [
                 Some(e.relative_half_width),
                 Some(e.coefficient_of_variation),
@@ -180,6 +184,7 @@ fn kind_name(kind: IntervalKind) -> &'static str {
         IntervalKind::ClopperPearson => "clopper_pearson",
         IntervalKind::RuleOfThree => "rule_of_three",
         IntervalKind::LogStudent => "log_student",
+        IntervalKind::Clusters => "clusters",
         IntervalKind::Nothing => "nothing",
     }
 }

@@ -144,7 +144,7 @@ impl StudyReport {
         header.extend(scores.variants.iter().skip(1).cloned());
         let rows = tables::f1_rows(scores, self.published);
         let level = value(100.0 * self.scores.options.confidence);
-        PageTable { caption: format!("F1 with its {level} % bootstrap interval"), header, texts: 2, rows }
+        PageTable { caption: format!("F1 with its {level} % interval over scenarios"), header, texts: 2, rows }
     }
 
     fn claims(&self) -> Section {

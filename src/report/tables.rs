@@ -66,7 +66,7 @@ pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<Stri
     rows
 }
 
-/// F1 per parameterization, model and criterion, with the bootstrap interval.
+/// F1 per parameterization, model and criterion, with its interval.
 pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
     let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
     header.extend(scores.variants.iter().skip(1).cloned());
@@ -75,7 +75,7 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
         table.add_row(row);
     }
     format!(
-        "{}: F1 of S' against S over {} scenarios, [bootstrap interval]; - is undefined (0/0)\n{}",
+        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: too few failures\n{}",
         scores.category.label(),
         readable::count(scores.scenarios),
         aligned(table, 2)
@@ -108,7 +108,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
 fn value(value: Option<f64>, interval: Option<Interval>) -> String {
     match (value, interval) {
         (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
-        (Some(value), None) => format!("{value:.3}"),
+        (Some(value), None) => format!("{value:.3}\n[few]"),
         (None, _) => "-".to_owned(),
     }
 }
@@ -159,6 +159,9 @@ fn difference(row: &ClaimRow) -> String {
     let mut text = row.value.map_or("-".to_owned(), |v| format!("{v:+.3}"));
     if let Some(Interval { low, high }) = row.interval {
         let _ = write!(text, "\n[{low:+.2} {high:+.2}]");
+    }
+    if row.undefined_draws > 0 {
+        let _ = write!(text, "\n{} draws 0/0", row.undefined_draws);
     }
     text
 }

@@ -338,7 +338,7 @@ pub fn compare_cells(
         };
         let with_data = cluster_rate(sampled.counts.cell(cell), level).interval;
         let sampled = SampledCell {
-            rate: RateRecord::of(&row.estimate),
+            rate: RateRecord { low: row.draws[0], high: row.draws[1], ..RateRecord::of(&row.estimate) },
             with_data: [with_data.low, with_data.high],
             ratio: paired_ratio(sampled.counts.cell(cell), s.cell(cell), enough, level),
             risk: row.risk,

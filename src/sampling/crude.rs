@@ -59,7 +59,7 @@ pub struct CheckpointRow {
     pub criterion: Criterion,
     /// Estimate.
     pub probability: f64,
-    /// Ends of its interval.
+    /// Ends of the interval of the draws alone: more samples make it smaller.
     pub interval: [f64; 2],
 }
 
@@ -206,7 +206,7 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
         model: row.model,
         criterion: row.criterion,
         probability: row.estimate.probability,
-        interval: [row.estimate.interval.low, row.estimate.interval.high],
+        interval: row.draws,
     };
     kept.map(of).collect()
 }
@@ -222,7 +222,8 @@ fn stopped(
 ) -> Option<StopReason> {
     let has_all = rows.iter().any(|row| row.headway == "all");
     let judged = rows.iter().filter(|r| r.criterion == criterion && (!has_all || r.headway == "all"));
-    let widest = judged.max_by(|a, b| a.estimate.relative_half_width.total_cmp(&b.estimate.relative_half_width))?;
+    // More samples make the draws' share of the uncertainty smaller, never that of the data.
+    let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };
-    rule.at(samples, widest.estimate.failures, widest.estimate.relative_half_width, started)
+    rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
 }

@@ -3,9 +3,9 @@
 use super::limit_state::limit_state;
 use super::plan::{SampleHeadways, plan_points};
 use crate::criterion::Criterion;
-use crate::density::DensityModel;
+use crate::density::{DensityModel, Mixture};
 use crate::driver::ModelId;
-use crate::estimate::{LimitState, Truncated};
+use crate::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
 use crate::profile::Profile;
 use crate::sweep::{Backend, SweepOptions, Wanted, sweep};
 use crate::{Error, Result};
@@ -50,4 +50,20 @@ impl LimitState for LaneLimitState<'_> {
 /// As [`Truncated::with_share`].
 pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> bool + Sync + '_>> {
     Truncated::with_share(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
+}
+
+/// Which scenarios failures come from, by draws of a proposal that keeps a share `defence` of the density. `None` where
+/// none of them fails.
+///
+/// # Errors
+/// Of the lanes.
+pub fn scenario_shares(
+    lanes: &LaneLimitState,
+    proposal: &Mixture,
+    defence: f64,
+    seed: u64,
+) -> Result<Option<KernelShares>> {
+    let nominal = truncated(lanes.density)?;
+    let proposal = defended(proposal.clone(), &nominal, defence)?;
+    kernel_shares(nominal.mixture(), &nominal, &proposal, lanes, seed)
 }

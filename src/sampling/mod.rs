@@ -8,6 +8,7 @@ mod compare;
 mod conditional;
 mod crude;
 mod generator;
+mod kernels;
 mod lanes;
 mod limit_state;
 mod map;
@@ -28,7 +29,8 @@ pub use crude::{
     Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, checkpoints, crude_of_segments, sample_crude, sample_into,
 };
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
-pub use lanes::{LaneLimitState, truncated};
+pub use kernels::KernelCounts;
+pub use lanes::{LaneLimitState, scenario_shares, truncated};
 pub use limit_state::limit_state;
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};

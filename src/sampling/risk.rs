@@ -12,7 +12,8 @@ pub struct RiskRate {
     pub estimate: f64,
     /// Standard deviation of the product, √(λ²σ_P² + P²σ_λ² + σ_λ²σ_P²): λ̂ and P̂ come from independent counts.
     pub standard_deviation: f64,
-    /// Lower end of the interval at the estimate's level: log-normal with this deviation; 0 without failures.
+    /// Lower end of the interval at the estimate's level: that of P and a log-normal one of λ, whose distances from the
+    /// estimate add as squares on the logarithm (Zou and Donner, Statistics in Medicine 27, 2008); 0 without failures.
     pub low: f64,
     /// Upper end; without failures the upper ends of both intervals multiplied.
     pub high: f64,
@@ -40,8 +41,10 @@ impl RiskRate {
             return RiskRate { estimate: product, standard_deviation, low: 0.0, high };
         }
         let z = normal_quantile(0.5 + 0.5 * estimate.interval.level);
-        let factor = libm::exp(z * libm::sqrt(libm::log1p((standard_deviation / product).powi(2))));
-        RiskRate { estimate: product, standard_deviation, low: product / factor, high: product * factor }
+        let of_events = z * libm::sqrt(libm::log1p((deviation / events).powi(2)));
+        let factor = |of_p: f64| libm::exp(libm::hypot(libm::log(of_p), of_events));
+        let (low, high) = (product / factor(p / estimate.interval.low), product * factor(estimate.interval.high / p));
+        RiskRate { estimate: product, standard_deviation, low, high }
     }
 }
 

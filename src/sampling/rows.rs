@@ -7,7 +7,9 @@ use super::tally::SampleTally;
 use crate::criterion::Criterion;
 use crate::density::Exposure;
 use crate::driver::ModelId;
-use crate::estimate::{BinomialInterval, Counts, Estimate, StopReason, from_clusters, from_counts};
+use crate::estimate::{
+    BinomialInterval, Counts, Estimate, Interval, KernelShares, StopReason, Warning, from_clusters, from_counts,
+};
 use crate::sweep::LanePlan;
 
 /// An estimate and what it is of.
@@ -19,10 +21,48 @@ pub struct EstimateRow {
     pub criterion: Criterion,
     /// Headway: `1.4s`, `sampled`, or `all` for the mean over those of the plan.
     pub headway: String,
-    /// The probability that a sampled lane fails.
+    /// The probability that a sampled lane fails. Where samples tell their scenarios, the uncertainty of the data is in
+    /// its variance and interval.
     pub estimate: Estimate,
+    /// Ends of the interval of the draws alone: as if the density were the truth.
+    pub draws: [f64; 2],
+    /// Effective number of scenarios that the failures come from, where samples tell their scenarios.
+    pub failing_scenarios: Option<f64>,
     /// Failures per hour and per 1,000 km, where the exposure is known.
     pub risk: Risk,
+}
+
+impl EstimateRow {
+    /// A row whose interval is that of the draws alone.
+    pub fn of_draws(
+        model: ModelId,
+        criterion: Criterion,
+        headway: String,
+        estimate: Estimate,
+        exposure: Option<&Exposure>,
+    ) -> EstimateRow {
+        let draws = [estimate.interval.low, estimate.interval.high];
+        let risk = Risk::of(&estimate, exposure);
+        EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk }
+    }
+
+    /// The same with the uncertainty of the data in it, or a warning that it is not.
+    pub fn with_data(mut self, shares: Option<&KernelShares>, exposure: Option<&Exposure>) -> EstimateRow {
+        let Some(shares) = shares else {
+            self.estimate.trust.warn_if(true, Warning::DataLeftOut);
+            return self;
+        };
+        self.estimate = self.estimate.over_kernels(shares);
+        self.failing_scenarios = Some(shares.effective_failing);
+        self.risk = Risk::of(&self.estimate, exposure);
+        self
+    }
+
+    /// Half the width of the draws' interval over the probability, which more samples make smaller; ∞ at zero.
+    pub fn draws_half_width(&self) -> f64 {
+        let [low, high] = self.draws;
+        Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
+    }
 }
 
 /// Name of a plan's headway in tables.
@@ -45,21 +85,29 @@ pub fn crude_rows(
     let mut rows = Vec::new();
     for (model, &id) in plan.models.iter().enumerate() {
         for criterion in Criterion::ALL {
-            let failed = |headway: usize| tally.failures[(headway * models + model) * criteria + criterion.index()];
-            let mut push = |headway: String, estimate: Estimate| {
-                let risk = Risk::of(&estimate, exposure);
-                rows.push(EstimateRow { model: id, criterion, headway, estimate, risk });
+            let cell = |headway: usize| (headway * models + model) * criteria + criterion.index();
+            let mut push = |headway: String, estimate: Estimate, cells: &[usize]| {
+                let mut row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
+                if let Some(counts) = &tally.by_kernel {
+                    let clusters = counts.rate(cells, level);
+                    row.estimate = row.estimate.over_scenarios(&clusters);
+                    row.failing_scenarios = Some(clusters.effective_failing);
+                    row.risk = Risk::of(&row.estimate, exposure);
+                }
+                rows.push(row);
             };
             if headways > 1 {
-                let sum = (0..headways).map(failed).sum();
+                let sum = (0..headways).map(|headway| tally.failures[cell(headway)]).sum();
                 let squares = tally.squares[model * criteria + criterion.index()];
                 let mut all = from_clusters(runs, headways as u64, sum, squares, level, stopped);
                 all.voids = tally.voids;
-                push("all".to_owned(), all);
+                push("all".to_owned(), all, &(0..headways).map(cell).collect::<Vec<_>>());
             }
             for headway in 0..headways {
-                let counts = Counts { runs, failures: failed(headway), voids: tally.voids, tries: tally.tries };
-                push(headway_name(plan, headway, is_sampled), from_counts(&counts, interval, level, stopped));
+                let failures = tally.failures[cell(headway)];
+                let counts = Counts { runs, failures, voids: tally.voids, tries: tally.tries };
+                let estimate = from_counts(&counts, interval, level, stopped);
+                push(headway_name(plan, headway, is_sampled), estimate, &[cell(headway)]);
             }
         }
     }

@@ -6,6 +6,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
 use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use crate::criterion::Criterion;
@@ -15,7 +16,7 @@ use crate::sweep::{Chunk, LanePlan};
 use crate::{Error, Place, Result};
 
 /// Samples that one task counts.
-const TASK: u64 = 4096;
+const TASK: usize = 4096;
 
 /// A lane with its limit state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -59,6 +60,8 @@ pub struct SampleTally {
     worst_limit: usize,
     /// The failure map, one count of failures per model.
     pub map: Option<MapCounts>,
+    /// The same samples and failures by kernel, where the points come from kernels.
+    pub by_kernel: Option<KernelCounts>,
 }
 
 impl SampleTally {
@@ -76,6 +79,7 @@ impl SampleTally {
             worst: vec![Vec::new(); models],
             worst_limit: options.worst,
             map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), models)),
+            by_kernel: KernelCounts::empty(plan),
         }
     }
 
@@ -93,13 +97,13 @@ impl SampleTally {
         if chunk.verdicts.is_empty() || (options.worst > 0 && chunk.outcomes.is_empty()) {
             return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
         }
-        let empty = || SampleTally::empty(plan, options);
+        let empty = || SampleTally { by_kernel: None, ..SampleTally::empty(plan, options) };
         let units = chunk.units.clone();
-        let tasks = (units.end - units.start).div_ceil(TASK);
-        let counted = (0..tasks).into_par_iter().fold(empty, |mut tally, task| {
-            let from = units.start + task * TASK;
-            for unit in from..units.end.min(from + TASK) {
-                tally.count(plan, generator, chunk, options, unit);
+        let mut kernels = vec![NO_KERNEL; (units.end - units.start) as usize];
+        let tasks = kernels.par_chunks_mut(TASK).enumerate();
+        let counted = tasks.fold(empty, |mut tally, (task, kernels)| {
+            for (unit, kernel) in (units.start + (task * TASK) as u64..).zip(kernels) {
+                *kernel = tally.count(plan, generator, chunk, options, unit);
             }
             tally
         });
@@ -109,9 +113,14 @@ impl SampleTally {
             a
         });
         tally.covered = vec![units];
+        tally.by_kernel = KernelCounts::empty(plan);
+        if let Some(counts) = &mut tally.by_kernel {
+            counts.count(plan, chunk, &kernels);
+        }
         Ok(tally)
     }
 
+    /// Counts the lanes of one sample; returns its kernel.
     fn count(
         &mut self,
         plan: &LanePlan,
@@ -119,12 +128,12 @@ impl SampleTally {
         chunk: &Chunk,
         options: &TallyOptions,
         unit: u64,
-    ) {
+    ) -> u32 {
         let drawn = generator.map(|generator| generator.draw(unit));
         if drawn.as_ref().is_some_and(Drawn::is_void) {
             self.voids += 1;
             self.tries += u64::from(ATTEMPTS);
-            return;
+            return NO_KERNEL;
         }
         self.tries += drawn.as_ref().map_or(1, |drawn| u64::from(drawn.tries));
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
@@ -158,6 +167,8 @@ impl SampleTally {
         if let (Some(map), Some(cell)) = (&mut self.map, cell) {
             map.lanes[cell] += headways as u64;
         }
+        let kernel = generator.zip(drawn).and_then(|(generator, drawn)| generator.points.component(unit, drawn.tries));
+        kernel.unwrap_or(NO_KERNEL)
     }
 
     /// Keeps a lane where it is among the worst.
@@ -187,6 +198,9 @@ impl SampleTally {
             }
         }
         if let (Some(ours), Some(theirs)) = (&mut self.map, &other.map) {
+            ours.add(theirs);
+        }
+        if let (Some(ours), Some(theirs)) = (&mut self.by_kernel, &other.by_kernel) {
             ours.add(theirs);
         }
     }
@@ -229,8 +243,9 @@ impl SampleTally {
     }
 
     /// Numbers of cells: they follow from models, headways and criteria.
-    fn shape(&self) -> [usize; 4] {
-        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len()]
+    fn shape(&self) -> [usize; 6] {
+        let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
+        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts]
     }
 
     /// Whether counts that were read from a file can be those of a run.
@@ -255,6 +270,10 @@ impl SampleTally {
             let complete = |cells: &Vec<u64>| cells.len() == MAP_CELLS * MAP_CELLS;
             let fits = complete(&map.lanes) && map.failures.len() == models && map.failures.iter().all(complete);
             problems.push((!fits, "the map has another number of cells"));
+        }
+        if let Some(counts) = &self.by_kernel {
+            let adds_up = counts.adds_up(samples.saturating_sub(self.voids), &self.failures);
+            problems.push((!adds_up, "the counts by kernel do not add up"));
         }
         problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
     }

@@ -15,4 +15,4 @@ pub use bootstrap::{Interval, ScoreOptions};
 pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, judge_claims, paper_claims};
 pub use published::{PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
-pub use table::{CategoryScores, Cell, ScoreTable, f1, precision, recall, score};
+pub use table::{CategoryScores, Cell, ScoreTable, f1, f1_interval, precision, recall, score};

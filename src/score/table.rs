@@ -1,10 +1,11 @@
 //! The score table: per category, parameterization, model and criterion the agreement of S' with S over
 //! (scenario, THW) pairs.
 
-use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws, interval};
+use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws};
 use super::contradiction::contradiction;
 use crate::criterion::Criterion;
 use crate::driver::ModelId;
+use crate::estimate::{Clusters, cluster_rate};
 use crate::scenario::Category;
 use crate::sweep::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use crate::{Error, Place, Result};
@@ -39,6 +40,26 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
     (denominator > 0.0).then(|| numerator / denominator)
 }
 
+/// The interval of F1 from the counts of each scenario. F1 = 2J/(1 + J) rises with J = TP/(TP + FP + FN), the share of
+/// agreement among all failures, so the interval of J over scenarios as clusters gives that of F1.
+///
+/// `None` below [`ScoreOptions::least_failures`] failures of S.
+pub fn f1_interval<'a>(
+    scenarios: impl Iterator<Item = &'a Confusion> + Clone,
+    options: &ScoreOptions,
+) -> Option<Interval> {
+    let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.both) + u64::from(c.only_s)).sum();
+    if failures_of_s < u64::from(options.least_failures.max(1)) {
+        return None;
+    }
+    let any = |c: &Confusion| u64::from(c.both) + u64::from(c.only_s) + u64::from(c.only_s_prime);
+    let (runs, agreed): (Vec<u64>, Vec<u64>) =
+        scenarios.map(|c| (any(c), u64::from(c.both))).filter(|(any, _)| *any > 0).unzip();
+    let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
+    let f1 = |j: f64| 2.0 * j / (1.0 + j);
+    Some(Interval { low: f1(share.low), high: f1(share.high) })
+}
+
 /// One cell of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
@@ -50,9 +71,9 @@ pub struct Cell {
     pub criterion: Criterion,
     /// Counts over (scenario, THW) pairs.
     pub counts: Confusion,
-    /// Bootstrap interval of F1; `None` where no draw defines it.
+    /// Interval of F1 over scenarios; `None` below [`ScoreOptions::least_failures`] failures of S.
     pub f1_interval: Option<Interval>,
-    /// Draws in which F1 is 0/0.
+    /// Bootstrap draws in which F1 is 0/0: claims about it leave them out. Its interval needs no draws.
     pub undefined_draws: u32,
 }
 
@@ -135,14 +156,14 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
         let draws = bootstrap_draws(units, width, block.category, options);
         let cells = (0..width)
             .map(|at| {
-                let values: Vec<f64> = draws.iter().filter_map(|draw| f1(&draw[at])).collect();
+                let undefined = draws.iter().filter(|draw| f1(&draw[at]).is_none()).count();
                 Cell {
                     variant: at / (plan.models.len() * criteria),
                     model: plan.models[at / criteria % plan.models.len()],
                     criterion: Criterion::ALL[at % criteria],
                     counts: totals[at],
-                    undefined_draws: (draws.len() - values.len()) as u32,
-                    f1_interval: interval(values, options.confidence),
+                    undefined_draws: undefined as u32,
+                    f1_interval: f1_interval(units.iter().map(|unit| &unit.cells[at]), options),
                 }
             })
             .collect();

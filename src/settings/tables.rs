@@ -89,8 +89,8 @@ pub struct FitSettings {
     pub bandwidth_rule: BandwidthInterval,
     /// Seed of P_valid and of the splits for M.
     pub seed: u64,
-    /// Draws that P_valid is counted on.
-    #[schemars(range(min = 1))]
+    /// Draws that P_valid is counted on; 10^9 tell it to 0.01 % where it is 0.1.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
     pub valid_draws: u64,
 }
 
@@ -161,7 +161,7 @@ pub struct SampleSettings {
     #[schemars(range(max = 1_048_576))]
     pub bootstrap: u32,
     /// Samples of each replicate.
-    #[schemars(range(min = 100))]
+    #[schemars(range(min = 100, max = 1_099_511_627_776_u64))]
     pub bootstrap_samples: u64,
     /// Seed of the draws.
     pub seed: u64,
@@ -248,10 +248,13 @@ pub struct CompareSettings {
     pub samples: u64,
     /// Seed of the draws.
     pub seed: u64,
+    /// Rates agree where the interval of their ratio lies from 1/margin to margin (1.25).
+    #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
+    pub margin: f64,
 }
 
 impl Default for CompareSettings {
     fn default() -> Self {
-        CompareSettings { samples: 20_000, seed: 157 }
+        CompareSettings { samples: 20_000, seed: 157, margin: crate::estimate::Enough::default().margin }
     }
 }

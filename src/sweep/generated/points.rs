@@ -88,12 +88,17 @@ impl Points {
         Drawn { values: [0.0; MOST_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
-    /// The component that a random draw comes from: that of draw `tries` (from 1) of an index. `None` for other
-    /// sources.
+    /// The component that a draw comes from: that of draw `tries` (from 1) of an index. `None` for given points.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
-        let PointSource::Random(stream) = &self.source else { return None };
-        let words = stream.words(index, tries.checked_sub(1)? * BLOCKS);
-        Some(self.chosen(words[0], words[1]))
+        let [a, b] = match &self.source {
+            PointSource::Random(stream) => {
+                let [a, b, ..] = stream.words(index, tries.checked_sub(1)? * BLOCKS);
+                [a, b]
+            }
+            PointSource::Sobol(sobol) => [sobol.word(index, 0)?, sobol.word(index, 1)?],
+            PointSource::Given => return None,
+        };
+        Some(self.chosen(a, b))
     }
 
     #[inline]
