@@ -274,9 +274,9 @@ fn few_scenarios_are_doubtful_and_their_interval_is_that_of_other_data_too() {
 #[test]
 fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let dir = few_and_all();
+    let crude = estimated(dir.path(), "all.json", &["--thw", "0.4", "--samples", "6000"]).0["estimates"][0].clone();
     for estimator in ["is", "ce"] {
         let how = ["--thw", "0.4", "--estimator", estimator, "--samples", "3000"];
-        let crude = estimated(dir.path(), "all.json", &["--thw", "0.4", "--samples", "6000"]).0["estimates"][0].clone();
         let row = estimated(dir.path(), "all.json", &how).0["estimates"][0].clone();
         let [a, b] = [&crude, &row].map(|row| row["failing_scenarios"].as_f64().unwrap());
         assert!((0.6..1.7).contains(&(b / a)), "{estimator}: {b} failing scenarios beside {a}");

@@ -51,7 +51,9 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let proposal = density.mixture().unwrap();
     let weighted = WeightedFacts {
         density: String::new(),
-        proposal: String::new(),
+        proposals: Vec::new(),
+        pilot: None,
+        pilots: Vec::new(),
         defence: 0.1,
         profile: profile.clone(),
         models: ModelId::ALL.to_vec(),
@@ -61,7 +63,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
         seed: 1,
         level: 0.95,
     };
-    let weighted = PlannedWeighted::new(density, proposal, weighted).unwrap().facts;
+    let weighted = PlannedWeighted::new(density, vec![proposal], weighted).unwrap().facts;
     let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
     let study = PlannedStudy {
         study: outline_study(&few, &profile, &StudyOptions::default()).unwrap().study,
