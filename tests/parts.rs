@@ -197,7 +197,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
     density(dir);
     for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
         let shard = |shard: &'static str| [run, &["--out", name, "--shard", shard]].concat();
-        ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
+        let _ = ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
         for file in ["part-00001-of-00002.json", "plan.json"] {
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
@@ -270,7 +270,7 @@ fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
         refused(dir, &shard("1/3"), said);
     }
     std::fs::write(&path, &whole).unwrap();
-    ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
+    let _ = ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
     done(dir, &["-q", "merge", "p"]);
 }
 

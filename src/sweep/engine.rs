@@ -19,7 +19,7 @@ pub const ENGINE_VERSION: u64 = 1;
 /// A version and the SHA-256 of what a small set of lanes is in it, by which a test knows that [`ENGINE_VERSION`] must be
 /// raised.
 #[cfg(test)]
-const PINNED_LANES: (u64, &str) = (1, "45d4f7b75512d60b23a78f1f99bd3d1dae30751e754f266a87c93e8c03f12aa0");
+const PINNED_LANES: (u64, &str) = (1, "896c0fb744a3e2a3dd6b3fa65a411af53125b0980d7e23da264a745f7ccf2b16");
 
 /// A hash over numbers and texts: little-endian, texts and lists behind their length, floats by their bits.
 pub(super) struct Canonical(Sha256);
@@ -190,13 +190,14 @@ fn put_other(bytes: &mut Vec<u8>, other: &LaneOther<f64>) {
 mod tests {
     use super::*;
     use crate::density::{Mixture, ParameterSpace};
+    use crate::driver::ModelId;
     use crate::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
     use crate::profile::Profile;
     use crate::sampling::{SampleSource, generator_of};
     use crate::scenario::{Category, Scenario};
     use crate::sweep::plan_file::{BlockHead, StudyHead};
     use crate::sweep::study::Records;
-    use crate::sweep::{Backend, CpuBackend, Headway, LanePlan, Wanted, unit_record, words};
+    use crate::sweep::{Backend, Constants, CpuBackend, Headway, LanePlan, Silent, Start, Wanted, unit_record, words};
     use crate::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
 
     /// Formulas instead of recordings and fits: the same bits wherever they are made.
@@ -219,6 +220,11 @@ mod tests {
             "target": vehicle, "lead": is_cut_out.then_some(lead), "D": is_cut_out.then_some(20.0 + 4.0 * k),
         });
         serde_json::from_value(text).unwrap()
+    }
+
+    /// Those that are never without a version: one that is added changes no lane of theirs.
+    fn models() -> Vec<ModelId> {
+        ["Reg157", "CCHDM", "RSS", "FSM"].map(|name| ModelId::parse(name).unwrap()).to_vec()
     }
 
     fn reduction(category: Category, options: &ParameterizationOptions) -> Reduction {
@@ -250,8 +256,7 @@ mod tests {
             blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options))));
         }
         let headways = vec![Headway::ThwS(1.2), Headway::ThwS(0.4), Headway::GapM(9.0)];
-        let models = crate::driver::ModelId::ALL.to_vec();
-        let head = StudyHead::new(profile.clone(), models, headways, options, blocks, &held).unwrap();
+        let head = StudyHead::new(profile.clone(), models(), headways, options, blocks, &held).unwrap();
         head.with_records(held).unwrap().window(0..6).unwrap()
     }
 
@@ -267,7 +272,7 @@ mod tests {
         plan.lane_count() as usize
     }
 
-    /// Points and cases of a generator of every category.
+    /// Points of generators of every category, and the lanes of their cases.
     fn samples(digest: &mut Sha256, profile: &Profile) {
         let options = ParameterizationOptions::default();
         for (category, key) in
@@ -289,17 +294,17 @@ mod tests {
             let sizes = Sizes::of(&scenario(Category::CutOut, 0));
             for source in [SampleSource::Random, SampleSource::Sobol] {
                 let generator = generator_of(&space, &mixture, &sizes, profile, source, 157).unwrap();
+                let constants = Constants::<f32>::resolve(profile, category);
                 for index in 0..64 {
                     let drawn = generator.draw(index);
                     digest.update(drawn.tries.to_le_bytes());
                     drawn.values.iter().for_each(|value| digest.update(value.to_bits().to_le_bytes()));
-                    let mut tables = Tables::<f64>::default();
-                    let case = generator.case::<f64>(index, &mut tables);
-                    // Without the version: the digest says whether that must be raised.
-                    let mut canonical = Canonical(Sha256::new());
-                    canonical.case(&case);
-                    canonical.tables(&tables);
-                    digest.update(canonical.finish());
+                    let mut tables = Tables::default();
+                    let case = generator.case(index, &mut tables);
+                    for model in models() {
+                        let outcome = constants.run(model, &case, &tables, Start::Headway(0.8), &mut Silent);
+                        words(&outcome.widen()).iter().for_each(|word| digest.update(word.to_le_bytes()));
+                    }
                 }
             }
         }
@@ -312,9 +317,11 @@ mod tests {
         for name in Profile::names() {
             for dt_s in [0.04, 0.1] {
                 let profile = Profile::load(name).unwrap().with_dt(dt_s).unwrap();
-                let random = RandomOptions { lanes_per_model_and_category: 80, ..RandomOptions::default() };
+                let random =
+                    RandomOptions { lanes_per_model_and_category: 80, models: models(), ..RandomOptions::default() };
                 count += lanes(&mut digest, &random_plan(&profile, &random).unwrap());
-                let thresholds = ThresholdOptions { units_per_threshold: 1, ..ThresholdOptions::default() };
+                let thresholds =
+                    ThresholdOptions { units_per_threshold: 1, models: models(), ..ThresholdOptions::default() };
                 count += lanes(&mut digest, &threshold_plan(&profile, &thresholds).unwrap());
                 count += lanes(&mut digest, &study(&profile));
                 if name != "jrc-2021" {
