@@ -400,8 +400,7 @@ fn bootstrap_text(record: &BootstrapRecord) -> String {
         let values = [Some(row.probability), row.per_hour, row.per_1000_km];
         rows.add_row(names.into_iter().chain(values.map(ends)).collect::<Vec<_>>());
     }
-    let how =
-        format!("95 % of {} replicates of {} samples each:\n", count(record.replicates), count(record.samples));
+    let how = format!("95 % of {} replicates of {} samples each:\n", count(record.replicates), count(record.samples));
     how + &aligned(rows, 2)
 }
 
