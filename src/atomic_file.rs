@@ -3,11 +3,12 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 use crate::{Error, Place, Result};
 
@@ -57,22 +58,62 @@ pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
     None
 }
 
-/// Removes from `dir` the hidden files that killed processes left there, of targets whose file name `is_ours`
-/// accepts. For the holder of the lock on those targets: nobody else may be writing them. What cannot be
-/// removed stays; it harms nobody.
-pub(crate) fn clear_stale(dir: &Path, is_ours: impl Fn(&str) -> bool) {
+/// Removes from `dir` the hidden files that killed processes left there, of one target or of all. A process locks the
+/// hidden files that it writes, and the lock ends with the process. What cannot be removed stays; it harms nobody.
+pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
+    let wanted = target.map(|target| target.file_name().and_then(|name| name.to_str()));
     for entry in entries.flatten() {
-        let name = entry.file_name();
-        // By name: the folder may be spelled in another way, and the random letters tell files apart.
-        let is_live = || live().iter().any(|path| path.file_name() == Some(&name));
-        if name.to_str().and_then(target_of).is_some_and(&is_ours) && !is_live() {
-            match std::fs::remove_file(entry.path()) {
-                Ok(()) => tracing::debug!("removed {}, left by a process that was killed", entry.path().display()),
-                Err(error) => tracing::debug!("{} stays: {error}", entry.path().display()),
+        let (name, path) = (entry.file_name(), entry.path());
+        let found = name.to_str().and_then(target_of);
+        let is_wanted = found.is_some() && wanted.is_none_or(|wanted| wanted == found);
+        if !is_wanted || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        // The registry: a staged file of this process may have given its lock back.
+        if live().iter().any(|path| path.file_name() == Some(&name)) {
+            continue;
+        }
+        let Ok(file) = OpenOptions::new().read(true).write(true).open(&path) else { continue };
+        if file.try_lock().is_ok() && is_named(&path, &file) {
+            match std::fs::remove_file(&path) {
+                Ok(()) => tracing::debug!("removed {}, left by a process that was killed", path.display()),
+                Err(error) => tracing::debug!("{} stays: {error}", path.display()),
             }
         }
     }
+}
+
+/// Whether `path` itself, and not what a link there leads to, is the file that is open as `file`.
+#[cfg(unix)]
+pub(crate) fn is_named(path: &Path, file: &File) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (std::fs::symlink_metadata(path), file.metadata()) {
+        (Ok(named), Ok(open)) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
+        _ => false,
+    }
+}
+
+/// Elsewhere std does not tell; an open file's name is not given away there before it is closed.
+#[cfg(not(unix))]
+pub(crate) fn is_named(_: &Path, _: &File) -> bool {
+    true
+}
+
+/// Refuses a link, a folder or a device where a run writes a file of its own: a folder that somebody else made must not
+/// make a run write elsewhere.
+///
+/// # Errors
+/// [`Error::Input`].
+pub(crate) fn refuse_link(path: &Path) -> Result<()> {
+    let what = match std::fs::symlink_metadata(path) {
+        Ok(about) if about.is_symlink() => "a link",
+        Ok(about) if about.is_dir() => "a folder",
+        Ok(about) if !about.is_file() => "a device or pipe",
+        _ => return Ok(()),
+    };
+    let problem = format!("this is {what}; a run writes only to files of its own in its folder");
+    Err(Error::input(Place::file(path), problem, "remove it, or choose another folder"))
 }
 
 /// The target's file name in a hidden name.
@@ -127,7 +168,7 @@ fn failed(target: &Path, source: std::io::Error) -> Error {
 }
 
 /// Makes a rename in `folder` survive a loss of power, where the system can do that.
-fn sync_folder(folder: &Path) {
+pub(crate) fn sync_folder(folder: &Path) {
     #[cfg(unix)]
     if let Ok(folder) = std::fs::File::open(folder) {
         // Some file systems refuse this for folders; the file's own content is on the disk already.
@@ -149,18 +190,34 @@ pub(crate) struct AtomicFile {
 /// nothing behind.
 pub(crate) struct StagedFile {
     target: PathBuf,
-    file: NamedTempFile,
+    path: TempPath,
+    /// Open for its lock.
+    file: Option<File>,
     live: Live,
 }
 
 impl AtomicFile {
-    /// Begins the file `target`, whose folder must exist. What is there under that name stays until
-    /// [`StagedFile::publish`].
+    /// Begins the file `target` that a user named, whose folder must exist; a link is followed. What is there under that
+    /// name stays until [`StagedFile::publish`]. What killed processes left of the same target is removed.
     ///
     /// # Errors
     /// If the folder cannot be written to.
     pub(crate) fn create(target: &Path) -> Result<Self> {
         let target = &resolve(target)?;
+        clear_stale(folder_of(target), Some(target));
+        AtomicFile::begin(target)
+    }
+
+    /// As [`AtomicFile::create`] for a file in a run's folder, where no link is followed.
+    ///
+    /// # Errors
+    /// As [`refuse_link`]; if the folder cannot be written to.
+    pub(crate) fn create_inside(target: &Path) -> Result<Self> {
+        refuse_link(target)?;
+        AtomicFile::begin(target)
+    }
+
+    fn begin(target: &Path) -> Result<Self> {
         let prefix = prefix(target);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
@@ -172,7 +229,15 @@ impl AtomicFile {
         });
         // The registry is held until the file is in it: an interruption between the two would leave the file.
         let mut registry = live();
-        let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
+        let file = loop {
+            let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
+            // Another process may be looking whether it is stale. A file system without locks keeps stale files.
+            match file.as_file().try_lock() {
+                Ok(()) if is_named(file.path(), file.as_file()) => break file,
+                Err(TryLockError::Error(_)) => break file,
+                _ => {}
+            }
+        };
         registry.insert(file.path().to_path_buf());
         drop(registry);
         let live = Live(file.path().to_path_buf());
@@ -196,7 +261,8 @@ impl AtomicFile {
         let failed = |source| failed(&target, source);
         let file = writer.into_inner().map_err(|error| failed(error.into_error()))?;
         file.as_file().sync_all().map_err(failed)?;
-        Ok(StagedFile { target, file, live })
+        let (file, path) = file.into_parts();
+        Ok(StagedFile { target, path, file: Some(file), live })
     }
 }
 
@@ -231,11 +297,32 @@ impl StagedFile {
     /// # Errors
     /// If the system refuses.
     pub(crate) fn publish(self) -> Result<()> {
-        let StagedFile { target, file, live } = self;
-        file.persist(&target).map_err(|error| failed(&target, error.error))?;
-        drop(live);
-        sync_folder(folder_of(&target));
+        let folder = folder_of(&self.target).to_path_buf();
+        self.place()?;
+        sync_folder(&folder);
         Ok(())
+    }
+
+    /// As [`StagedFile::publish`], for one of several files whose folder is synced after the last.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub(crate) fn place(self) -> Result<()> {
+        let StagedFile { target, path, file, live } = self;
+        path.persist(&target).map_err(|error| failed(&target, error.error))?;
+        drop((file, live));
+        Ok(())
+    }
+
+    /// Closes the file, for the holder of a lock on its folder: a process can have only so many files open.
+    pub(crate) fn closed(mut self) -> Self {
+        self.file = None;
+        self
+    }
+
+    /// The name that the file gets.
+    pub(crate) fn target(&self) -> &Path {
+        &self.target
     }
 }
 
@@ -300,21 +387,43 @@ mod tests {
     }
 
     #[test]
-    fn leftovers_of_a_killed_process_are_cleared_by_the_owner_of_their_target_only() {
+    fn leftovers_of_killed_processes_are_cleared_and_what_is_being_written_stays() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (stale, foreign, part) = (".lanesweep-run.json-aB3dE9.part", ".lanesweep-f1.csv-aB3dE9.part", "mine.part");
         for name in [stale, foreign, part, "run.json"] {
             fs::write(path(name), "half").unwrap();
         }
+        // As another process would hold it.
+        let held = File::open(path(foreign)).unwrap();
+        held.lock().unwrap();
         let mut own = AtomicFile::create(&path("run.json")).unwrap();
         own.append(b"new").unwrap();
-        clear_stale(dir.path(), |target| target == "run.json");
-        assert!(!path(stale).exists());
+        assert!(!path(stale).exists(), "the next one that writes the same file clears it");
+        clear_stale(dir.path(), None);
         assert!(path(foreign).exists() && path(part).exists() && path("run.json").exists());
         own.stage().unwrap().publish().unwrap();
         assert_eq!(fs::read_to_string(path("run.json")).unwrap(), "new", "what is being written is no leftover");
-        clear_stale(&path("no such folder"), |_| true);
+        drop(held);
+        clear_stale(dir.path(), Some(&path("run.json")));
+        assert!(path(foreign).exists());
+        clear_stale(dir.path(), None);
+        assert!(!path(foreign).exists());
+        clear_stale(&path("no such folder"), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn inside_a_runs_folder_no_link_is_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let (file, link) = (dir.path().join("file"), dir.path().join("run.json"));
+        for target in [&file, &dir.path().join("nowhere")] {
+            std::os::unix::fs::symlink(target, &link).unwrap();
+            let error = AtomicFile::create_inside(&link).err().unwrap();
+            assert!(error.to_string().contains("this is a link"), "{error}");
+            fs::remove_file(&link).unwrap();
+            fs::write(&file, "old").unwrap();
+        }
     }
 
     #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! Ending early in good order: what a signal (SIGINT, SIGTERM) or a time limit does to a run.
+//! Ending early in good order: what a signal (SIGINT, SIGTERM, SIGHUP) or a time limit does to a run.
 //!
 //! A run that keeps a journal says so with [`resumable`] and asks [`requested`] between its chunks: the first
 //! signal lets it end by itself. Any other run, and any run at the second signal, ends at once: its unfinished
@@ -61,8 +61,9 @@ fn deadline() -> Option<Instant> {
     *DEADLINE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Receives SIGINT and SIGTERM from now on, on a thread of its own, and SIGXFSZ, so that what is written beyond a limit
-/// of the size of files is an error and not the end; a second call does nothing. For the
+/// Receives SIGINT, SIGTERM and SIGHUP from now on, on a thread of its own, and SIGXFSZ, so that what is written beyond a
+/// limit of the size of files is an error and not the end; a second call does nothing. A SIGHUP that is ignored at the
+/// start (`nohup`) stays ignored; that is known on Linux only, and elsewhere SIGHUP is left to the system. For the
 /// program's start: a library user keeps the signals to itself by not calling it. Without Unix signals it does
 /// nothing, and the system's own way to end a process stays.
 pub fn install() {
@@ -85,8 +86,11 @@ pub fn install() {
 
 #[cfg(unix)]
 fn receive() -> std::io::Result<()> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
+    if !is_ignored(SIGHUP) {
+        signals.add_signal(SIGHUP)?;
+    }
     let receiver = move || {
         for signal in signals.forever() {
             if GUARDS.load(Ordering::SeqCst) > 0 && !REQUESTED.swap(true, Ordering::SeqCst) {
@@ -97,6 +101,14 @@ fn receive() -> std::io::Result<()> {
         }
     };
     std::thread::Builder::new().name("signals".to_owned()).spawn(receiver).map(drop)
+}
+
+/// Is a signal ignored, or is that unknown? The system's mask of ignored signals begins with signal 1.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    mask.is_none_or(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 #[cfg(unix)]

@@ -6,7 +6,8 @@
 //! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
 //! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`openscenario`] (played scenarios and
 //! distributions of parameters), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
-//! good order), [`settings`] (what may be configured) and [`cli`].
+//! good order), [`run_folder`] (one run per folder, published at once), [`settings`] (what may be configured) and
+//! [`cli`].
 //!
 //! A cut-in against one driver, in binary64:
 //!
@@ -97,6 +98,7 @@ pub mod profile;
 pub mod random;
 mod readable;
 pub mod report;
+pub mod run_folder;
 pub mod sampling;
 pub mod scalar;
 pub mod scenario;

@@ -2,9 +2,10 @@
 //! however that ends. A lock file that a killed process left behind is therefore free, and is taken over.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use crate::atomic_file::{is_named, refuse_link};
 use crate::{Error, Place, Result};
 
 /// The right to write what a lock file stands for; dropping it removes the file and releases the lock.
@@ -22,15 +23,25 @@ impl FolderLock {
     /// [`Error::Busy`] if another process holds it, named by its process id where that can be read;
     /// [`Error::Io`] if the file cannot be made or the file system knows no locks.
     pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
+        FolderLock::take(path, File::try_lock, true)
+    }
+
+    /// The same lock together with others who share it; who has it alone keeps them out, and they keep him out.
+    ///
+    /// # Errors
+    /// As [`FolderLock::acquire`].
+    pub(crate) fn share(path: &Path) -> Result<FolderLock> {
+        FolderLock::take(path, File::try_lock_shared, false)
+    }
+
+    fn take(
+        path: &Path,
+        try_lock: impl Fn(&File) -> std::result::Result<(), TryLockError>,
+        is_alone: bool,
+    ) -> Result<FolderLock> {
         loop {
-            let mut file = OpenOptions::new()
-                .read(true)
-                .write(true)
-                .create(true)
-                .truncate(false)
-                .open(path)
-                .map_err(|source| Error::io(path, "lock", source))?;
-            match file.try_lock() {
+            let Some(mut file) = open(path)? else { continue };
+            match try_lock(&file) {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Err(held(path, &mut file)),
                 Err(TryLockError::Error(source)) => return Err(Error::io(path, "lock", source)),
@@ -40,7 +51,9 @@ impl FolderLock {
             if !is_named(path, &file) {
                 continue;
             }
-            write_pid(&mut file).map_err(|source| Error::io(path, "write", source))?;
+            // Those who share it are many: no number is written.
+            if is_alone { write_pid(&mut file) } else { file.set_len(0) }
+                .map_err(|source| Error::io(path, "write", source))?;
             return Ok(FolderLock { path: path.to_path_buf(), file });
         }
     }
@@ -48,12 +61,35 @@ impl FolderLock {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // While the lock is still held, so that nobody else's file can be under that name, unless the folder was
+        // While the lock is still held alone, so that nobody else's file can be under that name, unless the folder was
         // taken away and made again. A file that stays is harmless.
-        if is_named(&self.path, &self.file) {
+        let is_alone = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
+        if is_alone && is_named(&self.path, &self.file) {
             let _ = std::fs::remove_file(&self.path);
         }
     }
+}
+
+/// Opens the lock file or makes it, never through a link; `None` where it was taken away meanwhile.
+fn open(path: &Path) -> Result<Option<File>> {
+    let options = || OpenOptions::new().read(true).write(true).clone();
+    let result = match options().create_new(true).open(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            refuse_link(path)?;
+            options().open(path)
+        }
+        result => result,
+    };
+    match result {
+        Ok(file) => Ok(Some(file)),
+        // Between the two: the folder itself is there, or the first would have said so.
+        Err(error) if error.kind() == ErrorKind::NotFound && path.parent().is_some_and(is_folder) => Ok(None),
+        Err(error) => Err(Error::io(path, "lock", error)),
+    }
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.as_os_str().is_empty() || path.is_dir()
 }
 
 /// For the message to those who come too late.
@@ -72,22 +108,6 @@ fn held(path: &Path, file: &mut File) -> Error {
         place: Box::new(Place::file(path)),
         problem: format!("another lanesweep process is writing this part or run{who}"),
     }
-}
-
-/// Whether `path` is the file that is open as `file`.
-#[cfg(unix)]
-pub(crate) fn is_named(path: &Path, file: &File) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    match (std::fs::metadata(path), file.metadata()) {
-        (Ok(named), Ok(open)) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
-        _ => false,
-    }
-}
-
-/// Elsewhere std does not tell; an open file's name is not given away there before it is closed.
-#[cfg(not(unix))]
-pub(crate) fn is_named(_: &Path, _: &File) -> bool {
-    true
 }
 
 #[cfg(test)]
@@ -123,6 +143,37 @@ mod tests {
         }
         drop(lock);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn many_share_a_lock_that_one_cannot_have_alone_meanwhile() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let (first, second) = (FolderLock::share(&path).unwrap(), FolderLock::share(&path).unwrap());
+        assert!(matches!(FolderLock::acquire(&path), Err(Error::Busy { .. })));
+        drop(first);
+        assert!(FolderLock::acquire(&path).is_err(), "one of two still holds it");
+        drop(second);
+        assert!(!path.exists());
+        let alone = FolderLock::acquire(&path).unwrap();
+        assert!(matches!(FolderLock::share(&path), Err(Error::Busy { .. })));
+        drop(alone);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_that_is_a_link_is_refused_and_what_it_leads_to_stays_as_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        let (precious, path) = (dir.path().join("precious"), dir.path().join("run.lock"));
+        fs::write(&precious, "mine").unwrap();
+        for target in [&precious, &dir.path().join("nowhere")] {
+            std::os::unix::fs::symlink(target, &path).unwrap();
+            let error = FolderLock::acquire(&path).unwrap_err();
+            assert!(error.to_string().contains("this is a link"), "{error}");
+            fs::remove_file(&path).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
+        assert!(!dir.path().join("nowhere").exists());
     }
 
     #[cfg(unix)]

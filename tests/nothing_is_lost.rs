@@ -76,6 +76,78 @@ fn what_an_earlier_run_left_in_the_folder_does_not_stay_beside_a_new_record() {
 }
 
 #[test]
+fn files_that_no_record_lists_stay_whatever_they_are_called() {
+    let dir = tempfile::tempdir().unwrap();
+    let (density, out) = (dir.path().join("d.json"), dir.path().join("out"));
+    let fit = ["fit", "--synth-recordings", "2", "--category", "cut-in", "--parameterization", "2", "--no-comparison"];
+    let run = |args: &[&str]| {
+        let output = lanesweep(&[&["-q"], args].concat());
+        assert!(output.status.success(), "{output:?}");
+    };
+    run(&[&fit[..], &["--out", text(&density)]].concat());
+    std::fs::create_dir(&out).unwrap();
+    let mine =
+        ["map-of-germany.svg", "worst.csv.svg", "estimates-of-mine.csv", "headways.json", "proposal-letter.html"];
+    mine.iter().for_each(|name| std::fs::write(out.join(name), "mine").unwrap());
+    let sample = ["sample", text(&density), "--samples", "500", "--thw", "0.6", "--out", text(&out)];
+    run(&[&sample[..], &["--models", "FSM,RSS"]].concat());
+    assert!(out.join("map-RSS.svg").exists());
+    run(&[&sample[..], &["--models", "FSM"]].concat());
+    assert!(!out.join("map-RSS.svg").exists(), "what the record lists goes with it");
+    for name in mine {
+        assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), "mine", "{name}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let (density, precious) = (dir.path().join("d.json"), dir.path().join("precious"));
+    let fit = ["-q", "fit", "--synth-recordings", "2", "--category", "cut-in", "--parameterization", "2"];
+    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
+    std::fs::write(&precious, "mine").unwrap();
+    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
+    let study = ["-q", "study", "--scenarios", text(&scenarios), "--categories", "lvd"];
+    let sample = ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--models", "FSM"];
+    let map = ["-q", "map", "lvd", "--x", "deceleration_mps2=2,4", "--y", "ego_speed_kmh=60,90", "--set", "thw_s=1.2"];
+    let part = [&study[..], &["--shard", "0/1"]].concat();
+    let links: [(&[&str], &[&str]); 5] = [
+        (&study, &["run.lock", "run.json", "f1.csv", "run-plan.json", "unfinished.json"]),
+        (&part, &["run.lock", "part-00000-of-00001.lock", "part-00000-of-00001.journal"]),
+        (&sample, &["run.lock", "estimate.json", "estimates.csv"]),
+        (&map, &["run.lock", "map.json", "cells.csv"]),
+        (&["-q", "synth", "--synth-recordings", "1", "--synth-duration", "20"], &["run.lock", "01_tracksMeta.csv"]),
+    ];
+    for (run, names) in links {
+        for name in names {
+            let out = dir.path().join("out");
+            std::fs::create_dir(&out).unwrap();
+            std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
+            let into: &[&str] = if run[1] == "synth" { &[text(&out)] } else { &["--out", text(&out)] };
+            let output = lanesweep(&[run, into].concat());
+            let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+            assert_eq!(output.status.code(), Some(3), "{run:?}, {name}: {said}");
+            assert!(said.contains("this is a link"), "{run:?}, {name}: {said}");
+            assert_eq!(std::fs::read_to_string(&precious).unwrap(), "mine", "{run:?}, {name}");
+            std::fs::remove_dir_all(&out).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_folder_holds_the_run_of_one_verb() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = ["-q", "map", "lvd", "--x", "deceleration_mps2=2,4", "--y", "ego_speed_kmh=60,90", "--set", "thw_s=1.2"];
+    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
+    let out = text(dir.path());
+    assert!(lanesweep(&[&map[..], &["--out", out]].concat()).status.success());
+    let page = std::fs::read(dir.path().join("report.html")).unwrap();
+    refused(&["study", "--scenarios", text(&scenarios), "--out", out], "the results of another verb");
+    assert!(std::fs::read(dir.path().join("report.html")).unwrap() == page);
+}
+
+#[test]
 fn values_that_no_lane_can_hold_are_refused_with_their_line() {
     let dir = tempfile::tempdir().unwrap();
     let scenarios = dir.path().join("scenarios.jsonl");

@@ -23,8 +23,9 @@ use crate::profile::Profile;
 use crate::readable::count;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
-use crate::report::files::{check_folder, make_folder, write_atomically};
+use crate::report::files::check_folder;
 use crate::report::html::PageFigure;
+use crate::run_folder::{COMPARE_RECORD, Results, RunFolder};
 use crate::sampling::{
     CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
     ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
@@ -163,7 +164,7 @@ impl Compare {
         if self.dry_run {
             return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
-        make_folder(&self.out)?;
+        let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: self.seed };
         let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
@@ -218,7 +219,7 @@ impl Compare {
             tracing::warn!("{error}; {}", error.help().unwrap_or_default());
         }
 
-        let file = CompareFile {
+        let mut file = CompareFile {
             lanesweep_comparison: 1,
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             data: facts.data.clone(),
@@ -235,9 +236,10 @@ impl Compare {
             study_plan_sha256: plan.hash().to_owned(),
             left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
             categories: compared,
+            files: Vec::new(),
             host: opened.host(swept.rechecked_lanes, started),
         };
-        self.write(&file)?;
+        self.write(&mut file, folder.results()?)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
@@ -278,23 +280,24 @@ impl Compare {
         Ok(Exit::Ok)
     }
 
-    /// Tables, figures and record; the record comes last.
-    fn write(&self, file: &CompareFile) -> Result<()> {
+    /// Tables, figures and record.
+    fn write(&self, file: &mut CompareFile, mut results: Results) -> Result<()> {
         let text = file.text();
-        write_atomically(&self.out.join("compare.csv"), &file.csv()?)?;
-        write_atomically(&self.out.join("compare.txt"), text.as_bytes())?;
+        results.add("compare.csv", &file.csv()?)?;
+        results.add("compare.txt", text.as_bytes())?;
         let mut figures = Vec::new();
         for comparison in &file.categories {
             for criterion in Criterion::ALL {
                 let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
                 let figure = compare_figures::rates(file, comparison, criterion);
                 let svg = figure.svg();
-                write_atomically(&self.out.join(&name), svg.as_bytes())?;
+                results.add(&name, svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
             }
         }
-        write_atomically(&self.out.join("report.html"), file.html(figures)?.as_bytes())?;
-        write_atomically(&self.out.join("compare.json"), file.json()?.as_bytes())?;
+        results.add("report.html", file.html(figures)?.as_bytes())?;
+        file.files = results.names();
+        results.publish(file.json()?.as_bytes())?;
         self.format.print(|| text, || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(())

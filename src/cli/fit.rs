@@ -19,6 +19,7 @@ use crate::parameterization::ParameterizationId;
 use crate::report::density;
 use crate::report::files::{check_folder_of, make_folder};
 use crate::report::records;
+use crate::run_folder::RunFolder;
 use crate::scenario::write_scenarios_to;
 use crate::settings::BandwidthInterval;
 use crate::{Error, Place, Result, input_file};
@@ -120,6 +121,8 @@ impl Fit {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
         }
 
+        // One file needs no folder of its own.
+        let folder = (!self.is_single()).then(|| RunFolder::open_without_record(&self.out)).transpose()?;
         let bar = console::progress(verbosity, ids.len() as u64, "fitting");
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
@@ -147,7 +150,7 @@ impl Fit {
         for error in &failed {
             tracing::warn!("{error}; {}", error.help().unwrap_or_default());
         }
-        self.write(&fitted)?;
+        write(&fitted, folder.as_ref())?;
         self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
         tracing::info!("{} density files written to {}", fitted.len(), self.out.display());
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
@@ -160,7 +163,7 @@ impl Fit {
 
     /// One file per density, none of them an input.
     fn files(&self, ids: &[ParameterizationId], configured: &Configured) -> Result<Vec<PathBuf>> {
-        let single = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let single = self.is_single();
         if single && ids.len() != 1 {
             return Err(Error::usage(
                 Place::item("--out"),
@@ -182,15 +185,27 @@ impl Fit {
         Ok(files)
     }
 
-    fn write(&self, fitted: &[(PathBuf, DensityModel)]) -> Result<()> {
-        for (path, model) in fitted {
+    fn is_single(&self) -> bool {
+        self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
+    }
+}
+
+/// All densities at once. Each is a result by itself, with its checksum: those of other runs stay beside them.
+fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Result<()> {
+    let Some(folder) = folder else {
+        return fitted.iter().try_for_each(|(path, model)| {
             if let Some(dir) = path.parent().filter(|dir| *dir != Path::new("")) {
                 make_folder(dir)?;
             }
-            write_density(path, model)?;
-        }
-        Ok(())
+            write_density(path, model)
+        });
+    };
+    let mut results = folder.results()?;
+    for (path, model) in fitted {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        results.add(name, &model.to_json()?)?;
     }
+    results.publish_each()
 }
 
 /// Label, checksum and exposure of the data.

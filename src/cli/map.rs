@@ -23,6 +23,7 @@ use crate::profile::Profile;
 use crate::readable::{count, value};
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
+use crate::run_folder::{MAP_RECORD, RunFolder};
 use crate::scenario::Category;
 use crate::sweep::{Backend, CpuBackend, Forecast, SweepSummary, Verdicts, Wanted, forecast};
 use crate::{Error, Place, Result};
@@ -151,6 +152,7 @@ impl Map {
         if self.dry_run {
             return forecast_maps(&planned, backend, self.format);
         }
+        let folder = RunFolder::open(&self.out, MAP_RECORD)?;
         let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed: Some(RECHECK_SEED) };
         let is_jrc = self.preset.is_some()
             && criterion == Criterion::Collision
@@ -190,16 +192,11 @@ impl Map {
             sweep_s: started.elapsed().as_secs_f64(),
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
-        let written = report.write(&self.out)?;
-        let name =
-            |path: &PathBuf| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        self.format.print(
-            || report.text(),
-            || report.json(written.iter().map(name).filter(|name| name != "map.json").collect()),
-        )?;
+        let written = report.write(folder.results()?)?;
+        self.format.print(|| report.text(), || report.json(written.clone()))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
-        tracing::info!("{} files written to {}", written.len(), self.out.display());
+        tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
         Ok(Exit::Ok)
     }
 

@@ -6,15 +6,15 @@ use clap::Args;
 
 use super::Exit;
 use super::format::FormatFlag;
-use super::shard_flags::{PLAN_FILE, is_result};
+use super::shard_flags::PLAN_FILE;
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
 use crate::cluster::quoted_word;
-use crate::lock::FolderLock;
 use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
 use crate::report::files::check_folder;
 use crate::report::run_record::Timings;
+use crate::run_folder::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::sweep::{Partial, SweepSummary};
 use crate::{Error, Place, Result};
 
@@ -61,21 +61,28 @@ impl Merge {
             return Err(self.no_parts());
         }
         let kind = kind_of(&plan)?;
-        let _lock = FolderLock::acquire(&self.dir.join("run.lock"))?;
-        crate::atomic_file::clear_stale(&self.dir, is_result);
-        match kind.as_str() {
-            study_plan::KIND => merge_study(&self.dir, &plan, self.format),
-            sample_plan::KIND => sample_crude::merge(&self.dir, &plan, self.format),
-            weighted_plan::KIND => sample_weighted::merge(&self.dir, &plan, self.format),
+        let (record, merge): (_, Merging) = match kind.as_str() {
+            study_plan::KIND => (STUDY_RECORD, merge_study),
+            sample_plan::KIND => (ESTIMATE_RECORD, sample_crude::merge),
+            weighted_plan::KIND => (ESTIMATE_RECORD, sample_weighted::merge),
             other => {
                 let help = "give the folder (--out) of a run in parts";
-                Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
+                return Err(Error::input(
+                    Place::file(plan),
+                    format!("this is a `{other}`, not the plan of a run"),
+                    help,
+                ));
             }
-        }
+        };
+        merge(&RunFolder::open(&self.dir, record)?, &plan, self.format)
     }
 }
 
-fn merge_study(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
+/// Makes the result of the parts in a folder.
+type Merging = fn(&RunFolder, &Path, FormatFlag) -> Result<Exit>;
+
+fn merge_study(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
+    let dir = folder.dir();
     // Counts are all that is joined: no scenario is needed.
     let (study, run_sha256) = PlannedStudy::read_some(plan, |_| 0..0)?;
     let parts = read_parts::<Partial>(dir, plan, "study", &run_sha256, study.plan().unit_count())?;
@@ -98,7 +105,7 @@ fn merge_study(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
         timings: Timings::default(),
         settings: Vec::new(),
     };
-    finish_study(&study, &partial, None, host, dir, format)
+    finish_study(&study, &partial, None, host, folder.results()?, format)
 }
 
 /// All parts of a folder, checked: of this run, whole, together everything exactly once.

@@ -1,6 +1,6 @@
 //! `lanesweep mine`: recordings in, scenarios out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -10,6 +10,7 @@ use super::source::{self, PlausibilityFlag, Source};
 use super::{Exit, console};
 use crate::atomic_file::AtomicFile;
 use crate::density::{Driven, ExposureFile};
+use crate::lock::FolderLock;
 use crate::readable::count_of;
 use crate::scenario::{check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::{Result, input_file};
@@ -35,6 +36,12 @@ pub struct Mine {
     plausibility: PlausibilityFlag,
 }
 
+/// Keeps a second process from writing the same file and what stands beside it.
+fn lock_of(path: &Path) -> Result<FolderLock> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    FolderLock::acquire(&path.with_file_name(format!(".lanesweep-{name}.lock")))
+}
+
 impl Mine {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.output {
@@ -44,6 +51,7 @@ impl Mine {
             // Before the work: a file that cannot be written is known at once.
             AtomicFile::create(path).map(drop)?;
         }
+        let _lock = self.output.as_deref().map(lock_of).transpose()?;
         let from = Source::Folder(self.dir.clone());
         let mut collection = from.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
         tracing::info!("{}", source::counts(&collection.scenarios));
@@ -52,6 +60,8 @@ impl Mine {
         }
         match &self.output {
             Some(path) => {
+                // What was driven is that of this file: the former goes first, the new one comes last.
+                ExposureFile::remove_beside(path)?;
                 write_scenarios(path, &collection.scenarios)?;
                 if let Some(driven) = Driven::of(&collection) {
                     let scenarios_sha256 = input_file::sha256(path)?;

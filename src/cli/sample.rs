@@ -27,8 +27,8 @@ use crate::estimate::{Checkpoints, Pilot, StopRule};
 use crate::openscenario::Rename;
 use crate::parts::kind_of;
 use crate::profile::Profile;
-use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, RunFacts};
+use crate::run_folder::{ESTIMATE_RECORD, RunFolder};
 use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
 use crate::settings::SampleSettings;
 pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
@@ -206,8 +206,8 @@ impl Sample {
             return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
         }
         if self.has_pilot() && !self.dry_run && self.until.is_none() && self.time_limit.is_none() {
-            make_folder(&self.out)?;
-            sample_lanes::check_writable(&self.out)?;
+            // Before the pilot: a folder that cannot be written to is known at once.
+            RunFolder::open(&self.out, ESTIMATE_RECORD).map(drop)?;
             return sample_weighted::run(self, &run.planned_after_pilot()?, &opened, started, verbosity);
         }
         if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
@@ -216,12 +216,14 @@ impl Sample {
         if self.dry_run {
             return run.forecast_adaptive();
         }
-        make_folder(&self.out)?;
-        sample_lanes::check_writable(&self.out)?;
-        let file = run.adaptive()?;
-        // A proposal in this folder may be an input: it is read and written on the way.
-        sample_lanes::clear(&self.out, &["proposal-"])?;
-        sample_lanes::write_estimates(&self.out, &run.density, &file, Vec::new())?;
+        let folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
+        let mut results = folder.results()?;
+        let mut file = run.adaptive(&mut results)?;
+        if !self.proposal.is_empty() {
+            // Those that were given may be of this folder.
+            results.keep(|name| name.starts_with("proposal-"));
+        }
+        sample_lanes::write_estimates(results, &run.density, &mut file, Vec::new())?;
         self.format.print(|| file.text(), || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(Exit::Ok)

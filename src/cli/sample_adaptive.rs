@@ -14,16 +14,17 @@ use crate::estimate::{
     cross_entropy, defended, from_pilot_with_proposal, importance, pilot_proposal, subset,
 };
 use crate::report::sampling::{EstimateFile, Levels};
+use crate::run_folder::Results;
 use crate::sampling::{
-    EstimateRow, LaneLimitState, SampleHeadways, plan_points, read_proposal, scenario_shares, truncated, write_proposal,
+    EstimateRow, LaneLimitState, SampleHeadways, plan_points, proposal_text, read_proposal, scenario_shares, truncated,
 };
 
 /// Draws that the valid share of each of several proposals is counted on.
 const VALIDITY_DRAWS: u64 = 1_000_000;
 
 impl Run<'_> {
-    /// One model after the other, at one headway.
-    pub(super) fn adaptive(&self) -> Result<EstimateFile> {
+    /// One model after the other, at one headway. The proposals that are found go to the results.
+    pub(super) fn adaptive(&self, results: &mut Results) -> Result<EstimateFile> {
         let headway = match &self.headways {
             SampleHeadways::Sampled => "sampled".to_owned(),
             SampleHeadways::Each(list) => one_headway(list, self.flags.estimator)?.to_string(),
@@ -39,7 +40,7 @@ impl Run<'_> {
         let (mut rows, mut levels) = (Vec::new(), Vec::new());
         for &model in &self.models {
             tracing::info!("{} on {}", model.name(), self.opened.backend().describe());
-            let (estimate, level, proposal) = self.estimate(&nominal, model, samples)?;
+            let (estimate, level, proposal) = self.estimate(&nominal, model, samples, results)?;
             let of =
                 |proposal| scenario_shares(&self.limit_state(model), proposal, self.flags.defence, self.flags.seed());
             let shares = proposal.as_ref().map(of).transpose()?.flatten();
@@ -132,12 +133,13 @@ impl Run<'_> {
         nominal: &dyn Density,
         model: ModelId,
         samples: u64,
+        results: &mut Results,
     ) -> Result<(Estimate, Option<Levels>, Option<Mixture>)> {
         let flags = self.flags;
         let lanes = self.limit_state(model);
         let importance_options =
             Importance { level: flags.level, stop: self.stop(samples), ..Importance::new(flags.seed(), samples) };
-        let proposal_file = flags.out.join(format!("proposal-{}.json", model.name()));
+        let proposal_file = format!("proposal-{}.json", model.name());
         match flags.estimator {
             EstimatorFlag::Subset => {
                 let options = Subset { level: flags.level, ..Subset::new(flags.seed(), samples) };
@@ -152,7 +154,7 @@ impl Run<'_> {
                     ..CrossEntropy::new(flags.seed(), (samples / 10).max(2000), samples)
                 };
                 let run = cross_entropy(nominal, &lanes, &options)?;
-                write_proposal(&proposal_file, &self.density, &run.proposal)?;
+                results.add(&proposal_file, proposal_text(&self.density, &run.proposal)?.as_bytes())?;
                 Ok((run.estimate, Some(Levels::CrossEntropy(run.steps)), Some(run.proposal)))
             }
             EstimatorFlag::Mc | EstimatorFlag::Is if flags.proposal.is_empty() => {
@@ -168,7 +170,7 @@ impl Run<'_> {
                     },
                     &importance_options,
                 )?;
-                write_proposal(&proposal_file, &self.density, &proposal)?;
+                results.add(&proposal_file, proposal_text(&self.density, &proposal)?.as_bytes())?;
                 Ok((estimate, None, Some(proposal)))
             }
             EstimatorFlag::Mc | EstimatorFlag::Is => {

@@ -13,9 +13,11 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::sample_plan::PlannedSample;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
+use crate::atomic_file::StagedFile;
 use crate::estimate::StopRule;
 use crate::readable::count;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
+use crate::run_folder::{ESTIMATE_RECORD, Results, RunFolder};
 use crate::sampling::{
     BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
 };
@@ -64,7 +66,7 @@ pub(super) fn run(
             tracing::info!("{left:.1} of {of} scenarios are near the given values");
         }
     }
-    let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: plan.unit_count() };
+    let desk = Desk { out, record: ESTIMATE_RECORD, run_sha256: &run_sha256, shard, unit_count: plan.unit_count() };
     if desk.is_done::<SampleTally>()? {
         tracing::info!("this part is there already, and whole");
         return Ok(Exit::Ok);
@@ -81,11 +83,12 @@ pub(super) fn run(
         return Ok(Exit::Ok);
     }
     let rows = flags.rows.as_deref().map(|path| (path, &planned.density));
-    let crude = {
+    let (crude, rows) = {
         let _resumable = is_journalled.then(interrupt::resumable);
         sample_lanes::run(plan, &mut work.ledger, &lanes, &counting, &planned.options(stop), rows, verbosity)?
     };
     if shard.is_some() {
+        rows.map_or(Ok(()), StagedFile::publish)?;
         desk.finish(work, [crude.summary.redone_lanes, crude.summary.rechecked_lanes])?;
         return Ok(Exit::Ok);
     }
@@ -106,7 +109,9 @@ pub(super) fn run(
         })
         .transpose()?;
     let host = opened.host(crude.summary.rechecked_lanes, started);
-    write_run(planned, crude, record, host, out, flags.format)?;
+    let mut results = work.folder.results()?;
+    rows.into_iter().for_each(|table| results.join(table));
+    write_run(planned, crude, record, host, results, flags.format)?;
     work.forget()?;
     Ok(Exit::Ok)
 }
@@ -136,7 +141,8 @@ fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule, for
 }
 
 /// Makes the result of the parts in a folder.
-pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
+pub(super) fn merge(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
+    let dir = folder.dir();
     let (planned, run_sha256) = PlannedSample::read(plan)?;
     let parts = read_parts::<SampleTally>(dir, plan, "sample", &run_sha256, planned.plan.unit_count())?;
     let rechecked = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
@@ -148,25 +154,26 @@ pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit>
         let problem = "the parts do not hold every sample that their names stand for";
         return Err(Error::input(Place::file(dir), problem, "make them again"));
     }
-    write_run(&planned, crude, None, host, dir, format)?;
+    write_run(&planned, crude, None, host, folder.results()?, format)?;
     Ok(Exit::Ok)
 }
 
-/// Tables, figures, the record; the record comes last.
+/// Tables, figures, the record.
 fn write_run(
     planned: &PlannedSample,
     crude: CrudeRun,
     bootstrap: Option<BootstrapRecord>,
     host: HostRecord,
-    out: &Path,
+    mut results: Results,
     format: FormatFlag,
 ) -> Result<()> {
-    let figures = sample_lanes::write(out, &planned.plan, &planned.density, &crude, &planned.counting())?;
+    let out = results.dir().to_path_buf();
+    let figures = sample_lanes::write(&mut results, &planned.plan, &planned.density, &crude, &planned.counting())?;
     let mut file = EstimateFile::new(&planned.density, planned.run_facts(), crude.rows, host)?;
     file.plan_sha256 = Some(planned.plan.hash().to_owned());
     file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
     file.bootstrap = bootstrap;
-    sample_lanes::write_estimates(out, &planned.density, &file, figures)?;
+    sample_lanes::write_estimates(results, &planned.density, &mut file, figures)?;
     format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(())

@@ -19,9 +19,9 @@ use crate::openscenario::{DistributionSamples, Names, Rename, parse_distribution
 use crate::plausibility::Doubts;
 use crate::profile::Profile;
 use crate::readable;
-use crate::report::files::{make_folder, write_atomically};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::run_folder::{ESTIMATE_RECORD, Results, RunFolder};
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
 use crate::scenario::Category;
 use crate::sweep::{Headway, LanePlan, LaneRunner, ONE_IN, Recheck, sha256};
@@ -106,8 +106,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let seed = flags.given_seed().or(samples.seed).unwrap_or(flags.seed());
     let count = flags.samples.unwrap_or(samples.runs);
     let opened = flags.open()?;
-    make_folder(&flags.out)?;
-    sample_lanes::check_writable(&flags.out)?;
+    let folder = RunFolder::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let recheck = Recheck::new(&plan, seed, ONE_IN);
     let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: Some(&recheck) };
@@ -155,7 +154,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         draws.rejected_share = (tries - count) as f64 / tries as f64;
     }
     file.draws = Some(draws);
-    write(flags, &kept, &samples, &plan, &crude, &counting, &file)?;
+    write(folder.results()?, &kept, &samples, &plan, &crude, &counting, &mut file)?;
     flags.format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", flags.out.display());
     Ok(Exit::Ok)
@@ -199,24 +198,17 @@ fn record(kept: &Kept, samples: &DistributionSamples, path: &Path) -> DensityRec
     }
 }
 
-/// Tables, page and record; the record comes last.
+/// Tables, page and record.
 fn write(
-    flags: &Sample,
+    mut results: Results,
     kept: &Kept,
     samples: &DistributionSamples,
     plan: &LanePlan,
     crude: &CrudeRun,
     counting: &TallyOptions,
-    file: &EstimateFile,
+    file: &mut EstimateFile,
 ) -> Result<()> {
-    let out = &flags.out;
-    sample_lanes::clear(out, &[])?;
-    // The density of another run in this folder would be taken for this one's.
-    let density = out.join("density.json");
-    if density.exists() {
-        std::fs::remove_file(&density).map_err(|e| Error::io(&density, "replace", e))?;
-    }
-    write_atomically(&out.join("convergence.csv"), &convergence_csv(&crude.convergence)?)?;
+    results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
     if counting.worst > 0 {
         let runner = LaneRunner::<f32>::new(plan);
         let missing = |lane: u64| Error::Internal(format!("lane {lane} is not in the plan"));
@@ -244,20 +236,11 @@ fn write(
             });
         }
         let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        write_atomically(&out.join("worst.csv"), &worst_csv(&rows, &names, counting.criterion)?)?;
+        results.add("worst.csv", &worst_csv(&rows, &names, counting.criterion)?)?;
     }
-    let mut figures = Vec::new();
-    if let Some(figure) = file.headways_figure() {
-        let svg = figure.svg();
-        write_atomically(&out.join("headways.svg"), svg.as_bytes())?;
-        write_atomically(&out.join("headways.csv"), &figure.csv()?)?;
-        figures.push(crate::report::html::PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
-    }
-    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
-    write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
-    write_atomically(&out.join(KEPT), &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;
-    write_atomically(&out.join("estimate.json"), file.json()?.as_bytes())
+    results.add(KEPT, &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;
+    sample_lanes::publish_estimates(results, file, Vec::new())
 }
 
 /// The plan of the run that wrote this folder, and what it is of.

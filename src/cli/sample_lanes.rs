@@ -3,20 +3,21 @@
 use std::path::Path;
 
 use super::console::{self, Verbosity};
-use crate::density::{DensityModel, write_density};
+use crate::atomic_file::StagedFile;
+use crate::density::DensityModel;
 use crate::parts::Ledger;
-use crate::report::files::{make_folder, write_atomically};
 use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::run_folder::Results;
 use crate::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
 use crate::sweep::{LanePlan, LaneRunner, Outcome};
 use crate::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
-/// Samples, with one row per lane where asked for.
+/// Samples, with one row per lane where asked for: a table that gets its name with the run's other results.
 pub(super) fn run(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
@@ -25,7 +26,7 @@ pub(super) fn run(
     options: &CrudeOptions,
     rows: Option<(&Path, &DensityModel)>,
     verbosity: Verbosity,
-) -> Result<CrudeRun> {
+) -> Result<(CrudeRun, Option<StagedFile>)> {
     let units = ledger.units();
     let left: u64 = ledger.missing(units)?.iter().map(|range| range.end - range.start).sum();
     let bar = console::progress(verbosity, left, "sampling");
@@ -35,7 +36,7 @@ pub(super) fn run(
             Ok(())
         });
         bar.finish_and_clear();
-        return run;
+        return Ok((run?, None));
     };
     // Rows hold every value, so the lanes must.
     let counting = TallyOptions { worst: counting.worst.max(1), ..counting.clone() };
@@ -52,62 +53,23 @@ pub(super) fn run(
         sampled_rows::write_chunk(&mut table, plan, density, chunk)
     });
     bar.finish_and_clear();
-    let run = run?;
-    table.finish()?;
-    Ok(run)
-}
-
-/// A folder that cannot be written to is known before the work.
-pub(super) fn check_writable(out: &Path) -> Result<()> {
-    crate::atomic_file::AtomicFile::create(&out.join("estimate.json")).map(drop)
-}
-
-/// Beginnings of the names of all files that a sampling run writes beside its input.
-const OURS: [&str; 8] = [
-    "estimate",
-    "worst.csv",
-    "convergence.",
-    "map-",
-    "proposal-",
-    "headways.",
-    "report.html",
-    super::sample_distribution::KEPT,
-];
-
-/// Takes the files of an earlier run out of a folder, so that none stands beside the results of this one; keeps those
-/// whose names begin so.
-pub(super) fn clear(out: &Path, kept: &[&str]) -> Result<()> {
-    let io = |e| Error::io(out, "list", e);
-    for entry in std::fs::read_dir(out).map_err(io)? {
-        let entry = entry.map_err(io)?;
-        let name = entry.file_name();
-        let Some(name) = name.to_str() else { continue };
-        let begins = |list: &[&str]| list.iter().any(|beginning| name.starts_with(beginning));
-        let is_result = [".json", ".csv", ".svg", ".html"].iter().any(|ending| name.ends_with(ending));
-        if is_result && begins(&OURS) && !begins(kept) {
-            std::fs::remove_file(entry.path()).map_err(|e| Error::io(entry.path(), "replace", e))?;
-        }
-    }
-    Ok(())
+    Ok((run?, Some(table.stage()?)))
 }
 
 /// Everything of a run but what [`write_estimates`] writes; returns the figures.
 pub(super) fn write(
-    out: &Path,
+    results: &mut Results,
     plan: &LanePlan,
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
 ) -> Result<Vec<PageFigure>> {
-    // It was there before the work; where it vanished meanwhile, the result is worth another one.
-    make_folder(out)?;
-    clear(out, &[])?;
     let mut figures = Vec::new();
     if !run.convergence.is_empty() {
-        write_atomically(&out.join("convergence.csv"), &convergence_csv(&run.convergence)?)?;
+        results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
         let figure = sampling_figures::convergence(density, &run.convergence);
         let svg = figure.svg();
-        write_atomically(&out.join("convergence.svg"), svg.as_bytes())?;
+        results.add("convergence.svg", svg.as_bytes())?;
         figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
@@ -144,35 +106,45 @@ pub(super) fn write(
             rows.push((row, *outcome));
         }
         let rows: Vec<WorstRow> = rows.into_iter().map(|(row, _)| row).collect();
-        write_atomically(&out.join("worst.csv"), &worst_csv(&rows, &names, counting.criterion)?)?;
+        results.add("worst.csv", &worst_csv(&rows, &names, counting.criterion)?)?;
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
             let figure = sampling_figures::failure_map(density, map, model, *id, counting.criterion);
             let (name, svg) = (format!("map-{}", id.name()), figure.svg());
-            write_atomically(&out.join(format!("{name}.csv")), figure.csv().as_bytes())?;
-            write_atomically(&out.join(format!("{name}.svg")), svg.as_bytes())?;
+            results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
+            results.add(&format!("{name}.svg"), svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
         }
     }
     Ok(figures)
 }
 
-/// Density, table, page and record; the record comes last, so a folder that has one is whole.
+/// Adds density, table and page, and puts all of it into the folder with its record.
 pub(super) fn write_estimates(
-    out: &Path,
+    mut results: Results,
     density: &DensityModel,
-    file: &EstimateFile,
+    file: &mut EstimateFile,
+    figures: Vec<PageFigure>,
+) -> Result<()> {
+    results.add("density.json", &density.to_json()?)?;
+    publish_estimates(results, file, figures)
+}
+
+/// Table and page of the estimates; then everything with its record.
+pub(super) fn publish_estimates(
+    mut results: Results,
+    file: &mut EstimateFile,
     mut figures: Vec<PageFigure>,
 ) -> Result<()> {
-    write_density(&out.join("density.json"), density)?;
     if let Some(figure) = file.headways_figure() {
         let svg = figure.svg();
-        write_atomically(&out.join("headways.svg"), svg.as_bytes())?;
-        write_atomically(&out.join("headways.csv"), &figure.csv()?)?;
+        results.add("headways.svg", svg.as_bytes())?;
+        results.add("headways.csv", &figure.csv()?)?;
         figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
     }
-    write_atomically(&out.join("estimates.csv"), &file.csv()?)?;
-    write_atomically(&out.join("report.html"), file.html(figures)?.as_bytes())?;
-    write_atomically(&out.join("estimate.json"), file.json()?.as_bytes())
+    results.add("estimates.csv", &file.csv()?)?;
+    results.add("report.html", file.html(figures)?.as_bytes())?;
+    file.files = results.names();
+    results.publish(file.json()?.as_bytes())
 }

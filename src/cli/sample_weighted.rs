@@ -18,11 +18,9 @@ use crate::driver::ModelId;
 use crate::estimate::{BlockSums, Defended, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
 use crate::parts::{Countable, Ledger};
 use crate::readable::count;
-use crate::report::files::make_folder;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::sampling::{
-    EstimateRow, LaneLimitState, WeightedTally, scenario_shares, truncated, write_proposal,
-};
+use crate::run_folder::{ESTIMATE_RECORD, Results, RunFolder};
+use crate::sampling::{EstimateRow, LaneLimitState, WeightedTally, proposal_text, scenario_shares, truncated};
 use crate::sweep::{CpuBackend, Forecast, lanes_within_seconds};
 use crate::{Error, Place, Result, interrupt};
 
@@ -64,7 +62,7 @@ pub(super) fn run(
         flags.format.print_plan(lanes, &out.join(PLAN_FILE))?;
         return Ok(Exit::Ok);
     }
-    let desk = Desk { out, run_sha256: &run_sha256, shard, unit_count: samples };
+    let desk = Desk { out, record: ESTIMATE_RECORD, run_sha256: &run_sha256, shard, unit_count: samples };
     if desk.is_done::<WeightedTally>()? {
         tracing::info!("this part is there already, and whole");
         return Ok(Exit::Ok);
@@ -85,11 +83,14 @@ pub(super) fn run(
     }
     let host = opened.host(0, started);
     let tally = work.ledger.counts(0..samples)?;
-    write_run(planned, tally, host, out, flags.format)?;
+    write_run(planned, tally, host, work.folder.results()?, flags.format)?;
     if planned.facts.pilot.is_some() {
         // The journal that needs it goes next; without it the next run's pilot has the same bits.
         let path = out.join(PILOT_FILE);
-        std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove", e))?;
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
+            _ => {}
+        }
     }
     work.forget()?;
     Ok(Exit::Ok)
@@ -181,25 +182,27 @@ fn sample(
 }
 
 /// Makes the result of the parts in a folder.
-pub(super) fn merge(dir: &Path, plan: &Path, format: FormatFlag) -> Result<Exit> {
+pub(super) fn merge(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
+    let dir = folder.dir();
     let (planned, run_sha256) = PlannedWeighted::read(plan)?;
     let parts = read_parts::<WeightedTally>(dir, plan, "sample", &run_sha256, planned.facts.samples)?;
     let host = HostRecord::of_parts(parts.len(), 0);
     let mut segments = parts.into_iter().flat_map(|part| part.segments);
     let first = segments.next();
     let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
-    write_run(&planned, tally, host, dir, format)?;
+    write_run(&planned, tally, host, folder.results()?, format)?;
     Ok(Exit::Ok)
 }
 
-/// Table, density, the record; the record comes last.
+/// Table, density, the record.
 fn write_run(
     planned: &PlannedWeighted,
     tally: Option<WeightedTally>,
     host: HostRecord,
-    out: &Path,
+    mut results: Results,
     format: FormatFlag,
 ) -> Result<()> {
+    let out = results.dir().to_path_buf();
     let (facts, density) = (&planned.facts, &planned.density);
     let tally = tally.filter(|tally| {
         let models: Vec<ModelId> = tally.sums.iter().map(|(model, _)| *model).collect();
@@ -230,15 +233,13 @@ fn write_run(
         Ok(row.with_data(shares.as_ref(), exposure))
     };
     let rows = tally.sums.iter().enumerate().map(row).collect::<Result<_>>()?;
-    let file = EstimateFile::new(density, planned.run_facts(), rows, host)?;
-    // It was there before the work; where it vanished meanwhile, the result is worth another one.
-    make_folder(out)?;
+    let mut file = EstimateFile::new(density, planned.run_facts(), rows, host)?;
     // A proposal in this folder may be the one that was given.
-    sample_lanes::clear(out, &["proposal-"])?;
+    results.keep(|name| name.starts_with("proposal-"));
     for (model, proposal) in facts.models.iter().zip(&planned.proposals).filter(|_| facts.pilot.is_some()) {
-        write_proposal(&out.join(format!("proposal-{}.json", model.name())), density, proposal)?;
+        results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;
     }
-    sample_lanes::write_estimates(out, density, &file, Vec::new())?;
+    sample_lanes::write_estimates(results, density, &mut file, Vec::new())?;
     format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(())

@@ -10,6 +10,7 @@ use crate::lock::FolderLock;
 use crate::parts::{Countable, Journal, Ledger, Part, Shard, read_part, write_part};
 use crate::readable::count;
 use crate::report::files::make_folder;
+use crate::run_folder::RunFolder;
 use crate::{Error, Place, Result, interrupt};
 
 /// Flags of every verb that can be split.
@@ -36,35 +37,6 @@ pub const PLAN_FILE: &str = "plan.json";
 /// Name of the plan that a run in one piece leaves in its folder, for its lanes to be run again. Another name than that
 /// of a run in parts, whose processes share their plan and hold no common lock.
 pub const RUN_PLAN_FILE: &str = "run-plan.json";
-
-/// Beginnings of the names that a whole run or a merge writes under its lock. Others in the same folder may be some
-/// other command's, at work.
-const RESULTS: [&str; 19] = [
-    "claims.csv",
-    "convergence.",
-    "density.json",
-    "estimate",
-    "f1-by-parameters-",
-    "f1.csv",
-    "failures.csv",
-    "headways",
-    "map-",
-    "modes-",
-    "parameters-",
-    "radar-",
-    "recall-precision-",
-    "reference.csv",
-    "report.html",
-    "report.txt",
-    "run-plan.json",
-    "run.json",
-    "worst.csv",
-];
-
-/// Is a file the result of a whole run or of a merge?
-pub fn is_result(name: &str) -> bool {
-    RESULTS.iter().any(|beginning| name.starts_with(beginning))
-}
 
 impl ShardFlags {
     /// Starts the clock of --stop-after.
@@ -93,13 +65,17 @@ pub struct Work<T> {
     pub units: Range<u64>,
     /// What is counted.
     pub ledger: Ledger<T>,
-    lock: FolderLock,
+    /// Where it is done; of a part, together with other parts.
+    pub folder: RunFolder,
+    part: Option<FolderLock>,
 }
 
 /// The place of a run or of one of its parts in its folder.
 pub struct Desk<'a> {
     /// The run's folder.
     pub out: &'a Path,
+    /// Name of the whole run's record.
+    pub record: &'static str,
     /// Hash of the run.
     pub run_sha256: &'a str,
     /// The shard, or the whole run.
@@ -137,17 +113,16 @@ impl Desk<'_> {
     /// # Errors
     /// [`Error::Busy`] where another process is at it; [`Error::Io`].
     pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool) -> Result<Work<T>> {
-        make_folder(self.out)?;
         let stem = self.shard.map(|shard| shard.stem());
-        let lock =
-            FolderLock::acquire(&self.out.join(stem.as_ref().map_or("run.lock".to_owned(), |s| format!("{s}.lock"))))?;
-        crate::atomic_file::clear_stale(self.out, |name| match &stem {
-            Some(stem) => name.strip_suffix(".json") == Some(stem),
-            None => is_result(name),
-        });
-        if let Some(stem) = &stem {
-            self.warn_of_another_split(stem);
-        }
+        let (folder, part) = match &stem {
+            None => (RunFolder::open(self.out, self.record)?, None),
+            Some(stem) => {
+                let folder = RunFolder::share(self.out)?;
+                let part = FolderLock::acquire(&self.out.join(format!("{stem}.lock")))?;
+                self.warn_of_another_split(stem);
+                (folder, Some(part))
+            }
+        };
         let units = self.units();
         let mut ledger = Ledger::new(units.clone(), cuts);
         if is_journalled {
@@ -160,7 +135,7 @@ impl Desk<'_> {
                 tracing::info!("{done} of {all} units are done already: this run continues");
             }
         }
-        Ok(Work { units, ledger, lock })
+        Ok(Work { units, ledger, folder, part })
     }
 
     /// Parts of two splits double one another: better said before the work than by the merge.
@@ -195,7 +170,7 @@ impl Desk<'_> {
         make_folder(self.out)?;
         write_part(&path, &Part { run_sha256, units: work.units, lanes_redone_and_rechecked: lanes, segments })?;
         journal.map_or(Ok(()), Journal::remove)?;
-        drop(work.lock);
+        drop((work.part, work.folder));
         tracing::info!("part written to {}", path.display());
         Ok(())
     }
@@ -209,7 +184,7 @@ impl<T: Countable> Work<T> {
     pub fn forget(self) -> Result<()> {
         let (_, journal) = self.ledger.finish()?;
         journal.map_or(Ok(()), Journal::remove)?;
-        drop(self.lock);
+        drop((self.part, self.folder));
         Ok(())
     }
 }
@@ -220,7 +195,7 @@ impl<T: Countable> Work<T> {
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
 pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
-    make_folder(out)?;
+    let _folder = RunFolder::share(out)?;
     let path = out.join(PLAN_FILE);
     let mut there = vec![0; line.len()];
     match crate::input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {
@@ -238,17 +213,5 @@ pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
             })
         }
         Err(e) => Err(e),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::is_result;
-
-    #[test]
-    fn leftovers_of_other_commands_are_not_taken_for_results_of_a_run() {
-        assert!(["run.json", "radar-lvd.svg", "map-FSM.csv", "estimates.csv"].into_iter().all(is_result));
-        let others = ["plan.json", "part-00000-of-00002.json", "scenarios.jsonl", "lanes.csv", "01_tracks.csv"];
-        assert!(!others.into_iter().any(is_result));
     }
 }

@@ -17,6 +17,7 @@ use crate::report::files::{make_folder, write_atomically};
 use crate::report::records;
 use crate::report::trace_figure::{TraceFigure, TraceSeries};
 use crate::report::trace_table;
+use crate::run_folder::is_listed;
 use crate::scenario::Tables;
 use crate::sweep::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
 use crate::{Error, Place, Result};
@@ -159,7 +160,7 @@ impl Simulate {
         refuse_overwriting(plot, &inputs, "--plot")?;
         let is_of_run = |dir: &Path| {
             plot.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p }) == Some(dir)
-                && plot.file_name().and_then(|name| name.to_str()).is_some_and(super::shard_flags::is_result)
+                && plot.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_listed(dir, name))
         };
         if self.from.as_deref().is_some_and(is_of_run) {
             let problem = format!("{} is a result of the run", plot.display());

@@ -6,8 +6,9 @@ use clap::Args;
 
 use super::configured::command;
 use super::{Exit, console};
+use crate::atomic_file::refuse_link;
 use crate::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
-use crate::report::files::{make_folder, write_atomically};
+use crate::run_folder::RunFolder;
 use crate::{Error, Place, Result};
 
 /// Split a run over a Slurm job array
@@ -82,7 +83,12 @@ impl Slurm {
         let array = SlurmArray { run, shards: self.array, out, scripts, start, program, resources: self.resources() };
         let texts = array.scripts()?;
         let folder = Path::new(&array.scripts);
-        make_folder(folder)?;
+        if self.scripts.is_none() && folder.exists() && !folder.symlink_metadata().is_ok_and(|about| about.is_dir()) {
+            refuse_link(folder)?;
+        }
+        // What is run comes last: with it, all of them are of one command.
+        let run_folder = RunFolder::open(folder, "submit.sh")?;
+        let mut results = run_folder.results()?;
         let mut told = String::new();
         for (name, text, what) in [
             ("array.sbatch", &texts.array, format!("{} tasks, one shard each", array.shards)),
@@ -90,9 +96,12 @@ impl Slurm {
             ("submit.sh", &texts.submit, "makes the plan, submits both".to_owned()),
         ] {
             let path = folder.join(name);
-            write_atomically(&path, text.as_bytes())?;
+            if name != "submit.sh" {
+                results.add(name, text.as_bytes())?;
+            }
             told += &format!("{}: {what}\n", path.display());
         }
+        results.publish(texts.submit.as_bytes())?;
         let submit = shell_quoted("--scripts", &format!("{}/submit.sh", array.scripts))?;
         console::print(&format!("{told}\nSubmit with:\n  bash {submit}\n"))?;
         Ok(Exit::Ok)

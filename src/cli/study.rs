@@ -25,6 +25,7 @@ use crate::report::distributions::parameter_histograms;
 use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
+use crate::run_folder::{Results, STUDY_RECORD};
 use crate::scenario::{Category, Scenario};
 use crate::sweep::{
     Backend, Block, Confusion, CpuBackend, Partial, StudyOptions, StudyOutline, Wanted, forecast, outline_study,
@@ -268,8 +269,13 @@ impl Study {
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
         let how = How { backend, fallback: opened.fallback(), recheck: study.facts.score.seed };
-        let desk =
-            Desk { out: &self.out, run_sha256: &run_sha256, shard: self.shards.shard, unit_count: plan.unit_count() };
+        let desk = Desk {
+            out: &self.out,
+            record: STUDY_RECORD,
+            run_sha256: &run_sha256,
+            shard: self.shards.shard,
+            unit_count: plan.unit_count(),
+        };
         if desk.is_done::<Partial>()? {
             tracing::info!("this part is there already, and whole");
             return Ok(Exit::Ok);
@@ -284,9 +290,12 @@ impl Study {
             return Ok(Exit::Ok);
         }
         let partial = work.ledger.take()?.unwrap_or_else(|| Partial::empty(plan));
+        let mut results = work.folder.results()?;
         if let Some(path) = &self.lanes {
             let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-            swept.add(&write_lanes(path, &study.study, &how, digits, study.facts.synthetic)?);
+            let (again, table) = write_lanes(path, &study.study, &how, digits, study.facts.synthetic)?;
+            swept.add(&again);
+            results.join(table);
         }
         let comparison = self.compare_reference.then(|| compare_reference(&study.study)).transpose()?;
         let host = Host {
@@ -299,16 +308,16 @@ impl Study {
             timings,
             settings: configured.record(),
         };
-        self.leave_plan(study)?;
-        let exit = finish_study(study, &partial, comparison, host, &self.out, self.format)?;
+        self.leave_plan(study, &mut results)?;
+        let exit = finish_study(study, &partial, comparison, host, results, self.format)?;
         work.forget()?;
         Ok(exit)
     }
 
-    /// For `simulate --from`. Under the run's lock.
-    fn leave_plan(&self, study: &PlannedStudy) -> Result<()> {
+    /// For `simulate --from`.
+    fn leave_plan(&self, study: &PlannedStudy, results: &mut Results) -> Result<()> {
         let Some(most_bytes) = self.keep_plan.most_bytes() else { return Ok(()) };
-        if !study.keep(&self.out.join(RUN_PLAN_FILE), most_bytes)? {
+        if !study.keep(results, RUN_PLAN_FILE, most_bytes)? {
             tracing::info!(
                 "the plan is not left in {}: it has more than {} MiB; --keep-plan always leaves it, for `simulate --from`",
                 self.out.display(),

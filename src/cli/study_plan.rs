@@ -10,7 +10,7 @@ use crate::mining::{MiningOptions, RecordingSummary};
 use crate::parameterization::{ModeShape, ParameterizationId, ParameterizationOptions};
 use crate::parts::{read_sealed_line, seal};
 use crate::report::distributions::ParameterHistogram;
-use crate::report::files::write_atomically_with;
+use crate::run_folder::Results;
 use crate::score::ScoreOptions;
 use crate::sweep::{LanePlan, Study, StudyHead};
 use crate::{Place, Result};
@@ -78,16 +78,16 @@ impl PlannedStudy {
         seal(KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.study.head().clone() })
     }
 
-    /// Writes the plan file, unless it would be larger than so many bytes; tells whether it did.
+    /// Adds the plan file to the results, unless it would be larger than so many bytes; tells whether it did.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn keep(&self, path: &Path, most_bytes: u64) -> Result<bool> {
+    pub fn keep(&self, results: &mut Results, name: &str, most_bytes: u64) -> Result<bool> {
         let (head, records) = (self.seal()?.0, self.study.records()?);
         if (head.len() + records.len()) as u64 > most_bytes {
             return Ok(false);
         }
-        write_atomically_with(path, |out| out.write_all(&head).and_then(|()| out.write_all(records)))?;
+        results.add_with(name, |out| out.write_all(&head).and_then(|()| out.write_all(records)))?;
         Ok(true)
     }
 

@@ -8,12 +8,14 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::shard_flags::Work;
 use super::study_plan::PlannedStudy;
+use crate::atomic_file::StagedFile;
 use crate::report::files::make_folder;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
+use crate::run_folder::Results;
 use crate::score::{ScoreTable, f1, judge_claims, score};
 use crate::sweep::{
     Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, Study, SweepOptions, SweepSummary,
@@ -112,14 +114,15 @@ pub(super) fn compare_reference(study: &Study) -> Result<ReferenceComparison> {
     Ok(comparison)
 }
 
-/// One row per lane, chunk by chunk, so that memory does not grow with the lanes.
+/// One row per lane, chunk by chunk, so that memory does not grow with the lanes. The table gets its name with the
+/// study's other results.
 pub(super) fn write_lanes(
     path: &Path,
     study: &Study,
     how: &How,
     digits: Digits,
     synthetic: bool,
-) -> Result<SweepSummary> {
+) -> Result<(SweepSummary, StagedFile)> {
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         make_folder(dir)?;
     }
@@ -134,8 +137,7 @@ pub(super) fn write_lanes(
     let swept = how.sweep(study, 0..plan.unit_count(), Wanted::Outcomes, |plan, chunk| {
         lanes::write_chunk(&mut table, plan, &chunk)
     })?;
-    table.finish()?;
-    Ok(swept)
+    Ok((swept, table.stage()?))
 }
 
 /// The format of a table of lanes.
@@ -159,7 +161,7 @@ pub(super) fn finish_study(
     partial: &Partial,
     comparison: Option<ReferenceComparison>,
     mut host: Host,
-    out: &Path,
+    results: Results,
     format: FormatFlag,
 ) -> Result<Exit> {
     let (plan, facts) = (study.plan(), study.facts.clone());
@@ -191,6 +193,7 @@ pub(super) fn finish_study(
         parameterization: facts.parameterization,
         score: facts.score,
         settings: host.settings,
+        files: Vec::new(),
         timings: host.timings,
     };
     let claims = judge_claims(&scores);
@@ -203,10 +206,11 @@ pub(super) fn finish_study(
         })
     };
     let pictures = study.facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
-    let report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
-    let written = report.write(out)?;
+    let out = results.dir().to_path_buf();
+    let mut report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
+    report.write(results)?;
     format.print(|| report.text(), || report.json())?;
-    tracing::info!("{} files written to {}", written.len(), out.display());
+    tracing::info!("{} files written to {}", report.run.files.len() + 1, out.display());
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
 }
 

@@ -1,6 +1,6 @@
 //! `lanesweep synth`: the embedded default's recordings as highD files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -8,7 +8,8 @@ use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source::Source;
-use crate::report::files::{make_folder, write_atomically};
+use crate::report::files::check_folder;
+use crate::run_folder::{RunFolder, unfinished};
 use crate::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
@@ -57,7 +58,15 @@ pub struct Synth {
 impl Synth {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let options = self.generator.options(configured)?;
-        let taken = |id: &str| HighdFiles::named(&self.dir, id).tracks.exists();
+        check_folder(&self.dir)?;
+        let folder = RunFolder::open(&self.dir, SYNTHETIC_MARKER)?;
+        // What a killed run was giving its names is written again.
+        let unfinished = unfinished(&self.dir).unwrap_or_default();
+        let is_unfinished = |tracks: &Path| unfinished.iter().any(|name| tracks.ends_with(name));
+        let taken = |id: &str| {
+            let tracks = HighdFiles::named(&self.dir, id).tracks;
+            tracks.exists() && !is_unfinished(&tracks)
+        };
         if let Some(id) = (1..=options.recordings).map(|k| format!("{k:02}")).find(|id| taken(id)) {
             return Err(Error::usage(
                 Place::file(&self.dir),
@@ -65,35 +74,21 @@ impl Synth {
                 "choose an empty folder",
             ));
         }
-        make_folder(&self.dir)?;
         let sentence = Source::Generated(options.clone()).describe(true);
         let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
-        write_atomically(&self.dir.join(SYNTHETIC_MARKER), marker.as_bytes())?;
+        let mut results = folder.results()?;
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
-        let written = (0..options.recordings).try_for_each(|index| {
+        for index in 0..options.recordings {
             let recording = generate_one(&options, index)?;
-            highd::write(&self.dir, &recording, &RecordingInfo::default())?;
+            let staged = highd::stage(&self.dir, &recording, &RecordingInfo::default())?;
+            staged.into_iter().for_each(|file| results.join(file.closed()));
             bar.inc(1);
-            Ok(())
-        });
-        bar.finish_and_clear();
-        if let Err(error) = written {
-            self.remove(options.recordings);
-            return Err(error);
         }
+        bar.finish_and_clear();
+        // Some of the recordings would be studied as if they were all, and as if they were real: all get their names at
+        // once, and last the file that says what they are.
+        results.publish(marker.as_bytes())?;
         tracing::info!("{} synthetic recordings written to {}", options.recordings, self.dir.display());
         Ok(Exit::Ok)
-    }
-
-    /// Takes away what this run wrote: some of the recordings would be studied as if they were all, and the same
-    /// command would refuse the folder.
-    fn remove(&self, recordings: usize) {
-        for id in (1..=recordings).map(|k| format!("{k:02}")) {
-            let files = HighdFiles::named(&self.dir, &id);
-            for file in [files.tracks, files.tracks_meta, files.recording_meta] {
-                // One that was not written is not there.
-                let _ = std::fs::remove_file(file);
-            }
-        }
     }
 }

@@ -45,6 +45,18 @@ impl ExposureFile {
         }
     }
 
+    /// Takes away the one beside a scenario file that is about to be replaced.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn remove_beside(scenarios: &Path) -> Result<()> {
+        let path = Self::path_of(scenarios);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "remove", e)),
+            _ => Ok(()),
+        }
+    }
+
     /// Writes it beside a scenario file: whole or not at all.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use super::road::road_file;
 use super::scenario_file::scenario_file;
 use crate::Result;
 use crate::report::csv;
-use crate::report::files::{make_folder, write_atomically};
+use crate::run_folder::RunFolder;
 
 /// Name of the index.
 pub const INDEX: &str = "index.csv";
@@ -23,7 +23,7 @@ pub struct IndexRow {
     pub lane: String,
 }
 
-/// Writes every scenario with its road, then the index; takes the files of an earlier index away first.
+/// Puts every scenario with its road and the index into a folder, in the place of an earlier export's.
 ///
 /// # Errors
 /// As [`scenario_file`]; [`crate::Error::Io`].
@@ -35,8 +35,8 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
         let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
         made.push((scenario_file(scenario, &row.road)?, road_file(&scenario.road())?, row));
     }
-    make_folder(dir)?;
-    remove_earlier(dir);
+    let folder = RunFolder::open(dir, INDEX)?;
+    let mut results = folder.results()?;
     // The lane has a column of its own already.
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
@@ -46,8 +46,8 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     let mut table = vec![header.collect::<Vec<String>>()];
     let mut rows = Vec::new();
     for ((text, road, row), scenario) in made.into_iter().zip(scenarios) {
-        write_atomically(&dir.join(&row.road), &road)?;
-        write_atomically(&dir.join(&row.file), &text)?;
+        results.add(&row.road, &road)?;
+        results.add(&row.file, &text)?;
         let value = |name: &String| {
             scenario.properties.iter().find(|(n, _)| n == name).map_or(String::new(), |(_, value)| value.clone())
         };
@@ -55,7 +55,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
         table.push(first.into_iter().chain(names.iter().map(value)).collect());
         rows.push(row);
     }
-    write_atomically(&dir.join(INDEX), &csv::text(table)?)?;
+    results.publish(&csv::text(table)?)?;
     Ok(rows)
 }
 
@@ -69,25 +69,4 @@ fn safe(key: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-') { c } else { '_' };
     let name: String = key.chars().map(plain).take(100).collect();
     name.trim_matches(['.', '_']).to_owned()
-}
-
-/// Is it a name that this file gives?
-fn is_ours(name: &str) -> bool {
-    let digits = name.bytes().take_while(u8::is_ascii_digit).count();
-    let is_plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-'));
-    digits >= 3 && name[digits..].starts_with('-') && is_plain && (name.ends_with(".xosc") || name.ends_with(".xodr"))
-}
-
-/// Takes away what an earlier export's index names, so that none of it stands beside the new files. What cannot be
-/// read or removed stays: it is not in the new index.
-fn remove_earlier(dir: &Path) {
-    let Ok(text) = crate::input_file::read_text(&dir.join(INDEX), crate::input_file::LARGEST_TABLE_BYTES) else {
-        return;
-    };
-    let mut reader = ::csv::Reader::from_reader(text.as_bytes());
-    for record in reader.records().flatten() {
-        for name in record.iter().take(2).filter(|name| is_ours(name)) {
-            let _ = std::fs::remove_file(dir.join(name));
-        }
-    }
 }

@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::lock::is_named;
+use crate::atomic_file::{is_named, refuse_link};
 use crate::sweep::{ENGINE_VERSION, hex};
 use crate::{Error, Place, Result};
 
@@ -63,6 +63,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         let due = Instant::now() + SHORTEST_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
+        refuse_link(path)?;
         let mut file = match OpenOptions::new().read(true).write(true).open(path) {
             Ok(file) => file,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
@@ -83,8 +84,12 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         let io = |e| Error::io(path, "write", e);
         file.set_len(whole as u64).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
-        // Where not even the head is whole, the file is begun anew.
-        journal.file = (whole > 0).then_some(file);
+        if whole > 0 {
+            journal.file = Some(file);
+        } else {
+            // Not even the head is whole: it is begun anew.
+            std::fs::remove_file(path).map_err(io)?;
+        }
         Ok((journal, Records { records, torn }))
     }
 
@@ -143,7 +148,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             Some(file) if !is_named(&self.path, file) => return Err(self.gone()),
             Some(_) => {}
             None => {
-                let created = File::create(&self.path).map_err(|e| match e.kind() {
+                let created = File::create_new(&self.path).map_err(|e| match e.kind() {
                     std::io::ErrorKind::NotFound => self.gone(),
                     _ => self.failed(e),
                 })?;

@@ -32,7 +32,7 @@ pub struct Part<T> {
 /// # Errors
 /// [`Error::Io`].
 pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
-    let mut file = AtomicFile::create(path)?;
+    let mut file = AtomicFile::create_inside(path)?;
     file.append(&seal("part", part)?.0)?;
     file.stage()?.publish()
 }

@@ -51,6 +51,8 @@ pub struct CompareFile {
     pub left_out: Vec<String>,
     /// Per category.
     pub categories: Vec<CategoryComparison>,
+    /// Files beside this one.
+    pub files: Vec<String>,
     /// The machine.
     pub host: HostRecord,
 }

@@ -1,11 +1,9 @@
 //! A run of `map` in tables and files: shares in the terminal, cells as CSV, sheets as SVG, `map.json`.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::files::{make_folder, write_atomically, write_atomically_with};
 use super::html::PageFigure;
 use super::map_sheet::{Kind, MapSheet};
 use super::run_record::{DeviceRecord, SweepRecord};
@@ -15,6 +13,7 @@ use crate::driver::ModelId;
 use crate::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
 use crate::profile::Profile;
 use crate::readable;
+use crate::run_folder::Results;
 use crate::table::quoted;
 use crate::{Error, Result};
 
@@ -144,25 +143,20 @@ impl MapReport {
         text
     }
 
-    /// Writes every file; gives their paths.
+    /// Puts every file into its folder; gives their names, without the record's.
     ///
     /// # Errors
     /// [`Error::Io`] where the folder cannot be written.
-    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
-        make_folder(dir)?;
-        let (mut written, mut figures) = (Vec::new(), Vec::new());
-        let file_of =
-            |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+        let mut figures = Vec::new();
         for mapped in &self.grids {
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
                 let what = format!("{}, {}", model.name(), self.criterion.label());
-                let sheet = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells);
-                let path = dir.join(format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name())));
-                let svg = sheet.svg();
-                write_atomically(&path, svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&file_of(&path), "cells.csv"]));
-                written.push(path);
+                let svg = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells).svg();
+                let name = format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name()));
+                results.add(&name, svg.as_bytes())?;
+                figures.push(PageFigure::new(&svg, &[&name, "cells.csv"]));
             }
         }
         let differences = self.differences();
@@ -170,42 +164,24 @@ impl MapReport {
             let cells = difference.cells.iter().map(|kind| *kind as u8).collect();
             let what = format!("{} against {}, {}", difference.first, difference.second, self.criterion.label());
             let kinds = Kind::agreements(&difference.first, &difference.second);
-            let sheet = self.sheet(difference.grid, what, kinds, cells);
+            let svg = self.sheet(difference.grid, what, kinds, cells).svg();
             let name = format!(
                 "{}_{}_against_{}.svg",
                 difference.grid.name(),
                 slug(difference.model.name()),
                 slug(&self.against_name())
             );
-            let path = dir.join(name);
-            let svg = sheet.svg();
-            write_atomically(&path, svg.as_bytes())?;
-            figures.push(PageFigure::new(&svg, &[&file_of(&path), "differences.csv"]));
-            written.push(path);
+            results.add(&name, svg.as_bytes())?;
+            figures.push(PageFigure::new(&svg, &[&name, "differences.csv"]));
         }
-        let path = dir.join("report.html");
-        write_atomically(&path, self.html(figures)?.as_bytes())?;
-        written.push(path);
-        let path = dir.join("cells.csv");
-        write_atomically_with(&path, |out| self.write_cells(out))?;
-        written.push(path);
+        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add_with("cells.csv", |out| self.write_cells(out))?;
         if !differences.is_empty() {
-            let path = dir.join("differences.csv");
-            write_atomically_with(&path, |out| self.write_differences(&differences, out))?;
-            written.push(path);
+            results.add_with("differences.csv", |out| self.write_differences(&differences, out))?;
         }
-        let path = dir.join("map.json");
-        let names: Vec<String> = written.iter().map(|path| file_of(path)).collect();
-        for stale in earlier_files(&path).into_iter().filter(|name| !names.contains(name)) {
-            let stale = dir.join(stale);
-            match std::fs::remove_file(&stale) {
-                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(Error::io(stale, "remove", e)),
-                _ => {}
-            }
-        }
-        write_atomically(&path, self.json(names)?.as_bytes())?;
-        written.push(path);
-        Ok(written)
+        let names = results.names();
+        results.publish(self.json(names.clone())?.as_bytes())?;
+        Ok(names)
     }
 
     fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {
@@ -315,22 +291,6 @@ impl MapReport {
         let text = serde_json::to_string_pretty(&record);
         text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("map.json cannot be written: {e}")))
     }
-}
-
-/// What an earlier run left beside its record: sheets and tables by their names alone, so that nothing outside the
-/// folder is meant. A record that cannot be read names nothing.
-fn earlier_files(record: &Path) -> Vec<String> {
-    #[derive(serde::Deserialize)]
-    struct Earlier {
-        files: Vec<String>,
-    }
-    let text = crate::input_file::read(record, 64 << 20).unwrap_or_default();
-    let earlier: Earlier = serde_json::from_slice(&text).unwrap_or(Earlier { files: Vec::new() });
-    let is_ours = |name: &String| {
-        let is_name = Path::new(name).file_name().is_some_and(|file| file == name.as_str());
-        is_name && (name.ends_with(".svg") || name.ends_with(".csv"))
-    };
-    earlier.files.into_iter().filter(is_ours).collect()
 }
 
 /// `map.json`.

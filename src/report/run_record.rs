@@ -134,6 +134,8 @@ pub struct RunRecord {
     /// Options that were set for this command, and by what. As the backend's, they are of the command and not of the
     /// result: a merge has none, its parts had their own.
     pub settings: Vec<SettingRecord>,
+    /// Files beside this one.
+    pub files: Vec<String>,
     /// Seconds; they differ from run to run.
     pub timings: Timings,
 }

@@ -183,6 +183,8 @@ pub struct EstimateFile {
     pub levels: Vec<Levels>,
     /// The share of the data in the uncertainty, where asked for.
     pub bootstrap: Option<BootstrapRecord>,
+    /// Files beside this one.
+    pub files: Vec<String>,
     /// The machine.
     pub host: HostRecord,
 }
@@ -232,6 +234,7 @@ impl EstimateFile {
             estimates,
             levels: Vec::new(),
             bootstrap: None,
+            files: Vec::new(),
             host,
         }
     }

@@ -220,7 +220,10 @@ impl EstimateFile {
         host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
         host.push((
             "checked".to_owned(),
-            format!("{} lanes computed again on the CPU with every step made, all equal", count(self.host.rechecked_lanes)),
+            format!(
+                "{} lanes computed again on the CPU with every step made, all equal",
+                count(self.host.rechecked_lanes)
+            ),
         ));
         if self.host.seconds > 0.0 {
             host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));

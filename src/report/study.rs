@@ -1,20 +1,18 @@
 //! A study as text for the terminal and as files in the output folder.
 
-use std::path::{Path, PathBuf};
-
 use super::distributions::{ParameterHistogram, distributions};
-use super::files::{make_folder, write_atomically};
 use super::panels::PanelFigure;
 use super::radar::{RadarChart, RadarSeries, radar_svg};
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
 use super::study_figures::{HeadwayFailures, f1_by_parameters, legend_name, modes, recall_and_precision};
 use super::{csv, tables};
+use crate::Result;
 use crate::criterion::Criterion;
 use crate::parameterization::ModeShape;
+use crate::run_folder::Results;
 use crate::scenario::Category;
 use crate::score::{CategoryScores, ClaimResult, ScoreTable, f1};
-use crate::{Error, Result};
 
 /// What the figures of one category need beside the scores.
 #[derive(Debug, Clone)]
@@ -64,35 +62,30 @@ impl StudyReport {
         parts.join("\n")
     }
 
-    /// Writes CSV tables, figures and `run.json` into a folder; the record comes last, so a folder that has
-    /// one is whole. Returns what was written.
-    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
-        make_folder(dir)?;
+    /// Puts CSV tables, figures, what is in `results` already and `run.json` into their folder.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn write(&mut self, mut results: Results) -> Result<()> {
         let data = if self.run.synthetic { "synthetic" } else { "recorded" };
-        let mut files: Vec<(PathBuf, Vec<u8>)> = vec![
-            (dir.join("failures.csv"), csv::failures(&self.scores, data)?),
-            (dir.join("f1.csv"), csv::f1_scores(&self.scores, data)?),
-            (dir.join("claims.csv"), csv::claims(&self.claims, data)?),
-            (dir.join("report.txt"), self.text().into_bytes()),
-        ];
-        files.push((dir.join("headways.csv"), self.headways(data)?));
+        results.add("failures.csv", &csv::failures(&self.scores, data)?)?;
+        results.add("f1.csv", &csv::f1_scores(&self.scores, data)?)?;
+        results.add("claims.csv", &csv::claims(&self.claims, data)?)?;
+        results.add("report.txt", self.text().as_bytes())?;
+        results.add("headways.csv", &self.headways(data)?)?;
         for (at, category) in self.scores.categories.iter().enumerate() {
-            files.push((dir.join(file_name("radar", category.category, "svg")), self.radar(category).into_bytes()));
+            results.add(&file_name("radar", category.category, "svg"), self.radar(category).as_bytes())?;
             for (name, figure) in self.figures(at) {
-                files.push((dir.join(file_name(name, category.category, "svg")), figure.svg().into_bytes()));
-                files.push((dir.join(file_name(name, category.category, "csv")), figure.csv()?));
+                results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
+                results.add(&file_name(name, category.category, "csv"), &figure.csv()?)?;
             }
         }
-        files.push((dir.join("report.html"), self.html()?.into_bytes()));
-        files.push((dir.join("run.json"), self.run.to_json()?));
         if let Some(comparison) = &self.comparison {
-            files.insert(0, (dir.join("reference.csv"), comparison.csv().into_bytes()));
+            results.add("reference.csv", comparison.csv().as_bytes())?;
         }
-        remove_earlier(dir, &files)?;
-        for (path, content) in &files {
-            write_atomically(path, content)?;
-        }
-        Ok(files.into_iter().map(|(path, _)| path).collect())
+        results.add("report.html", self.html()?.as_bytes())?;
+        self.run.files = results.names();
+        results.publish(&self.run.to_json()?)
     }
 
     /// F1 per model and criterion (spokes), one polygon per parameterization, as in the paper.
@@ -143,26 +136,7 @@ impl StudyReport {
     }
 }
 
-/// Beginnings of the names of the figures' files.
-pub const FIGURES: [&str; 6] = ["radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"];
-
 /// `radar-cut-in.svg`.
 pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> String {
     format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
-}
-
-/// Takes away what an earlier run left in the folder and this one does not write: the record first, so that a
-/// folder with a record is whole, then figures and comparisons of other categories.
-fn remove_earlier(dir: &Path, files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
-    let of = |c: Category| FIGURES.into_iter().flat_map(move |name| ["svg", "csv"].map(|end| file_name(name, c, end)));
-    let figures = Category::ALL.into_iter().flat_map(of);
-    let ours = figures.chain(["reference.csv".to_owned()]).map(|name| dir.join(name));
-    let stale = ours.filter(|path| files.iter().all(|(written, _)| written != path));
-    for path in std::iter::once(dir.join("run.json")).chain(stale) {
-        match std::fs::remove_file(&path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
-            _ => {}
-        }
-    }
-    Ok(())
 }

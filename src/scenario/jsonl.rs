@@ -87,7 +87,6 @@ fn write_lines<'a>(
     Ok(())
 }
 
-
 /// Longest line: hours at 1000 samples a second fit.
 const LONGEST_LINE_BYTES: u64 = 64 << 20;
 

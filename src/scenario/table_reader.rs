@@ -208,8 +208,7 @@ impl Reader {
                 if is_series { vec![value.clone()] } else { Vec::new() }
             };
             let series = self.chosen.iter().zip(&values).map(|(column, value)| series(column, value)).collect();
-            self.open =
-                Some(Open { rows: vec![row], id: id.clone(), first: values, series, times_s: vec![time_s] });
+            self.open = Some(Open { rows: vec![row], id: id.clone(), first: values, series, times_s: vec![time_s] });
             return Ok(());
         };
         for (at, (column, value)) in self.chosen.iter().zip(values).enumerate() {
@@ -226,7 +225,7 @@ impl Reader {
                 _ => {}
             }
         }
-        open.rows.push(row.number);
+        open.rows.push(row);
         open.times_s.push(time_s);
         Ok(())
     }

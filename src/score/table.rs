@@ -45,14 +45,14 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
 ///
 /// `None` below [`ScoreOptions::least_failures`] failures of S.
 pub fn f1_interval<'a>(
-    scenarios: impl Iterator<Item = &'a Confusion> + Clone,
+    scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
 ) -> Option<Interval> {
     let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.both) + u64::from(c.only_s)).sum();
     if failures_of_s < u64::from(options.least_failures.max(1)) {
         return None;
     }
-    let any = |c: &Confusion| u64::from(c.both) + u64::from(c.only_s) + u64::from(c.only_s_prime);
+    let any = |c: &Confusion<u32>| u64::from(c.both) + u64::from(c.only_s) + u64::from(c.only_s_prime);
     let (runs, agreed): (Vec<u64>, Vec<u64>) =
         scenarios.map(|c| (any(c), u64::from(c.both))).filter(|(any, _)| *any > 0).unzip();
     let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;

@@ -173,7 +173,7 @@ impl LaneRunner<'_, f32> {
             if in_batches {
                 constants.run_stream(model, instructions, &stream, series.entries(), each);
             } else {
-                self.one_by_one(block, cases, tables, model, each);
+                self.one_by_one(block, &cases, tables, model, each);
             }
         }
         if let Ok(mut spare) = self.spare.lock() {

@@ -109,6 +109,8 @@ pub(super) fn read(record: &[u8], category: Category) -> Option<Scenario> {
         frame1: 0,
         fps,
         kept: true,
+        // The study's facts tell it.
+        synthetic: false,
         reason: String::new(),
         ego,
         // No case follows from it.

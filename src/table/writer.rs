@@ -7,7 +7,7 @@ use std::path::Path;
 use super::parquet_writer::ParquetFile;
 use super::spreadsheet::quoted;
 use super::{Cell, Column, Kind, TableFormat, jsonl};
-use crate::atomic_file::AtomicFile;
+use crate::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
 /// What a file says of its table; only Parquet has a place for it.
@@ -94,12 +94,20 @@ impl TableWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn finish(self) -> Result<()> {
+        self.stage()?.publish()
+    }
+
+    /// Brings the table to the disk, still without its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn stage(self) -> Result<StagedFile> {
         let file = match self.out {
             Out::Csv(file, _) | Out::JsonLines(file, _) => file,
             #[cfg(feature = "parquet")]
             Out::Parquet(file) => file.finish()?,
         };
-        file.stage()?.publish()
+        file.stage()
     }
 }
 

@@ -45,6 +45,12 @@ const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.c
 /// If the folder cannot be listed, is none, or holds no complete recording.
 pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
+    let unfinished = crate::run_folder::unfinished(dir).unwrap_or_default();
+    if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
+        let problem = "`lanesweep synth` ended here before all of its recordings had their names: it is no data set";
+        let help = "give that command again, which completes the folder, or remove the folder";
+        return Err(Error::input(Place::file(dir), problem, help));
+    }
     let mut inventory = Inventory { recordings: Vec::new(), problems: Vec::new() };
     for (id, present) in found {
         let missing: Vec<String> =

@@ -22,4 +22,5 @@ pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up}
 pub use precision::Precision;
 pub use read::{Loaded, read, read_judged};
 pub use writable::quantize;
+pub(crate) use write::stage;
 pub use write::{RecordingInfo, write};

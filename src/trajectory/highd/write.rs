@@ -58,6 +58,21 @@ impl Default for RecordingInfo {
 /// If the format cannot hold the recording (carriageways other than `1` and `2`, unsorted vehicles, values
 /// that are not finite, …) or the system refuses to write.
 pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<()> {
+    let staged = stage(dir, recording, info)?;
+    // An older recording of the same name loses its main file first and the new one gets it last: a crash
+    // in between leaves a recording that is incomplete for everyone to see, never a mixture.
+    let tracks = HighdFiles::named(dir, &recording.id).tracks;
+    if tracks.exists() {
+        fs::remove_file(&tracks).map_err(|source| Error::io(&tracks, "replace", source))?;
+    }
+    staged.into_iter().try_for_each(StagedFile::publish)
+}
+
+/// The three files of a recording, complete, without their names; that of the tracks comes last.
+///
+/// # Errors
+/// As [`write`].
+pub(crate) fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
     let layout = Layout::of(recording, info.precision)?;
     check_texts(info)?;
     fs::create_dir_all(dir).map_err(|source| Error::io(dir, "create the folder", source))?;
@@ -66,12 +81,7 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
     let (tracks, summaries) = writer.tracks(&files.tracks)?;
     let tracks_meta = writer.tracks_meta(&files.tracks_meta, &summaries)?;
     let recording_meta = writer.recording_meta(&files.recording_meta, &summaries)?;
-    // An older recording of the same name loses its main file first and the new one gets it last: a crash
-    // in between leaves a recording that is incomplete for everyone to see, never a mixture.
-    if files.tracks.exists() {
-        fs::remove_file(&files.tracks).map_err(|source| Error::io(&files.tracks, "replace", source))?;
-    }
-    [recording_meta, tracks_meta, tracks].into_iter().try_for_each(StagedFile::publish)
+    Ok([recording_meta, tracks_meta, tracks])
 }
 
 fn check_texts(info: &RecordingInfo) -> Result<()> {
@@ -149,7 +159,7 @@ impl Writer<'_> {
     }
 
     fn tracks(&self, path: &Path) -> Result<(StagedFile, Vec<Summary>)> {
-        let mut file = AtomicFile::create(path)?;
+        let mut file = AtomicFile::create_inside(path)?;
         file.append(header(&TRACKS_COLUMNS).as_bytes())?;
         let around = neighbours(self.recording);
         let mut summaries = vec![Summary::default(); self.recording.tracks.len()];
@@ -229,7 +239,7 @@ impl Writer<'_> {
     }
 
     fn tracks_meta(&self, path: &Path, summaries: &[Summary]) -> Result<StagedFile> {
-        let mut file = AtomicFile::create(path)?;
+        let mut file = AtomicFile::create_inside(path)?;
         file.append(header(&TRACKS_META_COLUMNS).as_bytes())?;
         let mut line = Line::new(self.info.precision);
         for (track, summary) in self.recording.tracks.iter().zip(summaries) {
@@ -286,7 +296,7 @@ impl Writer<'_> {
         if self.recording.synthetic {
             line.text("1");
         }
-        let mut file = AtomicFile::create(path)?;
+        let mut file = AtomicFile::create_inside(path)?;
         file.append(header(columns).as_bytes())?;
         file.append(line.end())?;
         file.stage()
