@@ -370,3 +370,32 @@ fn two_processes_do_not_compute_the_same_part() {
     let told = format!("another lanesweep process is writing this part or run (pid {})", first.id());
     assert!(flat(&err).contains(&told) && out.is_empty(), "{err}");
 }
+
+#[test]
+fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let run = ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
+    let shard = |index: &'static str| [&run[..], &["--shard", index]].concat();
+    let mut first = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .current_dir(dir)
+        .args(shard("0/2"))
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    while !dir.join("run/part-00000-of-00002.lock").exists() {
+        assert!(first.try_wait().unwrap().is_none(), "the first process has ended");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let others = [&run[..], &["-q", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
+    let beside = lanesweep(dir, &[&shard("1/2")[..], &["--stop-after", "0.3"]].concat());
+    first.kill().unwrap();
+    first.wait().unwrap();
+    for (code, _, err) in others {
+        assert_eq!(code, 75, "{err}");
+        assert!(flat(&err).contains("another lanesweep process"), "{err}");
+    }
+    assert_eq!(beside.0, 75, "{}", beside.2);
+    assert!(flat(&beside.2).contains("are done and kept"), "{}", beside.2);
+}
