@@ -42,6 +42,10 @@ fn results(dir: &Path) -> Vec<(String, String)> {
             for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
                 record.as_object_mut().unwrap().remove(host);
             }
+            // A run in one piece leaves its plan.
+            if let Some(files) = record["files"].as_array_mut() {
+                files.retain(|file| file != "run-plan.json");
+            }
             content = record.to_string();
         }
         if name == "report.html" {
