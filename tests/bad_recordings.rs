@@ -232,7 +232,8 @@ fn small_speeds_backwards_are_noise_that_is_counted_and_larger_ones_an_error() {
 
 #[test]
 fn what_no_road_has_is_refused_unless_accepted_and_then_told() {
-    let cases: [(&str, fn(&mut Texts), &[&str]); 6] = [
+    type Change = fn(&mut Texts);
+    let cases: [(&str, Change, &[&str]); 6] = [
         ("speed", |t| t.tracks = with_field(&t.tracks, 5, "xVelocity", "-108"), &["line 5", "km/h: 30 m/s"]),
         ("jump", |t| t.tracks = with_field(&t.tracks, 5, "y", "12.6"), &["line 5", "column `y`", "lateral speed"]),
         ("lateral", |t| t.tracks = with_field(&t.tracks, 5, "yVelocity", "11"), &["line 5", "column `yVelocity`"]),

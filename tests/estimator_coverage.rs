@@ -254,7 +254,7 @@ fn sampled_scenarios(n: usize, [mean, spread]: [f64; 2], seed: u64) -> (Vec<u64>
 }
 
 /// Lanes in which S, S' and either of them fail, of one scenario.
-fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion {
+fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32> {
     let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     let s = if uniform() < failing { 1 + (uniform() * uniform() * 10.0) as i32 } else { 0 };
     let shift = 1 + (uniform() * 2.0) as i32;
@@ -263,10 +263,10 @@ fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion {
     let s_prime = if is_wrong { (s + shift).clamp(0, 10) } else { s };
     let count = |n: i32| n.max(0) as u32;
     Confusion {
-        both: count(s.min(s_prime)).into(),
-        only_s: count(s - s_prime).into(),
-        only_s_prime: count(s_prime - s).into(),
-        neither: count(10 - s.max(s_prime)).into(),
+        both: count(s.min(s_prime)),
+        only_s: count(s - s_prime),
+        only_s_prime: count(s_prime - s),
+        neither: count(10 - s.max(s_prime)),
     }
 }
 
@@ -324,24 +324,25 @@ fn intervals_of_f1_hold() {
     for n in [9, 30, 100] {
         for failing in [0.03, 0.1, 0.3] {
             for wrong in [0.02, 0.1, 0.3] {
-                let total = |units: &[Confusion]| {
-                    let mut sum = Confusion::default();
+                let total = |units: &[Confusion<u32>]| {
+                    let mut sum = Confusion::<u64>::default();
                     units.iter().for_each(|unit| sum.add(unit));
                     sum
                 };
                 let mut random = ChaCha8Rng::seed_from_u64(1);
-                let population: Vec<Confusion> = (0..200_000).map(|_| confusion(&mut random, failing, wrong)).collect();
+                let population: Vec<Confusion<u32>> =
+                    (0..200_000).map(|_| confusion(&mut random, failing, wrong)).collect();
                 let truth = f1(&total(&population)).expect("failures");
                 let of = |seed: u64| {
                     let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
-                    let units: Vec<Confusion> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
+                    let units: Vec<Confusion<u32>> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
                     // None below ten failures of S.
                     let ours = f1_interval(units.iter(), &ScoreOptions::default())?;
                     let score = |drawn: &[usize]| f1(&total(&drawn.iter().map(|at| units[*at]).collect::<Vec<_>>()));
                     let value = f1(&total(&units)).expect("failures");
                     assert!(ours.low <= value && value <= ours.high, "{ours:?} excludes {value}");
                     let sum = total(&units);
-                    let failures = u64::from(sum.both) + u64::from(sum.only_s);
+                    let failures = sum.both + sum.only_s;
                     Some(([percentiles(n, seed, score)?, (ours.low, ours.high)], failures))
                 };
                 let all: Vec<([(f64, f64); 2], u64)> = (0..REPEATS).into_par_iter().filter_map(of).collect();

@@ -221,12 +221,13 @@ impl Session for AskedSession<'_> {
 /// step: per thread 2^29 in batches and 2^25 of single lanes, or one unit where it has more.
 #[test]
 fn the_work_between_two_looks_is_bounded_whatever_the_time_step() {
-    let backends: [(fn() -> Box<dyn Backend>, u64); 3] = [
+    type Make = fn() -> Box<dyn Backend>;
+    let backends: [(Make, u64); 3] = [
         (|| Box::new(CpuBackend::lane_arithmetic()), 1 << 29),
         (|| Box::new(CpuBackend::scalar()), 1 << 25),
         (|| Box::new(CpuBackend::reference()), 1 << 25),
     ];
-    for dt_s in [1.0, 0.1, 0.04, 0.01, 0.001, 0.0001] {
+    for dt_s in [0.1, 0.04, 0.01, 0.001, 0.0001] {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
         let options = RandomOptions { lanes_per_model_and_category: 50, ..Default::default() };
         let plan = random_plan(&profile, &options).unwrap();

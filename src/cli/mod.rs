@@ -181,12 +181,10 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
 }
 
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
-    if let Some(threads) = cli.common.threads {
-        if threads == 0 || threads > MOST_THREADS {
-            let problem = format!("{threads} threads cannot work");
-            let help = format!("use at least 1 and at most {MOST_THREADS}; more than there are cores serve nothing");
-            return Err(Error::usage(Place::item("--threads"), problem, help));
-        }
+    if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MOST_THREADS).contains(threads)) {
+        let problem = format!("{threads} threads cannot work");
+        let help = format!("use at least 1 and at most {MOST_THREADS}; more than there are cores serve nothing");
+        return Err(Error::usage(Place::item("--threads"), problem, help));
     }
     start_threads(cli.common.threads)?;
     match &cli.verb {

@@ -38,7 +38,7 @@ const KERNELS: u64 = 1 << 10;
 fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
     let judged = lanes_within_seconds(step_cap) / models.max(1);
     let weighed = CHUNK / (kernels / KERNELS).max(1);
-    1 << judged.min(weighed).min(CHUNK).max(1).ilog2()
+    1 << judged.min(weighed).clamp(1, CHUNK).ilog2()
 }
 
 /// Samples what was planned: the whole run, or a shard of it.

@@ -47,6 +47,9 @@ const LONGEST_S: f64 = 120.0;
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 
+/// A row's number, and its fields or what is wrong with them.
+type NumberedRow = (u64, Result<Map<String, Value>>);
+
 /// A row of parameters: names without units as keys, numbers in the units of [`COLUMNS`].
 pub(crate) struct ParameterRows {
     table: TableReader,
@@ -66,7 +69,7 @@ impl ParameterRows {
     ///
     /// # Errors
     /// As [`TableReader::next_row`].
-    pub fn next_row(&mut self) -> Result<Option<(u64, Result<Map<String, Value>>)>> {
+    pub fn next_row(&mut self) -> Result<Option<NumberedRow>> {
         let Some(row) = self.table.next_row()? else { return Ok(None) };
         Ok(Some((row.number, self.typed(row))))
     }

@@ -351,7 +351,7 @@ mod tests {
                 assert_eq!(window.hash(), plan.hash());
                 assert_eq!(window.blocks[at].units.name(unit as u64), scenario.id);
                 let mut tables = Tables::default();
-                let cases = cases_of(scenario, &ids, Some(reduction), plan.profile.frame.dt_s, &options).unwrap();
+                let cases = cases_of(scenario, &ids, Some(reduction), TimeGrid::of(&plan.profile), &options).unwrap();
                 for (variant, case) in cases.iter().enumerate() {
                     let expected = LaneCase::encode(case, &plan.profile, &mut tables);
                     assert_eq!(window.case(at, unit as u64, variant), expected, "{}", scenario.id);
