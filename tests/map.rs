@@ -330,11 +330,12 @@ fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
 /// Where no vehicle comes into the ego's lane, and where no lane is over in time, there is no map.
 #[test]
 fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check() {
-    let beside = || {
+    let at_lateral_speed = |lateral: &str| {
         let fixed =
             vec![value(Category::CutIn, "ego_speed_mps", 30.0), value(Category::CutIn, "other_speed_mps", 20.0)];
-        Grid::new(GridParts { fixed, ..parts(Category::CutIn, "gap_m=10,20", "lateral_speed_mps=0") }).unwrap()
+        Grid::new(GridParts { fixed, ..parts(Category::CutIn, "gap_m=10,20", lateral) }).unwrap()
     };
+    let beside = || at_lateral_speed("lateral_speed_mps=0");
     let sweep = |grid: Grid, profile: &Profile| {
         let plan = GridPlan::new(grid, profile, &[ModelId::Fsm]).unwrap();
         let backend = CpuBackend::lane_arithmetic();
@@ -348,7 +349,7 @@ fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check
     assert!(sweep(beside(), &profile("paper")).is_ok(), "settled: the ego has passed it");
     let mut short = profile("paper");
     short.frame.time_cap_s = 0.2;
-    assert!(sweep(beside(), &short).unwrap_err().to_string().contains("0.2 s"));
+    assert!(sweep(at_lateral_speed("lateral_speed_mps=1"), &short).unwrap_err().to_string().contains("0.2 s"));
     // CCHDM avoids every collision with a decelerating leader, in runs that all go on to the cap.
     let jrc = profile("jrc-2021");
     let lvd = presets::jrc(Category::Lvd, &jrc).unwrap().remove(0);

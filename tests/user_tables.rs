@@ -49,7 +49,7 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
 #[test]
 fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() {
     let cases = [
-        ("10.08,106", "10.20,106", "s.csv, line 2, column `time_s`, scenario a", "not equally spaced"),
+        ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "not equally spaced"),
         (
             "a,cut-in,10.04,107,4.5",
             "a,cut-in,10.04,107,4.6",

@@ -208,11 +208,24 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     }
 }
 
+/// Address space of a thread: its stack, and its share of the allocator's arenas.
+const BYTES_PER_THREAD: usize = 4 << 20;
+
 /// Starts the workers, one per core unless told otherwise: before the work, for a pool that cannot start later panics.
 ///
 /// # Errors
 /// [`Error::Io`] where the system gives no more threads, or no memory for them.
 fn start_threads(count: Option<usize>) -> Result<()> {
+    if let Some(count) = count {
+        // Where memory ends after some of the threads have started, an allocation of one of them ends the process.
+        let mut room = Vec::<u8>::new();
+        room.try_reserve_exact(count.saturating_mul(BYTES_PER_THREAD)).map_err(|error| {
+            let source = std::io::Error::new(std::io::ErrorKind::WouldBlock, error.to_string());
+            Error::io(format!("--threads {count}"), "start", source)
+        })?;
+        // Else the compiler leaves out an allocation that nobody uses.
+        std::hint::black_box(&room);
+    }
     let started = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).build_global();
     started.map_err(|error| match std::error::Error::source(&error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
         Some(refused) => {
