@@ -2,7 +2,7 @@
 //!
 //! Results are written under hidden names. Once all are on the disk, the former record goes, the results get their names in
 //! quick succession, and the new record gets its own last. From before the first change until after the last,
-//! [`UNFINISHED`] lists every file that may be there: the next run removes what it does not write itself, and readers of
+//! `unfinished.json` lists every file that may be there: the next run removes what it does not write itself, and readers of
 //! files that stand for themselves (recordings) refuse the folder. What no record lists is never removed.
 //!
 //! Parts of a run share the folder with one another and keep whole runs out: [`parts`](crate::parts).

@@ -32,7 +32,7 @@ impl Scene {
     }
 
     /// What holds for all of these cases under a model. Where one vehicle comes or goes, there is a second one as
-    /// well, if one that is never there. Of lanes that [may cross](may_cross) nothing else is known: such time steps
+    /// well, if one that is never there. Of lanes that may cross nothing else is known: such time steps
     /// are rare.
     pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
         if may_cross {
