@@ -215,6 +215,21 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     }
 }
 
+/// A proposal that the record lists is one of this run.
+#[test]
+fn a_pilot_for_fewer_models_leaves_no_proposal_of_the_former_run() {
+    let (dir, _) = folder();
+    let proposals = |models: &str| {
+        let base = ["-q", "sample", "density.json", "--estimator", "is", "--thw", "0.3", "--backend", "cpu"];
+        let more = ["--samples", "2000", "--pilot", "2000", "--out", "o", "--models", models];
+        let (code, _, err) = lanesweep(dir.path(), &[&base[..], &more].concat());
+        assert_eq!(code, 0, "{err}");
+        let names = std::fs::read_dir(dir.path().join("o")).unwrap();
+        names.filter(|name| name.as_ref().unwrap().file_name().to_string_lossy().starts_with("proposal-")).count()
+    };
+    assert_eq!((proposals("RSS,FSM"), proposals("FSM")), (2, 1));
+}
+
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;

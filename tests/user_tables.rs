@@ -339,6 +339,14 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     let run: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
     assert!(run["notes"][0].as_str().unwrap().contains("lateral speed"), "{}", run["notes"]);
+    // Neither of two scenarios of one id is used, and both count.
+    let doubled = |times: usize| {
+        let first = cut_ins(times, |_, _| None);
+        cut_ins(30, |_, _| None) + first.split_once('\n').unwrap().1
+    };
+    assert_eq!(study(&doubled(1), &[]).0, 4);
+    let (code, text) = study(&doubled(2), &[]);
+    assert!(code == 3 && text.contains("4 of 32 scenarios cannot be used"), "{text}");
     // A table in kilometres per hour.
     let (code, text) = study(&cut_ins(30, |id, k| row(id, k, 108.0, 3.5)), &[]);
     assert_eq!(code, 3, "{text}");

@@ -206,9 +206,11 @@ impl Sample {
             return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
         }
         if self.has_pilot() && !self.dry_run && self.until.is_none() && self.time_limit.is_none() {
-            // Before the pilot: a folder that cannot be written to is known at once.
-            RunFolder::open(&self.out, ESTIMATE_RECORD).map(drop)?;
-            return sample_weighted::run(self, &run.planned_after_pilot()?, &opened, started, verbosity);
+            // The pilot is kept in the folder, so it needs the folder's lock too.
+            let folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
+            let planned = run.planned_after_pilot()?;
+            drop(folder);
+            return sample_weighted::run(self, &planned, &opened, started, verbosity);
         }
         if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
             return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);

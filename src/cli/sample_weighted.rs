@@ -234,8 +234,10 @@ fn write_run(
     };
     let rows = tally.sums.iter().enumerate().map(row).collect::<Result<_>>()?;
     let mut file = EstimateFile::new(density, planned.run_facts(), rows, host)?;
-    // A proposal in this folder may be the one that was given.
-    results.keep(|name| name.starts_with("proposal-"));
+    if facts.pilot.is_none() {
+        // A proposal in this folder may be the one that was given.
+        results.keep(|name| name.starts_with("proposal-"));
+    }
     for (model, proposal) in facts.models.iter().zip(&planned.proposals).filter(|_| facts.pilot.is_some()) {
         results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;
     }

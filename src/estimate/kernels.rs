@@ -88,7 +88,7 @@ impl Estimate {
             self.interval.high = self.interval.high.max(own.high);
             self.relative_half_width = self.interval.relative_half_width(p);
         }
-        self.trust.warn_if(scenarios < Warning::LEAST_SCENARIOS, Warning::FewScenarios { scenarios });
+        self.trust.warn_if(scenarios < Warning::MIN_SCENARIOS, Warning::FewScenarios { scenarios });
         self
     }
 }

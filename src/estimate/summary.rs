@@ -114,7 +114,7 @@ impl Estimate {
         }
         let scenarios = clusters.effective_failing;
         self.trust
-            .warn_if(self.failures > 0 && scenarios < Warning::LEAST_SCENARIOS, Warning::FewScenarios { scenarios });
+            .warn_if(self.failures > 0 && scenarios < Warning::MIN_SCENARIOS, Warning::FewScenarios { scenarios });
         self
     }
 

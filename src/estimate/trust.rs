@@ -15,7 +15,7 @@ pub enum Warning {
         /// How many.
         failures: u64,
     },
-    /// The failures come from effectively fewer than [`Warning::LEAST_SCENARIOS`] scenarios: other data would give
+    /// The failures come from effectively fewer than [`Warning::MIN_SCENARIOS`] scenarios: other data would give
     /// another probability, and how much so is itself badly known.
     FewScenarios {
         /// (Σk)²/Σk² over the failures around each scenario.
@@ -91,7 +91,7 @@ impl Warning {
     /// Failures below which [`Warning::FewFailures`] is raised.
     pub const LEAST_FAILURES: u64 = 10;
     /// Effective number of failing scenarios below which [`Warning::FewScenarios`] is raised.
-    pub const LEAST_SCENARIOS: f64 = 10.0;
+    pub const MIN_SCENARIOS: f64 = 10.0;
     /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
     pub const LEAST_EFFECTIVE_SIZE: f64 = 30.0;
     /// Share of the estimate above which [`Warning::OneWeightDominates`] is raised.
@@ -135,7 +135,7 @@ impl fmt::Display for Warning {
             Warning::FewFailures { failures: 1 } => write!(f, "only 1 failure was found"),
             Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
             Warning::FewScenarios { scenarios } => {
-                let least = Warning::LEAST_SCENARIOS;
+                let least = Warning::MIN_SCENARIOS;
                 write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {least} are needed")
             }
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),

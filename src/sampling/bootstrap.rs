@@ -16,6 +16,7 @@ use crate::driver::ModelId;
 use crate::estimate::{BinomialInterval, StopRule};
 use crate::profile::Profile;
 use crate::random::{Stream, choose};
+use crate::sweep::{ONE_IN, Recheck};
 use crate::{Error, Result};
 
 /// Purpose of the words that choose scenarios.
@@ -79,7 +80,8 @@ pub fn bootstrap(
         let seed = options.seed.wrapping_add(1 + u64::from(replicate));
         let options = SamplePlanOptions { samples, seed, source: SampleSource::Random, ..options.clone() };
         let plan = plan_samples(&resampled, &resampled.mixture()?, profile, &options)?;
-        let lanes = Lanes { recheck: None, ..*lanes };
+        let recheck = Recheck::new(&plan, seed, ONE_IN);
+        let lanes = Lanes { recheck: lanes.recheck.map(|_| &recheck), ..*lanes };
         let run = sample_crude(&plan, 0..samples, &lanes, &counting, &crude, |_| Ok(()))?;
         let overall = run.convergence.last().map(|c| c.rows.clone()).unwrap_or_default();
         if overall.len() != cells {

@@ -1,6 +1,6 @@
 //! Scenarios as they are read, one by one: the good ones, what was wrong with the others, and what was doubtful.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::Scenario;
 use super::check::{Problem, admit};
@@ -29,8 +29,10 @@ pub struct ScenarioFile {
 pub(super) struct Found {
     scenarios: Vec<Scenario>,
     rows: HashMap<String, u64>,
+    /// Ids that came more than once.
+    doubled: HashSet<String>,
     problems: Vec<Error>,
-    /// Errors that are not kept.
+    /// Scenarios left out without an error of their own: beyond those kept, and the first of two of one id.
     more: u64,
     doubts: Doubts,
     /// What to do about two scenarios of one id.
@@ -41,12 +43,20 @@ impl Found {
     /// `help` says what to do about two scenarios of one id.
     pub fn new(implausible: Implausible, help: &'static str) -> Found {
         let doubts = Doubts::new(implausible);
-        Found { scenarios: Vec::new(), rows: HashMap::new(), problems: Vec::new(), more: 0, doubts, help }
+        Found {
+            scenarios: Vec::new(),
+            rows: HashMap::new(),
+            doubled: HashSet::new(),
+            problems: Vec::new(),
+            more: 0,
+            doubts,
+            help,
+        }
     }
 
     /// Number of scenarios so far, good or not.
     pub fn count(&self) -> u64 {
-        self.scenarios.len() as u64 + self.problems.len() as u64 + self.more
+        (self.scenarios.len() - self.doubled.len()) as u64 + self.problems.len() as u64 + self.more
     }
 
     /// What is doubtful of one more scenario.
@@ -69,8 +79,8 @@ impl Found {
         }
         if let Some(first) = self.rows.get(&scenario.id) {
             let problem = format!("this id is that of {word} {first} too, but every scenario needs its own");
-            // Nobody knows which of the two is meant, or the one is a piece of the other.
-            self.scenarios.retain(|other| other.id != scenario.id);
+            // Nobody knows which of the two is meant, or the one is a piece of the other: neither is used.
+            self.more += u64::from(self.doubled.insert(scenario.id.clone()));
             return self.refuse(Error::input(place("id"), problem, self.help));
         }
         self.rows.insert(scenario.id.clone(), row);
@@ -94,6 +104,8 @@ impl Found {
     /// [`Error::Input`] for such a file, and for one of which more than one scenario in ten cannot be used: with what is
     /// wrong with each, up to a number.
     pub fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
+        self.scenarios.retain(|scenario| !self.doubled.contains(&scenario.id));
+        self.doubled.clear();
         let (total, bad) = (self.count(), self.problems.len() as u64 + self.more);
         if total == 0 {
             return Err(Error::input(file, "holds no scenario", help));

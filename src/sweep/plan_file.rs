@@ -268,7 +268,7 @@ impl Study {
     ///
     /// # Errors
     /// None for what this program makes.
-    pub fn thinned(&self, most: u64) -> Result<LanePlan> {
+    pub(crate) fn thinned(&self, most: u64) -> Result<LanePlan> {
         let step = (self.held.ends.len() as u64).div_ceil(most.max(1)).max(1);
         let (mut held, mut blocks) = (Records::default(), Vec::new());
         for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {

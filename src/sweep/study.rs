@@ -135,9 +135,16 @@ impl Study {
     /// The plan with the cases of these units, which must be held.
     ///
     /// # Errors
-    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case.
+    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case, or too short
+    /// for so many.
     pub fn window(&self, units: Range<u64>) -> Result<LanePlan> {
         let (plan, profile) = (&self.outline, &self.outline.profile);
+        let entries = self.entries(units.clone());
+        if entries > MAX_ENTRIES_AT_ONCE {
+            let problem = format!("{} s: the series of these scenarios have {entries:.1e} values", profile.frame.dt_s);
+            let help = "use a longer time step, or fewer or shorter scenarios at once (2.7e8 values, 2 GiB)";
+            return Err(Error::usage(Place::item("`frame.dt_s`"), problem, help));
+        }
         let none = |block: &Block| Units::Held(block.units.len(), 0, Arc::new([]));
         let mut held: Vec<Units> = plan.blocks.iter().map(none).collect();
         let mut table = CaseTable {
@@ -179,11 +186,28 @@ impl Study {
     ) -> Result<()> {
         let mut from = units.start;
         while from < units.end {
-            let to = units.end.min(from.saturating_add(most.max(1)));
+            let mut to = units.end.min(from.saturating_add(most.max(1)));
+            while to - from > 1 && self.entries(from..to) > MAX_ENTRIES_AT_ONCE {
+                to = from + (to - from) / 2;
+            }
             each(&self.window(from..to)?, from..to)?;
             from = to;
         }
         Ok(())
+    }
+
+    /// How many values the series of these units' cases have together, at most.
+    fn entries(&self, units: Range<u64>) -> f64 {
+        let grid = TimeGrid::of(&self.outline.profile);
+        let of_segment = |(at, inside): (usize, Range<u64>)| {
+            let block = &self.outline.blocks[at];
+            let ids = parameterizations(block.category, self.reductions[at].is_some());
+            let records = inside.filter_map(|unit| self.held.get(block.first_unit + unit));
+            let durations = records.filter_map(|record| unit_record::read(record, block.category));
+            let steps: f64 = durations.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
+            steps * entries_per_step(block.category, ids)
+        };
+        self.outline.segments(units).into_iter().map(of_segment).sum()
     }
 
     /// S, then every S', of a unit of a block.
@@ -209,9 +233,8 @@ pub(super) fn parameterizations(category: Category, has_reduction: bool) -> impl
 const MAX_ENTRIES: f64 = (4 << 20) as f64;
 const MAX_ENTRIES_PER_VALUE: f64 = 15.0;
 const PAPER_DT_S: f64 = 0.04;
-/// Entries at any time step of so many scenarios, whose cases are in memory at once: 2 GiB.
-const LIMIT_ENTRIES: f64 = (1 << 28) as f64;
-const CASES_AT_ONCE: usize = 2048;
+/// Entries of the cases that are in memory at once, at any time step: 2 GiB.
+const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
 
 /// Plans a study over mined scenarios with all of its cases: the kept ones are simulated, in the order given; a
 /// decomposition may be fitted on more (see [`SvdFit`]).
@@ -247,21 +270,11 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             }
             Err(error) => return Err(error),
         };
-        let ids: Vec<ParameterizationId> = parameterizations(category, reduction.is_some()).collect();
-        let sampled = ids.iter().filter(|id| id.kind != Kind::Kinematic || id.key == "ii").count() + 1;
-        // Speed, lateral position and lateral speed; in a cut-out the speed of the vehicle ahead; an LVD is centred.
-        let series = match category {
-            Category::CutIn => 3,
-            Category::CutOut => 4,
-            Category::Lvd => 1,
-        };
-        for some in kept.chunks(CASES_AT_ONCE) {
-            let steps: f64 = some.iter().map(|s| steps_of(s.duration_s(), grid) as f64).sum();
-            let at_once = steps * (sampled * series) as f64;
-            entries += at_once;
-            values += some.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * series.min(2) as f64;
-            check_size(at_once, entries, values, dt_s)?;
-        }
+        let per_step = entries_per_step(category, parameterizations(category, reduction.is_some()));
+        entries += kept.iter().map(|s| steps_of(s.duration_s(), grid) as f64).sum::<f64>() * per_step;
+        let recorded = if category == Category::Lvd { 1.0 } else { 2.0 };
+        values += kept.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * recorded;
+        check_size(entries, values, dt_s)?;
         held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::most_bytes(scenario)).sum());
         for scenario in &kept {
             if category == Category::CutOut {
@@ -285,14 +298,21 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
     Ok(StudyOutline { study: head.with_records(held)?, reductions, left_out })
 }
 
+/// Values in the series of a scenario per step, with its parameterizations: speed, lateral position and lateral speed of
+/// each that is sampled; in a cut-out the speed of the vehicle ahead; an LVD is centred.
+fn entries_per_step(category: Category, ids: impl Iterator<Item = ParameterizationId>) -> f64 {
+    let sampled = ids.filter(|id| id.kind != Kind::Kinematic || id.key == "ii").count() + 1;
+    let series = match category {
+        Category::CutIn => 3,
+        Category::CutOut => 4,
+        Category::Lvd => 1,
+    };
+    (sampled * series) as f64
+}
+
 /// Bounds the tables before anything of them is made.
-fn check_size(at_once: f64, entries: f64, values: f64, dt_s: f64) -> Result<()> {
+fn check_size(entries: f64, values: f64, dt_s: f64) -> Result<()> {
     let told = format!("the scenarios and their parameterizations have {entries:.1e} values at a step of {dt_s} s");
-    if at_once > LIMIT_ENTRIES {
-        let problem = format!("{told}, the tables {LIMIT_ENTRIES:.1e}");
-        let help = "use a longer time step, or study fewer or shorter scenarios at once";
-        return Err(Error::usage(Place::item("`frame.dt_s`"), problem, help));
-    }
     // A finer time step is the user's choice and not the file's.
     if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (PAPER_DT_S / dt_s).max(1.0) {
         let problem = format!("{told}, but only {values:.1e} were recorded");
