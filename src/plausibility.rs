@@ -97,19 +97,25 @@ impl Quantity {
         };
         let hint = of.mistaken.iter().find(|(_, per_own)| contains(of.plausible, value / per_own));
         let hint = hint.map_or(String::new(), |(unit, per_own)| {
-            format!("; {} looks like {unit}: {} {}", rounded(value), rounded(value / per_own), of.unit)
+            format!(
+                "; {} looks like {unit}: {} {}",
+                crate::readable::value(value),
+                crate::readable::value(value / per_own),
+                of.unit
+            )
         });
-        format!("{} {} {words} for a {} ({least} to {most} {}){hint}", rounded(value), of.unit, of.name, of.unit)
+        format!(
+            "{} {} {words} for a {} ({least} to {most} {}){hint}",
+            crate::readable::value(value),
+            of.unit,
+            of.name,
+            of.unit
+        )
     }
 }
 
 fn contains((least, most): (f64, f64), value: f64) -> bool {
     least <= value && value <= most
-}
-
-/// To three decimals.
-fn rounded(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
 }
 
 /// How often something was found, and where first.

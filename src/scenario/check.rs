@@ -96,7 +96,12 @@ fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
 }
 
 fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect((0.0..=LARGEST).contains(&value), field, value, "a number of at least 0 and at most 1e6")
+    expect(
+        (0.0..=LARGEST).contains(&value),
+        field,
+        value,
+        "a number of at least 0 and at most 1e6 (a speed above -0.5 counts as 0)",
+    )
 }
 
 fn above_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
