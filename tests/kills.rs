@@ -173,7 +173,7 @@ fn names(dir: &Path) -> Vec<String> {
 /// Not a result: plan and parts, and what is there only while a run is at work.
 fn is_beside(name: &str) -> bool {
     let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
-    is_of_work || name == "plan.json" || name == "unfinished.json" || name.starts_with("part-")
+    is_of_work || name == "pilot.json" || name == "plan.json" || name == "unfinished.json" || name.starts_with("part-")
 }
 
 fn files(dir: &Path) -> Files {
@@ -323,6 +323,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
             done(dir, verb.run);
         }
         same(&settled(files(&out)), expected, &what);
+        assert!(!out.join("pilot.json").exists(), "{what}: the run has ended, its pilot stays");
         assert_tidy(dir, &what);
         if at + 1 == VERBS.len() || kill + 1 == kills {
             println!(
