@@ -85,8 +85,15 @@ pub enum Implausible {
 
 impl Quantity {
     /// Its row.
+    #[inline]
     pub fn limits(self) -> &'static Limits {
         &LIMITS[self as usize]
+    }
+
+    /// Is the value within the range that needs no second look?
+    #[inline]
+    pub fn is_plausible(self, value: f64) -> bool {
+        contains(self.limits().plausible, value)
     }
 
     fn told(self, value: f64) -> String {
@@ -114,6 +121,7 @@ impl Quantity {
     }
 }
 
+#[inline]
 fn contains((least, most): (f64, f64), value: f64) -> bool {
     least <= value && value <= most
 }
@@ -159,7 +167,7 @@ impl Doubts {
     /// What is wrong with one beyond the physical range, unless such are accepted.
     #[inline]
     pub fn judge(&mut self, quantity: Quantity, value: f64, place: impl FnOnce() -> String) -> Result<(), String> {
-        if contains(quantity.limits().plausible, value) { Ok(()) } else { self.doubt(quantity, value, place()) }
+        if quantity.is_plausible(value) { Ok(()) } else { self.doubt(quantity, value, place()) }
     }
 
     #[cold]

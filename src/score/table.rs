@@ -1,6 +1,8 @@
 //! The score table: per category, parameterization, model and criterion the agreement of S' with S over
 //! (scenario, THW) pairs.
 
+use rayon::prelude::*;
+
 use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws};
 use super::contradiction::contradiction;
 use crate::criterion::Criterion;
@@ -155,6 +157,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
         }
         let draws = bootstrap_draws(units, width, block.category, options);
         let cells = (0..width)
+            .into_par_iter()
             .map(|at| {
                 let undefined = draws.iter().filter(|draw| f1(&draw[at]).is_none()).count();
                 Cell {

@@ -1,7 +1,7 @@
 //! What remains of lanes: exact integer counts per unit, and the worst lanes by value. A chunk, a journal record and a shard's part are
 //! all partials; merging is associative and does not depend on the order.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -62,15 +62,20 @@ impl Confusion<u32> {
             (false, false) => self.neither += 1,
         }
     }
+
+    /// The largest of the four counts.
+    pub fn largest(&self) -> u32 {
+        self.both.max(self.only_s).max(self.only_s_prime).max(self.neither)
+    }
 }
 
-impl Confusion {
+impl<N: From<u32> + AddAssign> Confusion<N> {
     /// Adds the counts of a unit.
     pub fn add(&mut self, unit: &Confusion<u32>) {
-        self.both += u64::from(unit.both);
-        self.only_s += u64::from(unit.only_s);
-        self.only_s_prime += u64::from(unit.only_s_prime);
-        self.neither += u64::from(unit.neither);
+        self.both += N::from(unit.both);
+        self.only_s += N::from(unit.only_s);
+        self.only_s_prime += N::from(unit.only_s_prime);
+        self.neither += N::from(unit.neither);
     }
 }
 

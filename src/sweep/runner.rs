@@ -72,10 +72,18 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self
     }
 
-    /// One lane.
+    /// One lane, of which nothing is known before it runs.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
-        self.run_case(key.block, &case, &tables, self.starts[key.headway], self.plan.models[key.model])
+        let scene = Scene::unknown(case.pair != 0);
+        self.constants[key.block].run_in(
+            self.plan.models[key.model],
+            scene,
+            &case,
+            &tables,
+            self.starts[key.headway],
+            &mut Silent,
+        )
     }
 
     fn dt(&self) -> R {
@@ -110,9 +118,10 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
             let (case, tables) = self.case(block, unit, variant);
+            let may_cross = may_cross(&case, &tables, self.dt());
             for &start in &self.starts {
                 for &model in &self.plan.models {
-                    each(at, self.run_case(block, &case, &tables, start, model));
+                    each(at, self.run_case(block, &case, &tables, may_cross, start, model));
                     at += 1;
                 }
             }
@@ -124,14 +133,14 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         block: usize,
         case: &LaneCase<R>,
         tables: &Tables<R>,
+        may_cross: bool,
         start: Start<R>,
         model: ModelId,
     ) -> Outcome<R> {
         let scene = if self.as_in_batches {
-            let may_cross = may_cross(case, tables, self.dt());
             Scene::of(std::slice::from_ref(case), model.index(), may_cross)
         } else {
-            Scene::unknown(case.pair != 0)
+            Scene { may_cross, ..Scene::unknown(case.pair != 0) }
         };
         self.constants[block].run_in(model, scene, case, tables, start, &mut Silent)
     }
@@ -216,8 +225,9 @@ impl LaneRunner<'_, f32> {
         mut each: impl FnMut(usize, E),
     ) {
         for (at_case, case) in cases.iter().enumerate() {
+            let may_cross = may_cross(case, tables, self.dt());
             for (at_start, &start) in self.starts.iter().enumerate() {
-                let outcome = self.run_case(block, case, tables, start, model);
+                let outcome = self.run_case(block, case, tables, may_cross, start, model);
                 each(at_case * self.starts.len() + at_start, outcome.into());
             }
         }

@@ -1,6 +1,8 @@
 //! One recording's three files into the internal model. Only the columns that the model needs are
 //! looked at, each line once, and nothing is kept but the model itself.
 
+use std::path::Path;
+
 use super::columns::{Column, FileChecksum, Table};
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
 use super::inventory::{HighdFiles, folder_of, made_up};
@@ -46,7 +48,9 @@ pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loade
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
     let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
     let columns = TrackColumns::of(&table)?;
-    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, &mut doubts)?;
+    let reserve = can_hold(&files.tracks, &vehicles);
+    let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
+    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
     let mut notes = notes(&columns, &vehicles, &tracks);
     notes.extend(doubts.sentences());
     let rows = table.rows();
@@ -93,22 +97,26 @@ impl TrackColumns {
     }
 }
 
-/// The tracks, ascending by id, without those that the meta file announces with no sample.
+/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file announces with no sample.
 fn read_tracks(
     table: &mut Table,
     columns: &TrackColumns,
     meta: &RecordingMeta,
     vehicles: &[Vehicle],
+    mut tracks: Vec<Track>,
     doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
-    let mut tracks: Vec<Track> = vehicles.iter().map(empty_track).collect();
+    let judge = SampleJudge::new(meta.frame_rate_hz);
     // Sums of the accelerations of each vehicle's last second: single samples are noisy.
-    let mut seconds = vec![0.0; vehicles.len()];
+    let mut sums_mps2 = vec![0.0; vehicles.len()];
     let mut at = 0;
     while table.next_row()? {
         at = find_vehicle(table, columns.id, vehicles, at)?;
         add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
-        judge_sample(table, columns, meta.frame_rate_hz, &tracks[at], &mut seconds[at], doubts)?;
+        let sample = judge.sample(&tracks[at], &mut sums_mps2[at]);
+        if !sample.is_plausible() {
+            report(&sample, table, columns, &tracks[at], doubts)?;
+        }
     }
     check_counts(table, vehicles, &tracks)?;
     tracks.retain(|track| !track.is_empty());
@@ -122,8 +130,16 @@ fn read_tracks(
     Ok(tracks)
 }
 
-/// Without room for the announced samples: a small file could announce any number.
-fn empty_track(vehicle: &Vehicle) -> Track {
+/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any number.
+fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
+    let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
+    let bytes = std::fs::metadata(tracks).map_or(0, |file| file.len());
+    announced <= bytes / MIN_ROW_BYTES
+}
+
+/// A track without samples; `reserve` gives it room for the announced ones.
+fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
+    let samples = if reserve { vehicle.samples.unwrap_or(0) as usize } else { 0 };
     Track {
         id: vehicle.id,
         class: vehicle.class,
@@ -131,12 +147,12 @@ fn empty_track(vehicle: &Vehicle) -> Track {
         width_m: vehicle.width_m,
         carriageway: vehicle.carriageway,
         first_frame: 0,
-        s_m: Vec::new(),
-        d_m: Vec::new(),
-        v_s_mps: Vec::new(),
-        v_d_mps: Vec::new(),
-        a_s_mps2: Vec::new(),
-        lane: Vec::new(),
+        s_m: Vec::with_capacity(samples),
+        d_m: Vec::with_capacity(samples),
+        v_s_mps: Vec::with_capacity(samples),
+        v_d_mps: Vec::with_capacity(samples),
+        a_s_mps2: Vec::with_capacity(samples),
+        lane: Vec::with_capacity(samples),
     }
 }
 
@@ -205,34 +221,84 @@ fn add_sample(
     Ok(())
 }
 
-/// Looks at the last sample of a track; `second` is the sum of its accelerations over a second so far.
-fn judge_sample(
+/// Judges the last sample of a track against the plausible ranges.
+struct SampleJudge {
+    rate_hz: f64,
+    /// Samples of a second.
+    window: usize,
+    /// One over that number.
+    inverse_window: f64,
+}
+
+/// What is judged of one sample; a quantity that it does not have yet is 0.
+struct JudgedSample {
+    speed_mps: f64,
+    lateral_speed_mps: f64,
+    /// Difference of the lateral positions over the time between two samples.
+    lateral_change_mps: f64,
+    /// Mean over the last second.
+    acceleration_mps2: f64,
+}
+
+impl SampleJudge {
+    fn new(rate_hz: f64) -> Self {
+        let window = (rate_hz.round() as usize).max(1);
+        SampleJudge { rate_hz, window, inverse_window: 1.0 / window as f64 }
+    }
+
+    /// `sum_mps2` is the sum of the track's accelerations over the last second so far.
+    #[inline]
+    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> JudgedSample {
+        let last = |series: &[f64]| series.last().copied().unwrap_or_default();
+        *sum_mps2 += last(&track.a_s_mps2);
+        let samples = track.a_s_mps2.len();
+        if let Some(&left) = samples.checked_sub(self.window + 1).and_then(|at| track.a_s_mps2.get(at)) {
+            *sum_mps2 -= left;
+        }
+        let lateral_change_m = match track.d_m[..] {
+            [.., before, now] => now - before,
+            _ => 0.0,
+        };
+        JudgedSample {
+            speed_mps: last(&track.v_s_mps),
+            lateral_speed_mps: last(&track.v_d_mps),
+            lateral_change_mps: lateral_change_m * self.rate_hz,
+            acceleration_mps2: if samples >= self.window { *sum_mps2 * self.inverse_window } else { 0.0 },
+        }
+    }
+}
+
+impl JudgedSample {
+    /// One test for all quantities: nearly every sample passes it.
+    #[inline]
+    fn is_plausible(&self) -> bool {
+        Quantity::Speed.is_plausible(self.speed_mps)
+            & Quantity::LateralSpeed.is_plausible(self.lateral_speed_mps)
+            & Quantity::LateralSpeed.is_plausible(self.lateral_change_mps)
+            & Quantity::Acceleration.is_plausible(self.acceleration_mps2)
+    }
+}
+
+/// Counts what is implausible about a sample.
+///
+/// # Errors
+/// A value beyond the physical range, unless such are accepted.
+#[cold]
+fn report(
+    sample: &JudgedSample,
     table: &Table,
     columns: &TrackColumns,
-    rate_hz: f64,
     track: &Track,
-    second: &mut f64,
     doubts: &mut Doubts,
 ) -> Result<()> {
-    let k = track.len() - 1;
     let mut judge = |quantity, value, column| {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
         doubts.judge(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
     };
-    judge(Quantity::Speed, track.v_s_mps[k], columns.velocity_x)?;
-    judge(Quantity::LateralSpeed, track.v_d_mps[k], columns.velocity_y)?;
-    if k > 0 {
-        judge(Quantity::LateralSpeed, (track.d_m[k] - track.d_m[k - 1]) * rate_hz, columns.y)?;
-    }
-    let window = (rate_hz.round() as usize).max(1);
-    *second += track.a_s_mps2[k];
-    if k >= window {
-        *second -= track.a_s_mps2[k - window];
-    }
-    if k + 1 >= window {
-        judge(Quantity::Acceleration, *second / window as f64, columns.acceleration_x)?;
-    }
-    Ok(())
+    judge(Quantity::Speed, sample.speed_mps, columns.velocity_x)?;
+    judge(Quantity::LateralSpeed, sample.lateral_speed_mps, columns.velocity_y)?;
+    judge(Quantity::LateralSpeed, sample.lateral_change_mps, columns.y)?;
+    judge(Quantity::Acceleration, sample.acceleration_mps2, columns.acceleration_x)
 }
 
 /// The error for a frame that is not the one after the vehicle's last.
@@ -299,6 +365,9 @@ fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<
     note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
     notes
 }
+
+/// Bytes of the shortest line: eight columns of one digit.
+const MIN_ROW_BYTES: u64 = 16;
 
 /// Way backwards, in metres, that is more than noise of a standing vehicle.
 const BACKWARDS_M: f64 = 5.0;
