@@ -11,14 +11,13 @@ mod common;
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
-use lanesweep::driver::ModelId;
-use lanesweep::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose};
-use lanesweep::profile::Profile;
-use lanesweep::scalar::{Counting, OperationCount};
+use lanesweep::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose};
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, SweepOptions, Wanted, sweep};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::model::scalar::{Counting, OperationCount};
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
-};
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();

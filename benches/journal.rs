@@ -10,23 +10,22 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use common::paper_size_scenarios;
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions};
-use lanesweep::driver::ModelId;
-use lanesweep::estimate::{BinomialInterval, StopRule};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::{CpuBackend, Headway, Partial, SweepOptions, Wanted, sweep};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
+use lanesweep::run::sampling::{
     CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
     plan_samples, sample_into,
 };
+use lanesweep::run::study::{Study, StudyHead, StudyOptions, outline_study};
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{
-    CpuBackend, Headway, Partial, Study, StudyHead, StudyOptions, SweepOptions, Wanted, outline_study, sweep,
-};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::estimate::{BinomialInterval, StopRule};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 const PAIRS: usize = 9;
 const STUDIES: usize = 20;

@@ -5,11 +5,11 @@
 
 use std::time::Instant;
 
-use lanesweep::grid::presets;
-use lanesweep::grid::{GridMap, GridPlan, MapBackend};
-use lanesweep::profile::Profile;
+use lanesweep::engine::CpuBackend;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::grid::presets;
+use lanesweep::run::grid::{GridMap, GridPlan, MapBackend};
 use lanesweep::scenario::Category;
-use lanesweep::sweep::CpuBackend;
 
 const REPETITIONS: u32 = 20;
 

@@ -10,12 +10,13 @@ use std::path::Path;
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios, peak_memory_bytes, swept};
-use lanesweep::mining::{MiningOptions, mine_folder};
-use lanesweep::profile::Profile;
-use lanesweep::score::{ScoreOptions, score};
-use lanesweep::sweep::{CpuBackend, StudyOptions, plan_study};
-use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::trajectory::highd::{self, RecordingInfo};
+use lanesweep::engine::CpuBackend;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::score::{ScoreOptions, score};
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::traffic::mining::{MiningOptions, mine_folder};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
 
 const REPETITIONS: usize = 5;
 const LEAST_BYTES: u64 = 1_000_000_000;

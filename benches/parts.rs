@@ -10,15 +10,16 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 
 use common::{paper_size_scenarios, swept};
-use lanesweep::driver::ModelId;
-use lanesweep::mining::{MiningOptions, mine, mine_folder, mine_generated};
-use lanesweep::parameterization::{ParameterizationOptions, Reduction};
-use lanesweep::profile::Profile;
+use lanesweep::engine::CpuBackend;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::score::{ScoreOptions, score};
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::{ParameterizationOptions, Reduction};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::score::{ScoreOptions, score};
-use lanesweep::sweep::{CpuBackend, StudyOptions, plan_study};
-use lanesweep::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::trajectory::highd::{self, HighdFiles, RecordingInfo};
+use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder, mine_generated};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
 
 /// Reading one recording, mining it, and both for a folder of four.
 fn recordings(criterion: &mut Criterion) {

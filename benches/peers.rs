@@ -12,11 +12,12 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
-use lanesweep::driver::{ModelId, NEVER};
-use lanesweep::profile::Profile;
+use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome};
+use lanesweep::engine::{SweepOptions, Wanted, sweep};
+use lanesweep::model::driver::{ModelId, NEVER};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Motion, Scenario};
-use lanesweep::sweep::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome};
-use lanesweep::sweep::{StudyOptions, SweepOptions, Wanted, plan_study, sweep};
 
 /// The smallest lanes, and those that most steps of a study are made for.
 const CATEGORIES: [Category; 2] = [Category::Lvd, Category::CutOut];

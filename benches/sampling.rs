@@ -9,19 +9,19 @@ mod common;
 use std::time::Instant;
 
 use common::peak_memory_bytes;
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions};
-use lanesweep::driver::ModelId;
-use lanesweep::estimate::{BinomialInterval, StopRule};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::{CpuBackend, Headway};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
     CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
 };
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{CpuBackend, Headway};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::estimate::{BinomialInterval, StopRule};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn main() {
     // `cargo test --benches` calls without `--bench`: nothing to time then.

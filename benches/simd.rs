@@ -17,13 +17,12 @@ use std::time::Instant;
 
 use common::worker::{WORKER, Worker, cpu_seconds, serve};
 use common::{lane_steps, paper_size_scenarios, peak_memory_bytes};
-use lanesweep::driver::ModelId;
-use lanesweep::profile::Profile;
-use lanesweep::scalar::Counting;
+use lanesweep::engine::{CpuBackend, Headway, Instructions, LanePlan, LaneRunner, SweepOptions, Wanted, sweep};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::model::scalar::Counting;
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{
-    CpuBackend, Headway, Instructions, LanePlan, LaneRunner, StudyOptions, SweepOptions, Wanted, plan_study, sweep,
-};
 use rayon::prelude::*;
 
 const REPETITIONS: usize = 15;
@@ -271,7 +270,7 @@ fn measured_roof(set: Instructions) -> f64 {
 
 /// Independent chains of operations in registers.
 mod roof {
-    use lanesweep::sweep::Instructions;
+    use lanesweep::engine::Instructions;
 
     const ROUNDS: u64 = 4_000_000;
 

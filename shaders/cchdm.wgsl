@@ -1,4 +1,4 @@
-// CCHDM: the careful and competent human driver of UN R157, Annex 3. Twin of src/driver/cchdm.rs.
+// CCHDM: the careful and competent human driver of UN R157, Annex 3. Twin of src/model/driver/cchdm.rs.
 
 override driver_always_unsafe: bool;
 // m

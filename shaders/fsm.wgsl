@@ -1,4 +1,4 @@
-// FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Twin of src/driver/fsm.rs.
+// FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Twin of src/model/driver/fsm.rs.
 
 // τ, s
 override driver_tau: f32;

@@ -1,4 +1,4 @@
-// Reg157: the performance model of UN R157, 5.2.5.2. Twin of src/driver/reg157.rs.
+// Reg157: the performance model of UN R157, 5.2.5.2. Twin of src/model/driver/reg157.rs.
 
 override driver_always_unsafe: bool;
 // m

@@ -1,4 +1,4 @@
-// RSS: Responsibility-Sensitive Safety. Twin of src/driver/rss.rs.
+// RSS: Responsibility-Sensitive Safety. Twin of src/model/driver/rss.rs.
 
 // ρ, s
 override driver_response_time: f32;

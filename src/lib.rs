@@ -1,22 +1,18 @@
 //! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
 //!
-//! Rooms in the order of the data: [`trajectory`] → [`mining`] → [`scenario`] → [`parameterization`] →
-//! [`driver`] and [`criterion`] → [`sweep`]. Beside them: [`profile`] (every constant as data), [`scalar`]
-//! (the number a lane computes with), [`random`], [`density`] and
-//! [`estimate`] (samples of rare events), [`gpu`] (compute devices), [`grid`] (maps), [`conformance`] (other simulators' tables),
-//! [`parts`] (shards, journals, merging), [`table`] (tables in files), [`openscenario`] (played scenarios and
-//! distributions of parameters), [`cluster`] (scripts for workload managers), [`interrupt`] (ending early in
-//! good order), [`run_folder`] (one run per folder, published at once), [`settings`] (what may be configured) and
-//! [`cli`].
+//! Rooms, each importing only those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria, profile,
+//! case), [`scenario`] (what was found, and its parameterizations), [`traffic`] (recordings, mining), [`stats`] (random
+//! numbers, densities, estimators), [`engine`] (lanes on CPUs and GPUs), [`run`] (studies, samples, maps, scores),
+//! [`report`] (tables, figures, pages), [`interop`] (other programs) and [`cli`].
 //!
 //! A cut-in against one driver, in binary64:
 //!
 //! ```
-//! use lanesweep::criterion::Criterion;
-//! use lanesweep::driver::ModelId;
-//! use lanesweep::profile::Profile;
+//! use lanesweep::model::criterion::Criterion;
+//! use lanesweep::model::driver::ModelId;
+//! use lanesweep::model::profile::Profile;
 //! use lanesweep::scenario::{Category, PlainCase, Tables};
-//! use lanesweep::sweep::{Headway, LaneCase, Trace};
+//! use lanesweep::engine::{Headway, LaneCase, Trace};
 //!
 //! # fn main() -> lanesweep::Result<()> {
 //! let profile = Profile::load("paper")?;
@@ -45,11 +41,12 @@
 //! A study: recordings → scenarios → plan → counts → scores.
 //!
 //! ```
-//! use lanesweep::mining::{MiningOptions, mine_generated};
-//! use lanesweep::profile::Profile;
-//! use lanesweep::score::{ScoreOptions, f1, score};
-//! use lanesweep::sweep::{CpuBackend, Partial, StudyOptions, SweepOptions, Wanted, plan_study, sweep};
-//! use lanesweep::trajectory::generator::GeneratorOptions;
+//! use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+//! use lanesweep::model::profile::Profile;
+//! use lanesweep::run::score::{ScoreOptions, f1, score};
+//! use lanesweep::engine::{CpuBackend, Partial, SweepOptions, Wanted, sweep};
+//! use lanesweep::run::study::{StudyOptions, plan_study};
+//! use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 //!
 //! # fn main() -> lanesweep::Result<()> {
 //! let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
@@ -71,44 +68,16 @@
 //! # }
 //! ```
 
-mod atomic_file;
-pub mod cli;
-pub mod cluster;
-pub mod conformance;
-pub mod criterion;
-pub mod density;
 #[macro_use]
-pub mod driver;
-pub mod error;
-pub mod estimate;
-pub mod flag;
-pub mod gpu;
-pub mod grid;
-mod input_file;
-pub mod interrupt;
-mod lock;
-pub mod mining;
-mod near_name;
-pub mod openscenario;
-pub mod parameterization;
-pub mod parts;
-mod plain_text;
-pub mod plausibility;
-pub mod profile;
-pub mod random;
-mod readable;
+pub mod model;
+pub mod cli;
+pub mod engine;
+pub mod interop;
 pub mod report;
-pub mod run_folder;
-pub mod sampling;
-pub mod scalar;
+pub mod run;
 pub mod scenario;
-pub mod score;
-pub mod settings;
-pub mod sweep;
-pub mod table;
-mod toml_file;
-pub mod trajectory;
-mod vector_state;
-pub mod verify;
+pub mod stats;
+pub mod support;
+pub mod traffic;
 
-pub use error::{Error, Place, Result};
+pub use support::error::{Error, Place, Result};

@@ -23,7 +23,7 @@ fn quiet_drivers() {
 fn quiet_caught_panics() {
     let others = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        if !lanesweep::table::is_panic_caught() {
+        if !lanesweep::support::table::is_panic_caught() {
             others(info);
         }
     }));

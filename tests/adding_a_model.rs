@@ -17,9 +17,9 @@ use common::device::software_device;
 const SOURCES: [&str; 7] = ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches"];
 
 /// The three touches: two new files and, in the third, one new line.
-const RUST: &str = "src/driver/aeb.rs";
+const RUST: &str = "src/model/driver/aeb.rs";
 const WGSL: &str = "shaders/aeb.wgsl";
-const REGISTRY: &str = "src/driver/registry.rs";
+const REGISTRY: &str = "src/model/driver/registry.rs";
 
 type Tree = BTreeMap<String, Vec<u8>>;
 

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use common::small::{self, Texts, edit_line, with_field, with_repeated_line, without_column, without_line};
 use lanesweep::Error;
-use lanesweep::plausibility::Implausible;
-use lanesweep::trajectory::highd::{self, HighdFiles};
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 use proptest::prelude::*;
 
 /// The message has all of these and comes with advice.

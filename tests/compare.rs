@@ -5,19 +5,20 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions, Kde};
-use lanesweep::driver::ModelId;
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::{CpuBackend, Headway, LanePlan, Partial, SweepOptions, Wanted, sweep};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
     Lanes, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts, kernel_scenarios, plan_points,
     plan_samples, sample_by_scenario,
 };
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
-use lanesweep::sweep::{CpuBackend, Headway, LanePlan, Partial, StudyOptions, SweepOptions, Wanted, plan_study, sweep};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 const SMALL: [&str; 4] = ["--synth-recordings", "3", "--synth-duration", "200"];
 
@@ -61,7 +62,7 @@ fn rates_are_those_of_study_and_of_fit_and_sample() {
     let failures = rows(&study.join("failures.csv"));
     let scores = rows(&study.join("f1.csv"));
     let cells = rows(&compared.join("compare.csv"));
-    assert_eq!(cells.len(), 3 * 3 * lanesweep::driver::MODELS);
+    assert_eq!(cells.len(), 3 * 3 * lanesweep::model::driver::MODELS);
     let share = |cell: &HashMap<String, String>, variant: &str| {
         let is_cell = |row: &&HashMap<String, String>| {
             ["category", "model", "criterion"].iter().all(|c| row[*c] == cell[*c]) && row["variant"] == variant

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use lanesweep::driver::ModelId;
+use lanesweep::model::driver::ModelId;
 use serde_json::Value;
 
 /// Runs the program with nothing configured but what the test configures.
@@ -337,11 +337,11 @@ fn a_dry_run_counts_the_lanes_of_the_run_and_writes_nothing() {
 #[test]
 fn the_variables_of_tests_and_ci_are_known() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let known: BTreeSet<String> = lanesweep::settings::Key::all()
+    let known: BTreeSet<String> = lanesweep::cli::settings::Key::all()
         .iter()
-        .map(|key| lanesweep::settings::variable_of(&key.name))
-        .chain(lanesweep::settings::TEST_VARIABLES.map(str::to_owned))
-        .chain([lanesweep::settings::FILE_VARIABLE.to_owned()])
+        .map(|key| lanesweep::cli::settings::variable_of(&key.name))
+        .chain(lanesweep::cli::settings::TEST_VARIABLES.map(str::to_owned))
+        .chain([lanesweep::cli::settings::FILE_VARIABLE.to_owned()])
         .collect();
     for folder in ["tests", "tests/common", ".ci", "benches", "deploy"] {
         let Ok(files) = std::fs::read_dir(root.join(folder)) else { continue };

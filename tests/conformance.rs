@@ -4,8 +4,8 @@ mod common;
 
 use std::path::Path;
 
-use lanesweep::conformance::{Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
-use lanesweep::profile::Profile;
+use lanesweep::interop::conformance::{Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
+use lanesweep::model::profile::Profile;
 use lanesweep::scenario::read_scenarios;
 
 fn tallies(path: &Path) -> Vec<Tally> {

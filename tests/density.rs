@@ -5,18 +5,18 @@ mod common;
 
 use std::sync::OnceLock;
 
-use lanesweep::density::{
-    Bandwidth, BandwidthRule, DataFacts, DensityModel, Driven, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
-    ValidShare, metric, normal_cdf, read_density, wasserstein, write_density,
-};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::{
+use lanesweep::scenario::parameterization::{
     CutInParameters, CutOutParameters, Kind, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale,
     Sizes, SvdLateral, fit_svd,
 };
-use lanesweep::random::Stream;
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{
+    Bandwidth, BandwidthRule, DataFacts, DensityModel, Driven, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
+    ValidShare, metric, normal_cdf, read_density, wasserstein, write_density,
+};
+use lanesweep::stats::random::Stream;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use serde_json::Value;
 
 #[test]

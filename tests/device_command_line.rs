@@ -35,7 +35,7 @@ fn device() -> Option<String> {
 
 /// Has this machine a GPU of its own? Then the tests of its absence say nothing.
 fn has_gpu() -> bool {
-    lanesweep::gpu::Adapters::enumerate().cards().iter().any(|card| card.is_real())
+    lanesweep::engine::gpu::Adapters::enumerate().cards().iter().any(|card| card.is_real())
 }
 
 const SMALL: [&str; 4] = ["--synth-recordings", "1", "--synth-duration", "120"];

@@ -4,15 +4,15 @@
 mod common;
 
 use common::device::software_device;
-use lanesweep::driver::ModelId;
-use lanesweep::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
-use lanesweep::profile::Profile;
-use lanesweep::scenario::Tables;
-use lanesweep::sweep::{
+use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
+use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::{
     Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Recheck, SweepOptions, Wanted, same_words,
     sweep,
 };
-use lanesweep::verify::{RandomOptions, random_plan};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::scenario::Tables;
 
 const ALL_WANTED: [Wanted; 3] = [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts];
 

@@ -6,10 +6,10 @@ mod common;
 
 use common::device::software_device;
 use common::lane_sets::{forms, random, small_study, thresholds};
-use lanesweep::gpu::{Checks, GpuBackend, GpuOptions};
-use lanesweep::profile::Profile;
-use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, Wanted, same_words};
-use lanesweep::verify::{Comparison, compare, self_check};
+use lanesweep::engine::gpu::{Checks, GpuBackend, GpuOptions};
+use lanesweep::engine::verify::{Comparison, compare, self_check};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Wanted, same_words};
+use lanesweep::model::profile::Profile;
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;

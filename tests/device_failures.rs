@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use common::device::software_device;
 use lanesweep::Error;
-use lanesweep::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
-use lanesweep::profile::Profile;
-use lanesweep::sweep::{
+use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
+use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::{
     Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
 };
-use lanesweep::verify::{RandomOptions, random_plan};
+use lanesweep::model::profile::Profile;
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;

@@ -4,12 +4,12 @@
 mod common;
 
 use common::device::software_device;
-use lanesweep::criterion::Criterion;
-use lanesweep::driver::ModelId;
-use lanesweep::gpu::{GpuBackend, GpuOptions};
-use lanesweep::profile::Profile;
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
 use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
-use lanesweep::sweep::{Block, CaseSource, Headway, LaneCase, LanePlan, SweepOptions, Verdicts, Wanted, sweep};
 
 /// Cases whose vehicle stands in the ego's lane or far beside it.
 struct Beside {

@@ -5,7 +5,7 @@ mod device;
 
 use assert_cmd::Command;
 use device::software_device;
-use lanesweep::gpu::{BackendChoice, choose, visible_here};
+use lanesweep::engine::gpu::{BackendChoice, choose, visible_here};
 
 /// The verb without what a cluster may have set, in a home of its own.
 fn devices(home: &tempfile::TempDir) -> Command {

@@ -1,12 +1,12 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
-use lanesweep::driver::ModelId;
-use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions, TimeGrid, recorded_case};
-use lanesweep::profile::Profile;
-use lanesweep::scalar::{Counting, Real};
+use lanesweep::engine::{Constants, LaneCase, Outcome, Silent, Start};
+use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::model::scalar::{Counting, Real};
+use lanesweep::scenario::parameterization::{ParameterizationId, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::scenario::{Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
-use lanesweep::sweep::{Constants, LaneCase, Outcome, Silent, Start};
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
     let mut tables = Tables::default();
@@ -286,7 +286,7 @@ fn the_ego_never_accelerates_and_never_drives_backwards() {
             let lane = LaneCase::encode(&case, &profile, &mut tables);
             let constants = Constants::<f64>::resolve(&profile, case.category);
             let mut before = f64::INFINITY;
-            let mut check = |step: &lanesweep::sweep::Step<f64>| {
+            let mut check = |step: &lanesweep::engine::Step<f64>| {
                 assert!(step.v_ego <= before && step.v_ego >= 0.0);
                 before = step.v_ego;
             };
@@ -361,7 +361,7 @@ fn jrc_2021_un_r157_and_paper_fit_run_every_category_and_differ_from_paper_where
     assert_eq!(un.reaction_step, 1, "a leader beyond 5 m/s² is perceived at once");
     let soft = lvd(30.0, 0.0, 3.0);
     let un = run(&Profile::load("un-r157").unwrap(), &soft, ModelId::Cchdm, 1.0);
-    assert_eq!(un.reaction_step, lanesweep::sweep::NO_STEP, "a soft deceleration never triggers it");
+    assert_eq!(un.reaction_step, lanesweep::engine::NO_STEP, "a soft deceleration never triggers it");
 }
 
 /// Time steps from fine to the longest that the profiles allow.
@@ -434,7 +434,7 @@ fn a_vehicle_from_behind_hits_the_ego_from_behind_at_every_time_step() {
 
 /// A number that is other for every word, 0 … 1.
 fn fraction(number: u32, word: u32) -> f64 {
-    f64::from(lanesweep::random::philox4x32_10([number, word, 0, 0], [21, 2])[0]) / 4_294_967_296.0
+    f64::from(lanesweep::stats::random::philox4x32_10([number, word, 0, 0], [21, 2])[0]) / 4_294_967_296.0
 }
 
 /// A collision that stays one when the vehicles are moved by what a coarse step moves them, is one at every coarser step

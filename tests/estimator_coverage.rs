@@ -5,14 +5,14 @@
 //! cargo test --release --test estimator_coverage -- --ignored --nocapture
 //! ```
 
-use lanesweep::density::{Mixture, normal_quantile};
-use lanesweep::estimate::{
+use lanesweep::engine::Confusion;
+use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
+use lanesweep::stats::density::{Mixture, normal_quantile};
+use lanesweep::stats::estimate::{
     BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot,
     StandardNormal, StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy,
     from_counts, from_pilot, monte_carlo, subset,
 };
-use lanesweep::score::{ScoreOptions, f1, f1_interval};
-use lanesweep::sweep::Confusion;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;

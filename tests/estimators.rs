@@ -1,8 +1,8 @@
 //! What the estimators of rare failures promise, on problems whose probability is known. Coverage over many repeats:
 //! `tests/estimator_coverage.rs`.
 
-use lanesweep::density::Mixture;
-use lanesweep::estimate::{
+use lanesweep::stats::density::Mixture;
+use lanesweep::stats::estimate::{
     BlockSums, CrossEntropy, Importance, Pilot, StandardNormal, Subset, Technique, Verdict, Warning, WeightSums,
     WeightedDraw, balance_heuristic, cross_entropy, defended, from_pilot, importance, importance_sums, subset,
 };

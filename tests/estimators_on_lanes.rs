@@ -7,23 +7,23 @@ mod common;
 
 use std::path::PathBuf;
 
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
-use lanesweep::driver::ModelId;
-use lanesweep::estimate::{
-    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
-    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset,
-};
-use lanesweep::mining::{MiningOptions, mine_folder, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::{CpuBackend, Headway};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
     CrudeOptions, LaneLimitState, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
     sample_crude, truncated,
 };
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{CpuBackend, Headway};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
+use lanesweep::stats::estimate::{
+    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
+    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset,
+};
+use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 const LEVEL: f64 = 0.999;
 

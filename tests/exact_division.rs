@@ -12,7 +12,7 @@
 //! The guess may lie up to three units in the last place of the true quotient of the mantissas off: Vulkan allows
 //! 2.5. Units below 1 are 2⁻²⁴ and above 2⁻²³; a guess is moved by the unit of the true quotient, also across 1.
 
-// SPIR-V is handed to the driver unseen, as src/gpu/device.rs does with the shaders of this crate.
+// SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
 #![allow(unsafe_code)]
 
 #[path = "common/device.rs"]
@@ -20,7 +20,7 @@ mod device;
 
 use bytemuck::{Pod, Zeroable};
 use device::software_device;
-use lanesweep::gpu::{Checks, exact_spirv, shader::ENTRY};
+use lanesweep::engine::gpu::{Checks, exact_spirv, shader::ENTRY};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 

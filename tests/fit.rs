@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
-use lanesweep::density::read_density;
 use lanesweep::scenario::{Category, read_scenarios, write_scenarios};
+use lanesweep::stats::density::read_density;
 
 fn lanesweep(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));

@@ -6,10 +6,10 @@
 #[path = "generator_calibration/traffic.rs"]
 mod traffic;
 
-use lanesweep::mining::{Mined, MiningOptions, mine};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::trajectory::generator::{GeneratorOptions, generate};
-use lanesweep::trajectory::{Recording, VehicleClass};
+use lanesweep::traffic::mining::{Mined, MiningOptions, mine};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
+use lanesweep::traffic::trajectory::{Recording, VehicleClass};
 use rayon::prelude::*;
 use traffic::{Traffic, class_index, mean, measure, mode, noise_sd_and_correlation, quantile, share};
 

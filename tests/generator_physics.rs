@@ -1,8 +1,8 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
-use lanesweep::trajectory::generator::{GeneratorOptions, generate, generate_one};
-use lanesweep::trajectory::highd::{self, RecordingInfo};
-use lanesweep::trajectory::{Recording, Track};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
+use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
+use lanesweep::traffic::trajectory::{Recording, Track};
 use sha2::{Digest, Sha256};
 
 /// SHA-256 of the default recordings' data as [`digest`] writes it. It changes when the generator does,

@@ -5,8 +5,8 @@ mod common;
 use std::fs;
 
 use common::small;
-use lanesweep::trajectory::highd::{self, Precision, RecordingInfo};
-use lanesweep::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::highd::{self, Precision, RecordingInfo};
+use lanesweep::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
 use proptest::prelude::*;
 
 fn read_back(recording: &Recording, precision: Precision) -> highd::Loaded {

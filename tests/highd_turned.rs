@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 
 use common::small::Texts;
-use lanesweep::trajectory::{Carriageway, Recording};
+use lanesweep::traffic::trajectory::{Carriageway, Recording};
 
 /// Length of the road, hundredths of a metre.
 const ROAD: i64 = 42_000;
@@ -93,7 +93,8 @@ fn assert_same_traffic(recording: &Recording, turned: &Recording) {
     assert_eq!(recording.tracks.len(), turned.tracks.len());
     for (a, b) in recording.tracks.iter().zip(&turned.tracks) {
         let (a, b) = (a.clone(), b.clone());
-        let fixed = |t: &lanesweep::trajectory::Track| (t.id, t.class, t.first_frame, t.length_m, t.width_m, t.len());
+        let fixed =
+            |t: &lanesweep::traffic::trajectory::Track| (t.id, t.class, t.first_frame, t.length_m, t.width_m, t.len());
         assert_eq!(fixed(&a), fixed(&b));
         assert_eq!(a.carriageway, 1 - b.carriageway);
         assert_eq!((a.lane, a.v_s_mps, a.v_d_mps, a.a_s_mps2), (b.lane, b.v_s_mps, b.v_d_mps, b.a_s_mps2));

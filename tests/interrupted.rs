@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use lanesweep::interrupt;
-use lanesweep::profile::Profile;
-use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, Session, SweepOptions, Verdicts, Wanted, sweep};
-use lanesweep::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Session, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::model::profile::Profile;
+use lanesweep::support::interrupt;
 
 /// Longest wait for anything here; an unloaded machine needs a second or two.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -7,16 +7,16 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
-use lanesweep::criterion::Criterion;
-use lanesweep::driver::ModelId;
-use lanesweep::grid::presets;
-use lanesweep::grid::{
+use lanesweep::engine::{Constants, CpuBackend, Headway, LaneCase, Silent, Start, Verdicts};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::grid::presets;
+use lanesweep::run::grid::{
     Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapBackend, Parameter, Quantity, boundary,
     count,
 };
-use lanesweep::profile::Profile;
 use lanesweep::scenario::{Category, Tables};
-use lanesweep::sweep::{Constants, CpuBackend, Headway, LaneCase, Silent, Start, Verdicts};
 use proptest::prelude::*;
 
 fn axis(category: Category, text: &str) -> GridAxis {

@@ -2,11 +2,11 @@
 
 mod common;
 
-use lanesweep::mining::lateral::{LaneChangeKind, lane_changes};
-use lanesweep::mining::longitudinal::{Longitudinal, longitudinal_events};
-use lanesweep::mining::tags::Tags;
-use lanesweep::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, cut_in, lvd, search};
-use lanesweep::trajectory::Lane;
+use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
+use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
+use lanesweep::traffic::mining::tags::Tags;
+use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, cut_in, lvd, search};
+use lanesweep::traffic::trajectory::Lane;
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {

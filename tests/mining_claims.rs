@@ -1,10 +1,10 @@
 //! What the miner must do with traffic whose every event is known, because it was put there.
 
-use lanesweep::mining::lateral::{LaneChangeKind, lane_changes};
-use lanesweep::mining::longitudinal::{Longitudinal, longitudinal_events};
-use lanesweep::mining::{LateralOptions, LongitudinalOptions, MiningOptions, mine};
 use lanesweep::scenario::{Category, Scenario, Side};
-use lanesweep::trajectory::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
+use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
+use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
+use lanesweep::traffic::mining::{LateralOptions, LongitudinalOptions, MiningOptions, mine};
+use lanesweep::traffic::trajectory::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
 use proptest::prelude::*;
 
 const LANE_M: f64 = 3.75;
@@ -334,7 +334,7 @@ proptest! {
         prop_assert!(changes.windows(2).all(|c| c[0].end <= c[1].start));
         let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
         let there = lane_changes(&mirrored, lane, 25.0, &LateralOptions::default());
-        let spans = |c: &[lanesweep::mining::lateral::LaneChange]| -> Vec<(usize, usize, usize, bool)> {
+        let spans = |c: &[lanesweep::traffic::mining::lateral::LaneChange]| -> Vec<(usize, usize, usize, bool)> {
             c.iter().map(|c| (c.start, c.crossing, c.end, c.kind.is_in())).collect()
         };
         prop_assert_eq!(spans(&changes), spans(&there));

@@ -6,9 +6,9 @@ mod common;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::mining::{Mined, MiningOptions, mine};
 use lanesweep::scenario::{Category, Scenario, read_scenarios, write_scenarios};
-use lanesweep::trajectory::highd::{HighdFiles, read};
+use lanesweep::traffic::mining::{Mined, MiningOptions, mine};
+use lanesweep::traffic::trajectory::highd::{HighdFiles, read};
 
 fn mined(dir: &Path, id: &str) -> Mined {
     mine(&read(&HighdFiles::named(dir, id)).unwrap().recording, &MiningOptions::default())

@@ -245,7 +245,10 @@ fn a_pipe_in_place_of_a_recording_is_refused() {
     std::fs::write(dir.path().join("01_recordingMeta.csv"), texts.recording_meta).unwrap();
     let pipe = dir.path().join("01_tracks.csv");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let error = lanesweep::mining::mine_folder(dir.path(), &Default::default(), Default::default(), || ()).unwrap_err();
+    let error = lanesweep::traffic::mining::mine_folder(dir.path(), &Default::default(), Default::default(), || ())
+        .unwrap_err();
     assert!(error.to_string().contains("expected a regular file"), "{error}");
-    assert!(lanesweep::scenario::read_scenarios(&pipe).is_err() && lanesweep::density::read_density(&pipe).is_err());
+    assert!(
+        lanesweep::scenario::read_scenarios(&pipe).is_err() && lanesweep::stats::density::read_density(&pipe).is_err()
+    );
 }

@@ -4,13 +4,15 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use lanesweep::criterion::Criterion;
-use lanesweep::driver::ModelId;
-use lanesweep::openscenario::{DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations};
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{SampleTally, TallyOptions};
+use lanesweep::engine::{Backend, CpuBackend, Headway, SweepOptions, Wanted, sweep};
+use lanesweep::interop::openscenario::{
+    DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations,
+};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{SampleTally, TallyOptions};
 use lanesweep::scenario::Category;
-use lanesweep::sweep::{Backend, CpuBackend, Headway, SweepOptions, Wanted, sweep};
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name)

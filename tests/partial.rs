@@ -4,9 +4,9 @@
 mod plans;
 
 use lanesweep::Place;
-use lanesweep::criterion::Criterion;
+use lanesweep::engine::{LanePlan, Partial, Verdicts};
+use lanesweep::model::criterion::Criterion;
 use lanesweep::scenario::Category;
-use lanesweep::sweep::{LanePlan, Partial, Verdicts};
 use plans::{chunk, mixed, plan};
 use proptest::prelude::*;
 

@@ -268,7 +268,7 @@ fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
     for (said, change) in changes {
         let mut sealed: serde_json::Value = serde_json::from_slice(&whole[..end]).unwrap();
         change(&mut sealed["content"]["plan"]);
-        let line = lanesweep::parts::seal("study plan", &sealed["content"]).unwrap().0;
+        let line = lanesweep::run::parts::seal("study plan", &sealed["content"]).unwrap().0;
         std::fs::write(&path, [&line, &whole[end + 1..]].concat()).unwrap();
         refused(dir, &["merge", "p"], said);
         refused(dir, &shard("1/3"), said);

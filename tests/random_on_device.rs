@@ -1,8 +1,8 @@
-//! What `src/random` makes of (seed, index), `shaders/shared/{philox,uniform,normal,sobol}.wgsl` make bit for bit: on
+//! What `src/stats/random` makes of (seed, index), `shaders/shared/{philox,uniform,normal,sobol}.wgsl` make bit for bit: on
 //! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
 //! deviates goes from one cubic to the next.
 
-// SPIR-V is handed to the driver unseen, as src/gpu/device.rs does with the shaders of this crate.
+// SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
 #![allow(unsafe_code)]
 
 #[path = "common/device.rs"]
@@ -11,8 +11,8 @@ mod device;
 mod kernel;
 
 use kernel::{Kernel, Path, WORKGROUP};
-use lanesweep::gpu::{Checks, shader::RANDOM};
-use lanesweep::random::{AliasTable, Sobol, Stream, choose, normal_table, standard_normal, unit_uniform};
+use lanesweep::engine::gpu::{Checks, shader::RANDOM};
+use lanesweep::stats::random::{AliasTable, Sobol, Stream, choose, normal_table, standard_normal, unit_uniform};
 
 const BINDINGS: &str = "
 @group(0) @binding(0) var<storage, read_write> answers: array<u32>;
@@ -183,7 +183,7 @@ fn the_ends_of_every_cubic_have_the_bits_of_rust() {
     let mut words: Vec<u32> = vec![];
     for octave in 0..32_u32 {
         for step in 0..16_u64 {
-            // First tail word of a segment, see src/random/normal.rs.
+            // First tail word of a segment, see src/stats/random/normal.rs.
             let tail = ((((16 + step) << 28) >> (octave + 1)) / 2) as u32;
             words.extend((0..64).map(|k| tail.wrapping_add(k).wrapping_sub(32)));
         }
@@ -205,7 +205,7 @@ fn a_defect_of_a_fragment_is_seen() {
         ("2u * tail + 1u", "2u * tail", 2),
         ("<< NORMAL_SEGMENT_BITS) >> 9u", "<< NORMAL_SEGMENT_BITS) >> 8u", 2),
         // The order of the sums. (A contraction would not show here: Mesa's software Vulkan rounds `fma` twice. That
-        // none is allowed stands in src/gpu/spirv.rs.)
+        // none is allowed stands in src/engine/gpu/spirv.rs.)
         ("((c.w * x + c.z) * x + c.y) * x + c.x", "(c.w * x + c.z) * (x * x) + (c.y * x + c.x)", 2),
         ("2u * (word >> 9u) + 1u", "2u * (word >> 9u)", 4),
         ("word_b < entry.x", "word_b > entry.x", 6),

@@ -2,7 +2,7 @@
 
 mod common;
 
-use lanesweep::parameterization::{SeriesScale, SvdBasis, fit_svd};
+use lanesweep::scenario::parameterization::{SeriesScale, SvdBasis, fit_svd};
 
 fn rows(value: &serde_json::Value) -> Vec<Vec<f64>> {
     serde_json::from_value(value.clone()).unwrap()

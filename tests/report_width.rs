@@ -4,10 +4,10 @@
 mod plans;
 
 use assert_cmd::Command;
+use lanesweep::engine::{Partial, Verdicts};
 use lanesweep::report::tables;
+use lanesweep::run::score::{ScoreOptions, judge_claims, score};
 use lanesweep::scenario::Category;
-use lanesweep::score::{ScoreOptions, judge_claims, score};
-use lanesweep::sweep::{Partial, Verdicts};
 use plans::{chunk, mixed, plan};
 
 fn assert_fits(text: &str) {

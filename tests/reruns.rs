@@ -6,18 +6,17 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use lanesweep::Place;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions};
-use lanesweep::driver::{MODELS, ModelId};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::parts::read_sealed_line;
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, Wanted, words};
+use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::read_sealed_line;
+use lanesweep::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
+use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, StudyHead, StudyOptions, Wanted, plan_study, words,
-};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 type Row = HashMap<String, String>;
 

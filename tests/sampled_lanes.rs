@@ -4,23 +4,24 @@ mod common;
 
 use std::sync::OnceLock;
 
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions, Mixture};
-use lanesweep::driver::{MODELS, ModelId};
-use lanesweep::gpu::{GpuBackend, GpuOptions};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::profile::Profile;
-use lanesweep::random::Stream;
-use lanesweep::sampling::{
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::{
+    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, SweepOptions, Wanted, sweep,
+    words,
+};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, generator_of, generator_of_points, plan_points, plan_samples,
 };
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario, Tables};
-use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, StudyOptions, SweepOptions,
-    Wanted, plan_study, sweep, words,
-};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Mixture};
+use lanesweep::stats::random::Stream;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();

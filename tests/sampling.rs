@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
-use lanesweep::driver::{MODELS, ModelId};
-use lanesweep::gpu::{GpuBackend, GpuOptions};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Wanted};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
     MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
 };
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{Backend, CpuBackend, Headway, LanePlan, Wanted};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
@@ -358,10 +358,10 @@ fn a_conditional_density_draws_what_is_given_and_its_neighbours() {
     let density = density(Category::CutIn, "2");
     let at = density.space.index_of("v_ego_mps").unwrap();
     let given = [("v_ego_mps".to_owned(), 30.0)];
-    let found = lanesweep::sampling::conditional(&density, &given).unwrap();
+    let found = lanesweep::run::sampling::conditional(&density, &given).unwrap();
     assert!(found.effective_scenarios > 1.0 && found.effective_scenarios < density.kde.points().len() as f64);
     let profile = Profile::load("paper").unwrap();
-    let generator = lanesweep::sampling::generator_of(
+    let generator = lanesweep::run::sampling::generator_of(
         &density.space,
         &found.mixture,
         &density.sizes,
@@ -372,7 +372,7 @@ fn a_conditional_density_draws_what_is_given_and_its_neighbours() {
     .unwrap();
     // The same by the density's own conditional draws, which the published figures check.
     let constrained = density.kde.conditional(&[(at, 30.0)]).unwrap();
-    let stream = lanesweep::random::Stream { seed: 8, purpose: 1 };
+    let stream = lanesweep::stats::random::Stream { seed: 8, purpose: 1 };
     let n = 20_000;
     let drawn: Vec<[f32; 14]> = (0..n).map(|i| generator.draw(i).values).collect();
     assert!(drawn.iter().all(|p| p[at] == 30.0));
@@ -385,7 +385,7 @@ fn a_conditional_density_draws_what_is_given_and_its_neighbours() {
         assert!((ours - mean).abs() < 6.0 * spread * (2.0 / n as f64).sqrt(), "parameter {j}: {ours} and {mean}");
     }
     for wrong in [("v_ego_mph", 30.0), ("v_ego_mps", -3.0)] {
-        assert!(lanesweep::sampling::conditional(&density, &[(wrong.0.to_owned(), wrong.1)]).is_err());
+        assert!(lanesweep::run::sampling::conditional(&density, &[(wrong.0.to_owned(), wrong.1)]).is_err());
     }
 }
 

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use lanesweep::error::Error;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
+use lanesweep::support::error::Error;
 use serde_json::Value;
 
 fn cut_out() -> Scenario {

@@ -4,11 +4,11 @@ mod common;
 #[path = "common/plans.rs"]
 mod plans;
 
-use lanesweep::criterion::Criterion;
-use lanesweep::driver::{MODELS, ModelId};
+use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::run::score::{ScoreOptions, ScoreTable, f1, judge_claims, precision, recall, score};
 use lanesweep::scenario::Category;
-use lanesweep::score::{ScoreOptions, ScoreTable, f1, judge_claims, precision, recall, score};
-use lanesweep::sweep::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
 use plans::{chunk, mixed, plan};
 
 const LVD: &[&str] = &["i", "ii", "iii", "iv", "v"];
@@ -237,7 +237,7 @@ fn a_part_that_was_changed_and_sealed_again_is_refused_by_merge() {
         let mut content = sealed["content"].clone();
         unpack(&mut content["segments"][0]);
         change(&mut content["segments"][0]);
-        std::fs::write(&path, lanesweep::parts::seal("part", &content).unwrap().0).unwrap();
+        std::fs::write(&path, lanesweep::run::parts::seal("part", &content).unwrap().0).unwrap();
         let (code, err) = lanesweep(&["merge", "run"]);
         assert_eq!(code, 3, "{err}");
         assert!(err.contains(said), "should say `{said}`: {err}");

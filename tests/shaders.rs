@@ -8,15 +8,15 @@ use std::collections::BTreeSet;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
-use lanesweep::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
-use lanesweep::driver::{AttentionRule, MODELS, ModelId, NEVER};
-use lanesweep::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
-use lanesweep::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
-use lanesweep::profile::Profile;
-use lanesweep::random::SOBOL_ROW;
+use lanesweep::engine::generated::{self, ATTEMPTS, MOST_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
+use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
+use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
+use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
+use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
+use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
+use lanesweep::model::profile::Profile;
 use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
-use lanesweep::sweep::generated::{self, ATTEMPTS, MOST_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
-use lanesweep::sweep::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
+use lanesweep::stats::random::SOBOL_ROW;
 use wgsl::{Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments};
 
 /// What [`every_record_has_the_layout_of_its_rust_twin`] looks at: name in WGSL, size of the Rust type, its fields.
@@ -264,7 +264,7 @@ fn constants_that_stand_on_both_sides_agree() {
         ("UNBOUNDED", f32::MAX.to_bits()),
         // Four verdict bits a lane; the host's own constants are not public, so their text is read.
         ("LANES_PER_WORD", u32::BITS / 4),
-        ("CELL_WORDS", number_after(include_str!("../src/gpu/records.rs"), "const CELL_WORDS: usize = ")),
+        ("CELL_WORDS", number_after(include_str!("../src/engine/gpu/records.rs"), "const CELL_WORDS: usize = ")),
     ];
     for (name, host) in expected {
         assert_eq!(constant(&module, name), host, "{name}");
@@ -355,7 +355,7 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
     ];
     for model in ModelId::ALL {
         let (file, shader) = driver_shader(model);
-        let twin = in_crate("src/driver").join(file).with_extension("rs");
+        let twin = in_crate("src/model/driver").join(file).with_extension("rs");
         let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
         let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
         names.retain(|name| !no_twin.contains(&name.as_str()));
@@ -373,7 +373,7 @@ fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_ord
     let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
     for (file, shader) in RANDOM {
         let name = Path::new(file).file_name().unwrap();
-        let twin = in_crate("src/random").join(name).with_extension("rs");
+        let twin = in_crate("src/stats/random").join(name).with_extension("rs");
         let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
         let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
         names.retain(|name| !no_twin.contains(&name.as_str()));

@@ -4,16 +4,16 @@
 mod common;
 
 use common::lane_sets::{forms, random, small_study, thresholds};
-use lanesweep::driver::ModelId;
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::profile::Profile;
-use lanesweep::scenario::Category;
-use lanesweep::sweep::{
-    Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, StudyOptions, Verdicts, Wanted,
-    plan_study, same_words,
+use lanesweep::engine::verify::{Comparison, compare};
+use lanesweep::engine::{
+    Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
 };
-use lanesweep::trajectory::generator::GeneratorOptions;
-use lanesweep::verify::{Comparison, compare};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::Category;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 /// Batches on every instruction set of this machine.
 fn in_batches() -> Vec<CpuBackend<f32>> {

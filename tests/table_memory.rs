@@ -13,15 +13,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, StringArray};
-use lanesweep::plausibility::Implausible;
-use lanesweep::profile::Profile;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::read_scenario_file;
-use lanesweep::sweep::{StudyOptions, plan_study};
+use lanesweep::support::plausibility::Implausible;
 use parquet::basic::Compression;
 
 use lanesweep::report::lanes::{Digits, columns};
-use lanesweep::table::{Cell, Kind, TableFacts, TableFormat, TableWriter};
-use lanesweep::trajectory::highd;
+use lanesweep::support::table::{Cell, Kind, TableFacts, TableFormat, TableWriter};
+use lanesweep::traffic::trajectory::highd;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 #[global_allocator]

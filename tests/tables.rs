@@ -10,12 +10,12 @@ mod run;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::density::{DataFacts, DensityModel, FitOptions, write_density};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::ParameterizationId;
-use lanesweep::plausibility::LIMITS;
+use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, write_density};
+use lanesweep::support::plausibility::LIMITS;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use made::{Read, read};
 use proptest::prelude::*;
 use run::{lanesweep, said};

@@ -3,14 +3,16 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
-use lanesweep::criterion::Criterion;
-use lanesweep::driver::{ModelId, View};
-use lanesweep::profile::Profile;
-use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
-use lanesweep::sweep::{Backend, Constants, CpuBackend, EndReason, LaneCase, LanePlan, NO_STEP, Outcome, Step, Wanted};
-use lanesweep::verify::{
+use lanesweep::engine::verify::{
     RandomOptions, RandomUnit, SIDES, Threshold, ThresholdOptions, VARIANTS, random_plan, threshold_plan,
 };
+use lanesweep::engine::{
+    Backend, Constants, CpuBackend, EndReason, LaneCase, LanePlan, NO_STEP, Outcome, Step, Wanted,
+};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{ModelId, View};
+use lanesweep::model::profile::Profile;
+use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
 
 fn profile(name: &str) -> Profile {
     Profile::load(name).unwrap()

@@ -4,10 +4,10 @@
 
 pub mod worker;
 
-use lanesweep::mining::{MiningOptions, mine_generated};
+use lanesweep::engine::{Backend, LanePlan, Partial, SweepOptions, Wanted, sweep};
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::sweep::{Backend, LanePlan, Partial, SweepOptions, Wanted, sweep};
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 /// The paper's kept scenarios.
 pub const PAPER: [(Category, usize); 3] = [(Category::CutIn, 362), (Category::CutOut, 819), (Category::Lvd, 482)];

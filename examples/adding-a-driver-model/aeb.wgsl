@@ -1,4 +1,4 @@
-// AEB: an automatic emergency brake after UN R152. Twin of src/driver/aeb.rs.
+// AEB: an automatic emergency brake after UN R152. Twin of src/model/driver/aeb.rs.
 
 // s
 override driver_trigger_ttc: f32;

@@ -1,5 +1,5 @@
 // When a driver may react to a vehicle, as far as that depends on the vehicle's own motion: twin of
-// src/driver/attention.rs.
+// src/model/driver/attention.rs.
 
 const NEVER: u32 = 0xffffffffu;
 

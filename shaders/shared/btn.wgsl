@@ -1,4 +1,4 @@
-// Brake Threat Number: required over largest available deceleration. Twin of src/criterion/btn.rs, which
+// Brake Threat Number: required over largest available deceleration. Twin of src/model/criterion/btn.rs, which
 // has the formulas. The quotient itself is worked out on the host.
 
 const BTN_EQUIVALENT_DELAY: u32 = 0u;

@@ -1,4 +1,4 @@
-// Collision: the boxes overlap along and across the road. Twin of src/criterion/collision.rs.
+// Collision: the boxes overlap along and across the road. Twin of src/model/criterion/collision.rs.
 
 const CONTACT_NONE: u32 = 0u;
 // The other vehicle hits the ego from the side or behind (centres).

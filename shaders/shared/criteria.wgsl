@@ -1,5 +1,5 @@
-// The criteria together: their gate and what they have gathered. Twin of src/criterion/mod.rs and of the
-// record in src/sweep/lane_step.rs.
+// The criteria together: their gate and what they have gathered. Twin of src/model/criterion/mod.rs and of the
+// record in src/engine/lane_step.rs.
 
 const GATE_EGO_WIDTH: u32 = 0u;
 const GATE_OVERLAP: u32 = 1u;

@@ -1,4 +1,4 @@
-// Point → validity and case: twin of src/sweep/generated/decode.rs. Series go to this sample's own part of the tables.
+// Point → validity and case: twin of src/engine/generated/decode.rs. Series go to this sample's own part of the tables.
 
 // An event this close behind a step, in steps, counts as at the step.
 const STEP_TOLERANCE: f32 = 1e-4f;

@@ -1,4 +1,4 @@
-// What a driver sees, decides and remembers: twin of src/driver/mod.rs. A model brings `initial`, `check`
+// What a driver sees, decides and remembers: twin of src/model/driver/mod.rs. A model brings `initial`, `check`
 // and `react`, and its constants as `override driver_…`.
 
 struct View {

@@ -1,4 +1,4 @@
-// Exact arithmetic, as src/scalar.rs: binary32, to nearest even, in the written order. No fma, no root, no
+// Exact arithmetic, as src/model/scalar.rs: binary32, to nearest even, in the written order. No fma, no root, no
 // transcendental; `%`, min, max and clamp are left alone because devices differ on them.
 
 const INFINITY_BITS: u32 = 0x7f800000u;

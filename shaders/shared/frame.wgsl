@@ -1,5 +1,5 @@
-// The frame: one lane from start to end, the latched step once for all models. Twin of src/sweep/lane_step.rs and
-// src/sweep/lane.rs.
+// The frame: one lane from start to end, the latched step once for all models. Twin of src/engine/lane_step.rs and
+// src/engine/lane.rs.
 //
 // Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the
 // contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter.

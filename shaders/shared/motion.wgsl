@@ -1,4 +1,4 @@
-// How another vehicle moves, decoded from its record and the shared tables: twin of src/scenario/motion.rs.
+// How another vehicle moves, decoded from its record and the shared tables: twin of src/model/motion.rs.
 
 const SPEED_SAMPLED: u32 = 1u;
 const LATERAL_SAMPLED: u32 = 2u;

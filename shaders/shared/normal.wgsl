@@ -1,4 +1,4 @@
-// Standard normal deviates, as src/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which whoever includes
+// Standard normal deviates, as src/stats/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which whoever includes
 // this declares and fills with `normal_table()`.
 
 const NORMAL_SEGMENT_BITS: u32 = 4u;

@@ -1,4 +1,4 @@
-// Sample index → point: twin of src/sweep/generated/points.rs. Means and factors stand in `numbers`, as bits.
+// Sample index → point: twin of src/engine/generated/points.rs. Means and factors stand in `numbers`, as bits.
 
 const ATTEMPTS: u32 = 64u;
 // Blocks of four words per draw.

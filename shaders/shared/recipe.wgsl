@@ -1,4 +1,4 @@
-// What a point's numbers mean: twin of src/sweep/generated/recipe.rs. A test compares sizes and offsets.
+// What a point's numbers mean: twin of src/engine/generated/recipe.rs. A test compares sizes and offsets.
 
 const MOST_PARAMETERS: u32 = 14u;
 const QUANTITIES: u32 = 11u;

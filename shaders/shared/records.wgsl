@@ -1,6 +1,6 @@
 // The records that host and device share, field by field the `repr(C)` types of the host:
-// Motion (src/scenario/motion.rs), LaneOther and LaneCase (src/sweep/lane_case.rs), Start, Launch and
-// OutcomeRecord (src/gpu/records.rs). A test compares every size and offset. MODELS comes from the registry.
+// Motion (src/model/motion.rs), LaneOther and LaneCase (src/engine/lane_case.rs), Start, Launch and
+// OutcomeRecord (src/engine/gpu/records.rs). A test compares every size and offset. MODELS comes from the registry.
 
 struct Motion {
     kind: u32,

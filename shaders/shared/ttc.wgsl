@@ -1,4 +1,4 @@
-// Time to collision: gap over closing speed, 0 at contact. Twin of src/criterion/ttc.rs.
+// Time to collision: gap over closing speed, 0 at contact. Twin of src/model/criterion/ttc.rs.
 
 // s
 override ttc_threshold_s: f32;

@@ -1,5 +1,5 @@
 // From a random word to a uniform number, one of several things, or one of several weighted things, as
-// src/random/uniform.rs; needs shared/philox.wgsl. Reads `alias_table: array<vec2<u32>>`, which whoever includes this
+// src/stats/random/uniform.rs; needs shared/philox.wgsl. Reads `alias_table: array<vec2<u32>>`, which whoever includes this
 // declares and fills with `AliasTable::table`, several tables one after the other if need be.
 
 // A uniform number in (0, 1), in the middle of one of 2^23 parts.

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose, visible_here};
+use crate::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose, visible_here};
+use crate::engine::verify::self_check;
+use crate::engine::{Backend, CpuBackend};
 use crate::report::run_record::DeviceRecord;
 use crate::report::sampling::HostRecord;
-use crate::sweep::{Backend, CpuBackend};
-use crate::verify::self_check;
 use crate::{Error, Place, Result};
 
 /// Flags of every verb that sweeps.

@@ -5,13 +5,14 @@ use std::path::Path;
 use clap::Args;
 use serde::Deserialize;
 
-use crate::driver::ModelId;
-use crate::plausibility::{Doubts, HELP, Implausible, Quantity};
-use crate::profile::Profile;
+use crate::engine::Headway;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least, needed};
-use crate::sweep::Headway;
-use crate::table::{TableFormat, TableReader};
-use crate::{Error, Place, Result, toml_file};
+use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
+use crate::support::table::{TableFormat, TableReader};
+use crate::support::toml_file;
+use crate::{Error, Place, Result};
 
 /// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Args)]

@@ -14,26 +14,25 @@ use super::source::{self, PlausibilityFlag, Source};
 use super::study_run::{How, run_plan};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
-use crate::criterion::Criterion;
-use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
-use crate::driver::ModelId;
-use crate::estimate::Enough;
-use crate::parameterization::ParameterizationId;
-use crate::profile::Profile;
-use crate::readable::count;
+use crate::engine::{Forecast, Headway, LanePlan, ONE_IN, Partial, Recheck, SweepSummary, Wanted, forecast};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
-use crate::report::files::check_folder;
 use crate::report::html::PageFigure;
-use crate::run_folder::{COMPARE_RECORD, Results, RunFolder};
-use crate::sampling::{
+use crate::run::sampling::{
     CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
     ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
 };
+use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
-use crate::sweep::{
-    Forecast, Headway, LanePlan, ONE_IN, Partial, Recheck, StudyOptions, SweepSummary, Wanted, forecast, plan_study,
-};
+use crate::scenario::parameterization::ParameterizationId;
+use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
+use crate::stats::estimate::Enough;
+use crate::support::files::check_folder;
+use crate::support::readable::count;
+use crate::support::run_dir::{COMPARE_RECORD, Results, RunFolder};
 use crate::{Error, Place, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
@@ -346,7 +345,7 @@ impl Run<'_> {
     ) -> Result<(ComparedParameterization, Vec<Error>)> {
         let fitted = DensityModel::fit(id, self.scenarios, self.facts, &self.fit)?;
         let density = fitted.model;
-        let find = |(at, block): (usize, &crate::sweep::Block)| {
+        let find = |(at, block): (usize, &crate::engine::Block)| {
             let variant = block.variants.iter().position(|v| v == id.key)?;
             (block.category == id.category).then_some((at, variant))
         };

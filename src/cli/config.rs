@@ -9,11 +9,11 @@ use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, console};
-use crate::cluster::quoted_word;
-use crate::report::files::{make_folder, write_atomically};
-use crate::settings::{
+use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
+use crate::interop::cluster::quoted_word;
+use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
 /// Write, check and explain configurations

@@ -7,9 +7,9 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
-use crate::profile::Profile;
+use crate::cli::settings::{Assignment, Layers, Origin, Setting, Settings};
+use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
-use crate::settings::{Assignment, Layers, Origin, Setting, Settings};
 use crate::{Error, Place, Result};
 
 /// What a run is configured with.
@@ -186,7 +186,7 @@ impl Configured {
     pub fn refuse_with_plan(&self) -> Result<()> {
         let is_typed = |origin: &Origin| match origin {
             Origin::Assignment(_) => true,
-            Origin::File { .. } => std::env::var_os(crate::settings::FILE_VARIABLE).is_none(),
+            Origin::File { .. } => std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none(),
             _ => false,
         };
         let of_plan = |key: &str| OF_THE_PLAN.iter().any(|part| key.starts_with(part));
@@ -263,7 +263,7 @@ fn broken(error: clap::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::{Key, Kind};
+    use crate::cli::settings::{Key, Kind};
 
     #[test]
     fn every_flag_that_sets_a_key_exists_with_the_same_default_and_the_same_words() {

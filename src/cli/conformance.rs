@@ -8,11 +8,13 @@ use comfy_table::{Table as TextTable, presets};
 
 use super::Exit;
 use super::format::FormatFlag;
-use crate::conformance::{LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes};
-use crate::profile::Profile;
-use crate::readable::{count, count_of};
+use crate::interop::conformance::{
+    LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes,
+};
+use crate::model::profile::Profile;
 use crate::report::records;
 use crate::scenario::read_scenarios;
+use crate::support::readable::{count, count_of};
 use crate::{Error, Place, Result};
 
 /// Compare golden tables of simulated cases with our own lanes

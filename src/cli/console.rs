@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
-use crate::plain_text::{shown, shown_in_line, shown_json};
+use crate::support::plain_text::{shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
 /// How much is said on stderr.

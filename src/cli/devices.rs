@@ -7,9 +7,9 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, pr
 
 use super::Exit;
 use super::format::FormatFlag;
-use crate::gpu::{AdapterCard, Adapters, BackendChoice, GpuBackend, GpuOptions, choose, visible_here};
+use crate::engine::gpu::{AdapterCard, Adapters, BackendChoice, GpuBackend, GpuOptions, choose, visible_here};
+use crate::engine::verify::self_check;
 use crate::report::tables::{WIDTH, wrap};
-use crate::verify::self_check;
 use crate::{Error, Result};
 
 /// List the compute devices and tell which one is used
@@ -235,7 +235,7 @@ fn bytes(size: u64) -> String {
 mod tests {
     use super::*;
     use crate::Place;
-    use crate::gpu::{AdapterLimits, Api, DeviceKind};
+    use crate::engine::gpu::{AdapterLimits, Api, DeviceKind};
 
     fn card(index: usize, name: &str, kind: DeviceKind, bus: Option<&str>) -> AdapterCard {
         AdapterCard {

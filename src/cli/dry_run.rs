@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use super::format::FormatFlag;
 use crate::Result;
-use crate::readable::{count, value};
+use crate::engine::{Block, Forecast, LanePlan};
 use crate::report::records::document;
-use crate::sweep::{Block, Forecast, LanePlan};
+use crate::support::readable::{count, value};
 
 /// Time that lanes are run for to know their speed.
 pub(super) const BUDGET: Duration = Duration::from_millis(200);

@@ -9,12 +9,12 @@ use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenario
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, ProfileFlags};
-use crate::criterion::Criterion;
-use crate::openscenario::{EgoMotion, export_folder};
-use crate::readable::count_of;
-use crate::report::files::check_folder;
+use crate::interop::openscenario::{EgoMotion, export_folder};
+use crate::model::criterion::Criterion;
 use crate::report::records::document;
 use crate::scenario::Side;
+use crate::support::files::check_folder;
+use crate::support::readable::count_of;
 use crate::{Error, Place, Result};
 
 /// Write scenarios for other simulators

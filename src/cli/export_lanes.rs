@@ -6,19 +6,17 @@ use super::case_flags::CaseFlags;
 use super::export_worst::{worst_of_sample, worst_of_study};
 use super::simulate_lanes::{Run, find, find_run, model, refuse_void};
 use super::source::scenarios_of;
-use crate::criterion::Criterion;
-use crate::density::DensityModel;
-use crate::driver::{ModelId, NEVER};
-use crate::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
-use crate::parameterization::{Sizes, VehicleSize};
-use crate::plausibility::Implausible;
-use crate::profile::{CutOutTarget, Profile};
-use crate::scalar::Real;
+use crate::engine::{EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, Trace, check_time_step};
+use crate::interop::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
+use crate::model::criterion::Criterion;
+use crate::model::driver::{ModelId, NEVER};
+use crate::model::profile::{CutOutTarget, Profile};
+use crate::model::scalar::Real;
+use crate::run::study::{StudyOptions, plan_study};
+use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
-use crate::sweep::{
-    EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, StudyOptions, Trace, check_time_step,
-    plan_study,
-};
+use crate::stats::density::DensityModel;
+use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
 /// What the flags say beside the lanes.
@@ -295,7 +293,7 @@ fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Ext
 /// The same numbers in f64.
 fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
     LaneCase {
-        others: case.others.map(|o| crate::sweep::LaneOther {
+        others: case.others.map(|o| crate::engine::LaneOther {
             motion: crate::scenario::Motion::resting(),
             half_lengths: o.half_lengths.to_f64(),
             half_widths: o.half_widths.to_f64(),

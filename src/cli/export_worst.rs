@@ -4,12 +4,14 @@ use std::path::Path;
 
 use super::simulate_lanes::{find, model};
 use super::study_run::WINDOW;
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::sampling::limit_state;
-use crate::sweep::{Backend, Chunk, CpuBackend, LaneKey, LanePlan, Study, SweepOptions, Wanted, sweep};
-use crate::table::text_of_cell;
-use crate::{Error, Place, Result, input_file};
+use crate::engine::{Backend, Chunk, CpuBackend, LaneKey, LanePlan, SweepOptions, Wanted, sweep};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::limit_state;
+use crate::run::study::Study;
+use crate::support::input_file;
+use crate::support::table::text_of_cell;
+use crate::{Error, Place, Result};
 
 /// Lanes that one export writes at most.
 const MOST_LANES: usize = 10_000;

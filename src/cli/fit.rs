@@ -13,16 +13,17 @@ use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
-use crate::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
-use crate::mining::Collection;
-use crate::parameterization::ParameterizationId;
+use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
-use crate::report::files::{check_folder_of, make_folder};
 use crate::report::records;
-use crate::run_folder::RunFolder;
+use crate::scenario::parameterization::ParameterizationId;
 use crate::scenario::write_scenarios_to;
-use crate::settings::BandwidthInterval;
-use crate::{Error, Place, Result, input_file};
+use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use crate::support::files::{check_folder_of, make_folder};
+use crate::support::input_file;
+use crate::support::run_dir::RunFolder;
+use crate::traffic::mining::Collection;
+use crate::{Error, Place, Result};
 
 /// Draws for P_valid at most, as in the configuration.
 const MAX_VALID_DRAWS: u64 = 1_000_000_000;
@@ -216,7 +217,7 @@ pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> 
             // That of the file that `mine` would write: the same scenarios have the same checksum.
             let mut digest = Hashing(Sha256::new());
             write_scenarios_to(&mut digest, &collection.scenarios)?;
-            crate::sweep::hex(&digest.0.finalize())
+            crate::support::hex::hex(&digest.0.finalize())
         }
     };
     let mut facts = DataFacts {

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::console;
 use crate::Result;
-use crate::readable::count;
+use crate::support::readable::count;
 
 /// How tables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

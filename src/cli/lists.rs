@@ -1,9 +1,9 @@
 //! Lists of models, headways and parameterizations as several verbs take them.
 
-use crate::driver::ModelId;
-use crate::parameterization::ParameterizationId;
+use crate::engine::Headway;
+use crate::model::driver::ModelId;
 use crate::scenario::Category;
-use crate::sweep::Headway;
+use crate::scenario::parameterization::ParameterizationId;
 use crate::{Error, Place, Result};
 
 /// The models of `--models`, in the order of every table; all where none is given.

@@ -11,21 +11,21 @@ use super::dry_run::{BUDGET, DryRun, Part};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::grid::presets::{self, Preset};
-use crate::grid::{
-    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MOST_PANELS, MapBackend, PARAMETERS, Parameter,
-};
-use crate::openscenario::{Names, Rename, read_distribution, variations};
-use crate::plausibility::Doubts;
-use crate::profile::Profile;
-use crate::readable::{count, value};
+use crate::engine::{Backend, CpuBackend, Forecast, SweepSummary, Verdicts, Wanted, forecast};
+use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
-use crate::run_folder::{MAP_RECORD, RunFolder};
+use crate::run::grid::presets::{self, Preset};
+use crate::run::grid::{
+    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MOST_PANELS, MapBackend, PARAMETERS, Parameter,
+};
 use crate::scenario::Category;
-use crate::sweep::{Backend, CpuBackend, Forecast, SweepSummary, Verdicts, Wanted, forecast};
+use crate::support::plausibility::Doubts;
+use crate::support::readable::{count, value};
+use crate::support::run_dir::{MAP_RECORD, RunFolder};
 use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.

@@ -10,12 +10,12 @@ use super::shard_flags::PLAN_FILE;
 use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
-use crate::cluster::quoted_word;
-use crate::parts::{Countable, Part, Shard, collect, kind_of, read_part};
-use crate::report::files::check_folder;
+use crate::engine::{Partial, SweepSummary};
+use crate::interop::cluster::quoted_word;
 use crate::report::run_record::Timings;
-use crate::run_folder::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
-use crate::sweep::{Partial, SweepSummary};
+use crate::run::parts::{Countable, Part, Shard, collect, kind_of, read_part};
+use crate::support::files::check_folder;
+use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
 /// Make the result of a run that was computed in parts

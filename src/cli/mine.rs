@@ -8,12 +8,13 @@ use super::configured::Configured;
 use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, Source};
 use super::{Exit, console};
-use crate::atomic_file::AtomicFile;
-use crate::density::{Driven, ExposureFile};
-use crate::lock::FolderLock;
-use crate::readable::count_of;
+use crate::Result;
 use crate::scenario::{check_scenario_file, write_scenarios, write_scenarios_to};
-use crate::{Result, input_file};
+use crate::stats::density::{Driven, ExposureFile};
+use crate::support::atomic_file::AtomicFile;
+use crate::support::input_file;
+use crate::support::lock::FolderLock;
+use crate::support::readable::count_of;
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///

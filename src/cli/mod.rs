@@ -31,6 +31,7 @@ mod sample_distribution;
 mod sample_lanes;
 mod sample_plan;
 mod sample_weighted;
+pub mod settings;
 mod shard_flags;
 mod shell;
 mod simulate;
@@ -52,7 +53,7 @@ use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
 use console::Verbosity;
 
-use crate::profile::Profile;
+use crate::model::profile::Profile;
 use crate::{Error, Place, Result};
 
 #[derive(Parser)]
@@ -156,7 +157,7 @@ pub fn main() -> ExitCode {
     if let Ok(common) = Common::from_arg_matches(&matches) {
         console::start_log(common.verbosity());
     }
-    crate::interrupt::install();
+    crate::support::interrupt::install();
     told(|| {
         let (cli, configured) = Configured::of(&matches)?;
         run(&cli, &configured)

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::density::{DensityModel, read_density};
-use crate::driver::ModelId;
-use crate::profile::Profile;
+use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::sampling::RunFacts;
-use crate::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
-use crate::sweep::{ENGINE_VERSION, Headway, LanePlan};
-use crate::{Error, Place, Result, input_file};
+use crate::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
+use crate::stats::density::{DensityModel, read_density};
+use crate::support::input_file;
+use crate::{Error, Place, Result};
 
 /// What `estimate.json` must say of a run.
 #[derive(Deserialize)]

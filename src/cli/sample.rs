@@ -20,20 +20,22 @@ use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
 use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use super::{Exit, ProfileFlags};
-use crate::criterion::Criterion;
-use crate::density::{DensityModel, read_density};
-use crate::driver::ModelId;
-use crate::estimate::{Checkpoints, Pilot, StopRule};
-use crate::openscenario::Rename;
-use crate::parts::kind_of;
-use crate::profile::Profile;
+use crate::cli::settings::SampleSettings;
+pub(super) use crate::cli::settings::{
+    Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
+};
+use crate::engine::Headway;
+use crate::interop::openscenario::Rename;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::sampling::{EstimateFile, RunFacts};
-use crate::run_folder::{ESTIMATE_RECORD, RunFolder};
-use crate::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
-use crate::settings::SampleSettings;
-pub(super) use crate::settings::{Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag};
-use crate::sweep::Headway;
-use crate::table::TableFormat;
+use crate::run::parts::kind_of;
+use crate::run::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
+use crate::stats::density::{DensityModel, read_density};
+use crate::stats::estimate::{Checkpoints, Pilot, StopRule};
+use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder};
+use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?

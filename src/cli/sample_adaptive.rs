@@ -7,17 +7,17 @@ use super::dry_run::{DryRun, Part};
 use super::sample::{EstimatorFlag, Run, one_headway};
 use super::sample_checks::MOST_HELD;
 use crate::Result;
-use crate::density::{BandwidthRule, Kde, Mixture};
-use crate::driver::ModelId;
-use crate::estimate::{
+use crate::model::driver::ModelId;
+use crate::report::sampling::{EstimateFile, Levels};
+use crate::run::sampling::{
+    EstimateRow, LaneLimitState, SampleHeadways, plan_points, proposal_text, read_proposal, scenario_shares, truncated,
+};
+use crate::stats::density::{BandwidthRule, Kde, Mixture};
+use crate::stats::estimate::{
     CrossEntropy, Defended, Density, Estimate, Importance, Pilot, PilotCheck, Subset, Technique, balance_heuristic,
     cross_entropy, defended, from_pilot_with_proposal, importance, pilot_proposal, subset,
 };
-use crate::report::sampling::{EstimateFile, Levels};
-use crate::run_folder::Results;
-use crate::sampling::{
-    EstimateRow, LaneLimitState, SampleHeadways, plan_points, proposal_text, read_proposal, scenario_shares, truncated,
-};
+use crate::support::run_dir::Results;
 
 /// Draws that the valid share of each of several proposals is counted on.
 const VALIDITY_DRAWS: u64 = 1_000_000;

@@ -13,16 +13,17 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::sample_plan::PlannedSample;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
-use crate::atomic_file::StagedFile;
-use crate::estimate::StopRule;
-use crate::readable::count;
+use crate::engine::{ONE_IN, Outcome, Recheck, Wanted, forecast};
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
-use crate::run_folder::{ESTIMATE_RECORD, Results, RunFolder};
-use crate::sampling::{
+use crate::run::sampling::{
     BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
 };
-use crate::sweep::{ONE_IN, Outcome, Recheck, Wanted, forecast};
-use crate::{Error, Place, Result, interrupt};
+use crate::stats::estimate::StopRule;
+use crate::support::atomic_file::StagedFile;
+use crate::support::interrupt;
+use crate::support::readable::count;
+use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
+use crate::{Error, Place, Result};
 
 /// A condition that so few scenarios are near is outside the data.
 const FEW_SCENARIOS: f64 = 5.0;

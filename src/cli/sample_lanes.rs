@@ -3,18 +3,18 @@
 use std::path::Path;
 
 use super::console::{self, Verbosity};
-use crate::atomic_file::StagedFile;
-use crate::density::DensityModel;
-use crate::parts::Ledger;
+use crate::engine::{LanePlan, LaneRunner, Outcome};
 use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
-use crate::run_folder::Results;
-use crate::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
-use crate::sweep::{LanePlan, LaneRunner, Outcome};
-use crate::table::{TableFacts, TableFormat, TableWriter};
+use crate::run::parts::Ledger;
+use crate::run::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
+use crate::stats::density::DensityModel;
+use crate::support::atomic_file::StagedFile;
+use crate::support::run_dir::Results;
+use crate::support::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
 /// Samples, with one row per lane where asked for: a table that gets its name with the run's other results.

@@ -5,17 +5,17 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::criterion::Criterion;
-use crate::density::DensityModel;
-use crate::driver::ModelId;
-use crate::estimate::{BinomialInterval, StopRule};
-use crate::parts::{read_sealed, seal};
-use crate::profile::Profile;
+use crate::engine::{Headway, LanePlan};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::sampling::RunFacts;
-use crate::sampling::{
+use crate::run::parts::{read_sealed, seal};
+use crate::run::sampling::{
     CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, mixture_of, plan_samples,
 };
-use crate::sweep::{Headway, LanePlan};
+use crate::stats::density::DensityModel;
+use crate::stats::estimate::{BinomialInterval, StopRule};
 use crate::{Error, Place, Result};
 
 /// Kind of the sealed file.

@@ -13,16 +13,19 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use super::weighted_plan::{PILOT_FILE, PlannedWeighted};
-use crate::density::Mixture;
-use crate::driver::ModelId;
-use crate::estimate::{BlockSums, Defended, StopReason, WeightSums, defended, from_weight_sums, importance_sums};
-use crate::parts::{Countable, Ledger};
-use crate::readable::count;
+use crate::engine::{CpuBackend, Forecast, lanes_within_seconds};
+use crate::model::driver::ModelId;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::run_folder::{ESTIMATE_RECORD, Results, RunFolder};
-use crate::sampling::{EstimateRow, LaneLimitState, WeightedTally, proposal_text, scenario_shares, truncated};
-use crate::sweep::{CpuBackend, Forecast, lanes_within_seconds};
-use crate::{Error, Place, Result, interrupt};
+use crate::run::parts::{Countable, Ledger};
+use crate::run::sampling::{EstimateRow, LaneLimitState, WeightedTally, proposal_text, scenario_shares, truncated};
+use crate::stats::density::Mixture;
+use crate::stats::estimate::{
+    BlockSums, Defended, StopReason, WeightSums, defended, from_weight_sums, importance_sums,
+};
+use crate::support::interrupt;
+use crate::support::readable::count;
+use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
+use crate::{Error, Place, Result};
 
 /// Memory of a sample while it is judged (point, case, motion, outcome), bytes, measured.
 const BYTES_PER_SAMPLE: u64 = 280;

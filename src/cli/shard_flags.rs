@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::lock::FolderLock;
-use crate::parts::{Countable, Journal, Ledger, Part, Shard, read_part, write_part};
-use crate::readable::count;
-use crate::report::files::make_folder;
-use crate::run_folder::RunFolder;
-use crate::{Error, Place, Result, interrupt};
+use crate::run::parts::{Countable, Journal, Ledger, Part, Shard, read_part, write_part};
+use crate::support::files::make_folder;
+use crate::support::interrupt;
+use crate::support::lock::FolderLock;
+use crate::support::readable::count;
+use crate::support::run_dir::RunFolder;
+use crate::{Error, Place, Result};
 
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
@@ -198,7 +199,7 @@ pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
     let _folder = RunFolder::share(out)?;
     let path = out.join(PLAN_FILE);
     let mut there = vec![0; line.len()];
-    match crate::input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {
+    match crate::support::input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {
         Ok(Ok(())) if there == line => Ok(()),
         Ok(_) => {
             let problem = "this folder holds the plan of another run";
@@ -207,7 +208,7 @@ pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
             Err(Error::input(Place::file(path), problem, help))
         }
         Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
-            crate::report::files::write_atomically_with(&path, |file| {
+            crate::support::files::write_atomically_with(&path, |file| {
                 file.write_all(line)?;
                 std::io::copy(&mut rest, file).map(drop)
             })

@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use super::configured::command;
 use super::{Exit, console};
-use crate::report::files::{make_folder, write_atomically};
+use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Result};
 
 /// Print the completions for a shell

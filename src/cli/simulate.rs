@@ -10,16 +10,16 @@ use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
 use super::source::{PlausibilityFlag, refuse_overwriting};
 use super::{Exit, ProfileFlags};
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::readable::value;
-use crate::report::files::{make_folder, write_atomically};
+use crate::engine::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
 use crate::report::records;
 use crate::report::trace_figure::{TraceFigure, TraceSeries};
 use crate::report::trace_table;
-use crate::run_folder::is_listed;
 use crate::scenario::Tables;
-use crate::sweep::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
+use crate::support::files::{make_folder, write_atomically};
+use crate::support::readable::value;
+use crate::support::run_dir::is_listed;
 use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series

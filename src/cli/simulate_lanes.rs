@@ -9,14 +9,16 @@ use super::sample_plan::{self, PlannedSample};
 use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
 use super::source::scenarios_of;
 use super::study_plan::{self, PlannedStudy};
-use crate::density::DensityModel;
-use crate::driver::ModelId;
-use crate::parts::kind_of;
-use crate::plausibility::Implausible;
-use crate::profile::Profile;
-use crate::scalar::Real;
-use crate::sweep::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, StudyOptions, Trace, plan_study};
-use crate::{Error, Place, Result, input_file};
+use crate::engine::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, Trace};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::model::scalar::Real;
+use crate::run::parts::kind_of;
+use crate::run::study::{StudyOptions, plan_study};
+use crate::stats::density::DensityModel;
+use crate::support::input_file;
+use crate::support::plausibility::Implausible;
+use crate::{Error, Place, Result};
 
 /// Which lanes are asked for: one by its key, and others of the same scenario and headway beside it.
 pub(super) struct Asked<'a> {
@@ -109,7 +111,7 @@ pub(super) enum Run {
 
 /// Where a folder holds a study's results and a sampling run's, the key tells: samples are numbered.
 pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
-    crate::report::files::check_folder(dir)?;
+    crate::support::files::check_folder(dir)?;
     let (run, estimate) = (dir.join("run.json"), dir.join("estimate.json"));
     if run.exists() && !(estimate.exists() && key.starts_with('#')) {
         return study_of(dir, &run).map(|study| Run::Study(Box::new(study)));

@@ -6,9 +6,9 @@ use clap::Args;
 
 use super::configured::command;
 use super::{Exit, console};
-use crate::atomic_file::refuse_link;
-use crate::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
-use crate::run_folder::RunFolder;
+use crate::interop::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
+use crate::support::atomic_file::refuse_link;
+use crate::support::run_dir::RunFolder;
 use crate::{Error, Place, Result};
 
 /// Split a run over a Slurm job array

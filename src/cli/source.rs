@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::console::{self, Verbosity};
-use crate::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
-use crate::plausibility::Implausible;
-use crate::readable;
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
-use crate::trajectory::generator::GeneratorOptions;
-use crate::trajectory::highd::{self, made_up};
+use crate::support::plausibility::Implausible;
+use crate::support::readable;
+use crate::traffic::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
+use crate::traffic::trajectory::generator::GeneratorOptions;
+use crate::traffic::trajectory::highd::{self, made_up};
 use crate::{Error, Place, Result};
 
 /// What the scenarios of a run are.

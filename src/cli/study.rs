@@ -17,20 +17,20 @@ use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
 use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
-use crate::criterion::Criterion;
-use crate::mining::{Collection, count};
-use crate::parameterization::{ParameterizationOptions, Reduction};
-use crate::readable;
+use crate::engine::{Backend, Block, Confusion, CpuBackend, Partial, Wanted, forecast};
+use crate::model::criterion::Criterion;
 use crate::report::distributions::parameter_histograms;
-use crate::report::files::{check_folder, check_folder_of};
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
-use crate::run_folder::{Results, STUDY_RECORD};
+use crate::run::study::{StudyOptions, StudyOutline, outline_study};
+use crate::scenario::parameterization::{ParameterizationOptions, Reduction};
 use crate::scenario::{Category, Scenario};
-use crate::sweep::{
-    Backend, Block, Confusion, CpuBackend, Partial, StudyOptions, StudyOutline, Wanted, forecast, outline_study,
-};
-use crate::{Error, Place, Result, input_file};
+use crate::support::files::{check_folder, check_folder_of};
+use crate::support::input_file;
+use crate::support::readable;
+use crate::support::run_dir::{Results, STUDY_RECORD};
+use crate::traffic::mining::{Collection, count};
+use crate::{Error, Place, Result};
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -169,7 +169,8 @@ impl Study {
             return self.sweep(&study, &opened, run_sha256, configured, timings, verbosity);
         }
         // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.
-        let run_sha256 = crate::sweep::sha256(&format!("{} reference {}", study.plan().hash(), study.facts.reference));
+        let run_sha256 =
+            crate::support::hex::sha256(&format!("{} reference {}", study.plan().hash(), study.facts.reference));
         self.sweep(&study, &opened, run_sha256, configured, timings, verbosity)
     }
 
@@ -358,7 +359,7 @@ fn category_facts(
     planned: &StudyOutline,
     options: &ParameterizationOptions,
 ) -> Result<Vec<CategoryFacts>> {
-    let facts = |block: &crate::sweep::Block| {
+    let facts = |block: &crate::engine::Block| {
         let of = count(&collection.scenarios, block.category);
         let reduction = planned.reductions.iter().find(|r| r.category == block.category);
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());

@@ -6,13 +6,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::mining::{MiningOptions, RecordingSummary};
-use crate::parameterization::{ModeShape, ParameterizationId, ParameterizationOptions};
-use crate::parts::{read_sealed_line, seal};
+use crate::engine::LanePlan;
 use crate::report::distributions::ParameterHistogram;
-use crate::run_folder::Results;
-use crate::score::ScoreOptions;
-use crate::sweep::{LanePlan, Study, StudyHead};
+use crate::run::parts::{read_sealed_line, seal};
+use crate::run::score::ScoreOptions;
+use crate::run::study::{Study, StudyHead};
+use crate::scenario::parameterization::{ModeShape, ParameterizationId, ParameterizationOptions};
+use crate::support::run_dir::Results;
+use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Place, Result};
 
 /// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
@@ -137,10 +138,10 @@ const AGAIN: &str = "make it with `lanesweep study … --plan-only --out DIR` of
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mining::mine_generated;
-    use crate::profile::Profile;
-    use crate::sweep::{StudyOptions, plan_study};
-    use crate::trajectory::generator::GeneratorOptions;
+    use crate::model::profile::Profile;
+    use crate::run::study::{StudyOptions, plan_study};
+    use crate::traffic::mining::mine_generated;
+    use crate::traffic::trajectory::generator::GeneratorOptions;
 
     #[test]
     fn a_plan_with_variants_that_no_study_has_is_refused_before_they_are_printed() {

@@ -8,21 +8,23 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::shard_flags::Work;
 use super::study_plan::PlannedStudy;
-use crate::atomic_file::StagedFile;
-use crate::report::files::make_folder;
+use crate::Result;
+use crate::engine::{
+    Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, SweepOptions, SweepSummary, Wanted,
+    chunks, sweep,
+};
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
-use crate::run_folder::Results;
-use crate::score::{ScoreTable, f1, judge_claims, score};
-use crate::sweep::{
-    Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, Study, SweepOptions, SweepSummary,
-    Wanted, chunks, sweep,
-};
-use crate::table::{TableFacts, TableFormat, TableWriter};
-use crate::{Result, interrupt};
+use crate::run::score::{ScoreTable, f1, judge_claims, score};
+use crate::run::study::Study;
+use crate::support::atomic_file::StagedFile;
+use crate::support::files::make_folder;
+use crate::support::interrupt;
+use crate::support::run_dir::Results;
+use crate::support::table::{TableFacts, TableFormat, TableWriter};
 
 /// Scenarios whose cases are held at once, with some 25 kB each.
 pub(super) const WINDOW: u64 = 2048;
@@ -216,7 +218,7 @@ pub(super) fn finish_study(
 
 fn category_records(study: &PlannedStudy, scores: &ScoreTable) -> Vec<CategoryRecord> {
     let plan = study.plan();
-    let record = |(block, of): (&crate::sweep::Block, &super::study_plan::CategoryFacts)| {
+    let record = |(block, of): (&crate::engine::Block, &super::study_plan::CategoryFacts)| {
         let scored = scores.categories.iter().find(|c| c.category == block.category);
         let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
         CategoryRecord {

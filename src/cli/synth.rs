@@ -8,10 +8,10 @@ use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source::Source;
-use crate::report::files::check_folder;
-use crate::run_folder::{RunFolder, unfinished};
-use crate::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
+use crate::support::files::check_folder;
+use crate::support::run_dir::{RunFolder, unfinished};
+use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
 
 /// Flags of the generator.

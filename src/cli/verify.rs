@@ -11,12 +11,13 @@ use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
-use crate::profile::Profile;
-use crate::readable::count;
+use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
+use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
+use crate::model::profile::Profile;
 use crate::report::{records, verification};
+use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Category;
-use crate::sweep::{Backend, LanePlan, LaneRunner, StudyOptions, Wanted, plan_study};
-use crate::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
+use crate::support::readable::count;
 use crate::{Error, Place, Result};
 
 /// Check that a device computes every lane as the CPU does
@@ -195,7 +196,7 @@ impl Verify {
         let cpu = LaneRunner::<f32>::new(&plan).run(&key).widen();
         let theirs = chunk.outcomes[at];
         let names = ["f64 reference", "CPU, f32", "under test"];
-        let is_equal = crate::sweep::same_words(&cpu, &theirs);
+        let is_equal = crate::engine::same_words(&cpu, &theirs);
         let outcomes = [reference, cpu, theirs];
         self.format.print(
             || format!("Under test: {}\n{}", tested.describe(), verification::lane(text, names, &outcomes)),

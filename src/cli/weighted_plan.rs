@@ -5,16 +5,16 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::criterion::Criterion;
-use crate::density::{DensityModel, Mixture};
-use crate::driver::ModelId;
-use crate::estimate::{Pilot, PilotCheck};
-use crate::parts::{read_sealed, seal};
-use crate::profile::Profile;
-use crate::report::files::{make_folder, write_atomically};
+use crate::engine::Headway;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::report::sampling::RunFacts;
-use crate::sampling::{SampleHeadways, plan_points, proposal_from_text, proposal_text};
-use crate::sweep::Headway;
+use crate::run::parts::{read_sealed, seal};
+use crate::run::sampling::{SampleHeadways, plan_points, proposal_from_text, proposal_text};
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::estimate::{Pilot, PilotCheck};
+use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
 /// What a run with a pilot of its own keeps until it ends.

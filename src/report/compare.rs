@@ -7,13 +7,15 @@ use serde::Serialize;
 use super::html::{Page, PageFigure, Section};
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
-use crate::criterion::Criterion;
-use crate::density::Driven;
-use crate::driver::ModelId;
-use crate::estimate::{Enough, Ratio, RatioVerdict};
-use crate::readable;
-use crate::sampling::{CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate};
-use crate::score::f1;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{
+    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate,
+};
+use crate::run::score::f1;
+use crate::stats::density::Driven;
+use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
+use crate::support::readable;
 use crate::{Error, Result};
 
 /// `compare.json`.

@@ -3,8 +3,8 @@
 use super::axis::AxisScale;
 use super::compare::CompareFile;
 use super::forest::{ForestFigure, ForestGroup, ForestRow};
-use crate::criterion::Criterion;
-use crate::sampling::{CategoryComparison, RateRecord};
+use crate::model::criterion::Criterion;
+use crate::run::sampling::{CategoryComparison, RateRecord};
 
 fn row(name: String, rate: &RateRecord) -> ForestRow {
     // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
@@ -15,7 +15,7 @@ fn row(name: String, rate: &RateRecord) -> ForestRow {
 pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> ForestFigure {
     let recorded = comparison.recorded.iter().filter(|cell| cell.criterion == criterion);
     let groups = recorded.map(|cell| {
-        let density = |p: &crate::sampling::ComparedParameterization| {
+        let density = |p: &crate::run::sampling::ComparedParameterization| {
             let found = p.cells.iter().find(|c| c.model == cell.model && c.criterion == criterion)?;
             Some(row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate))
         };

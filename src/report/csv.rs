@@ -1,9 +1,9 @@
 //! The tables as CSV: numbers in full precision, an empty field where a value is undefined.
 
-use crate::criterion::Criterion;
-use crate::parameterization::ParameterizationId;
-use crate::score::{Cell, ClaimResult, Interval, ScoreTable, f1, precision, recall};
-use crate::table::cell_text;
+use crate::model::criterion::Criterion;
+use crate::run::score::{Cell, ClaimResult, Interval, ScoreTable, f1, precision, recall};
+use crate::scenario::parameterization::ParameterizationId;
+use crate::support::table::cell_text;
 use crate::{Error, Result};
 
 pub(crate) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
@@ -153,10 +153,10 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::driver::ModelId;
+    use crate::engine::{Confusion, Headway};
+    use crate::model::driver::ModelId;
+    use crate::run::score::{CategoryScores, Cell, ScoreOptions};
     use crate::scenario::Category;
-    use crate::score::{CategoryScores, Cell, ScoreOptions};
-    use crate::sweep::{Confusion, Headway};
 
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {

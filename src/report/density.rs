@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::tables::{aligned, table};
-use crate::density::{DensityModel, Exposure, Rate, Representativeness, SearchEnd, standard_deviation};
-use crate::readable::{count, count_of, significant};
+use crate::stats::density::{DensityModel, Exposure, Rate, Representativeness, SearchEnd, standard_deviation};
+use crate::support::readable::{count, count_of, significant};
 
 /// Everything of one density but its kernels.
 pub fn text(model: &DensityModel) -> String {

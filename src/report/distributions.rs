@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::axis::plain_step;
 use super::panels::{Mark, Panel, PanelFigure, PanelSeries};
 use crate::Result;
-use crate::density::ParameterSpace;
-use crate::parameterization::{ParameterizationId, ParameterizationOptions};
+use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
 use crate::scenario::{Category, Scenario};
+use crate::stats::density::ParameterSpace;
 
 /// Most bins of a histogram.
 const MOST_BINS: f64 = 40.0;
@@ -50,7 +50,7 @@ pub fn parameter_histograms(
         return Ok(Vec::new());
     };
     let points = scenarios.iter().map(|scenario| space.point(scenario)).collect::<Result<Vec<_>>>()?;
-    let of = |(at, parameter): (usize, &crate::density::Parameter)| {
+    let of = |(at, parameter): (usize, &crate::stats::density::Parameter)| {
         let values: Vec<f64> = points.iter().map(|point| point[at]).collect();
         let (low, width, counts) = bins(values)?;
         Some(ParameterHistogram { name: parameter.name.clone(), unit: parameter.unit.clone(), low, width, counts })

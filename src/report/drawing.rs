@@ -3,7 +3,7 @@
 //! `kuva` supplies the scene and the SVG writer (number format, XML escapes); layout is ours. Every figure is 1000 px
 //! wide and as high as its texts need, so no text is cut.
 
-use crate::plain_text::acts;
+use crate::support::plain_text::acts;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};

@@ -5,7 +5,7 @@ use minijinja::value::{Serde, Value};
 use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
 
-use crate::plain_text::shown;
+use crate::support::plain_text::shown;
 use crate::{Error, Result};
 
 const TEMPLATE: &str = include_str!("templates/report.html");

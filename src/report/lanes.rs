@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::criterion::Criterion;
-use crate::scalar::Real;
-use crate::sweep::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
-use crate::table::{Cell, Column, Kind, TableWriter};
+use crate::engine::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
+use crate::model::criterion::Criterion;
+use crate::model::scalar::Real;
+use crate::support::table::{Cell, Column, Kind, TableWriter};
 
 /// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,13 +8,13 @@ use super::html::PageFigure;
 use super::map_sheet::{Kind, MapSheet};
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
-use crate::profile::Profile;
-use crate::readable;
-use crate::run_folder::Results;
-use crate::table::quoted;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
+use crate::support::readable;
+use crate::support::run_dir::Results;
+use crate::support::table::quoted;
 use crate::{Error, Result};
 
 /// A swept grid with what is known of it.

@@ -2,7 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
-use crate::readable::count;
+use crate::support::readable::count;
 use crate::{Error, Result};
 
 impl MapReport {

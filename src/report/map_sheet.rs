@@ -9,7 +9,7 @@ use super::drawing::{
     self, BORDER_PX, GREY, GRID, INK, NAME_BOLD, NOTE, TEXT_WIDTH_PX, Type, group, paragraph, path, path_data, rect,
     text,
 };
-use crate::grid::{Grid, boundary, runs};
+use crate::run::grid::{Grid, boundary, runs};
 use kuva::render::color::Color;
 use kuva::render::render::{Scene, TextAnchor};
 
@@ -59,7 +59,7 @@ impl Kind {
         vec![kind("pass", "#f7f1dc"), kind("fail", "#6f86ad")]
     }
 
-    /// The four of a difference, in the order of [`crate::grid::Agreement::ALL`].
+    /// The four of a difference, in the order of [`crate::run::grid::Agreement::ALL`].
     pub fn agreements(first: &str, second: &str) -> Vec<Kind> {
         let kind = |name: String, fill, hatch| Kind { name, fill, hatch };
         vec![

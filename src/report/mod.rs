@@ -2,7 +2,7 @@
 //!
 //! Here live the terminal tables, the CSV files, the figures (SVG), `run.json` and the one way files are
 //! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
-//! [`crate::score`]; text and files go to the user.
+//! [`crate::run::score`]; text and files go to the user.
 
 pub mod axis;
 pub mod compare;
@@ -13,7 +13,6 @@ pub mod density;
 pub mod distributions;
 mod drawing;
 pub mod failure_map;
-pub mod files;
 pub mod forest;
 pub mod html;
 pub mod lanes;

@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value};
 
-use crate::criterion::Criterion;
-use crate::sweep::{NO_STEP, Outcome};
-use crate::table::text_of_cell;
+use crate::engine::{NO_STEP, Outcome};
+use crate::model::criterion::Criterion;
+use crate::support::table::text_of_cell;
 use crate::{Error, Result};
 
 /// Columns whose fields are texts even where they look like numbers (a parameterization's key is `1`). Every other

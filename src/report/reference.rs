@@ -1,10 +1,10 @@
 //! The lane arithmetic against the f64 reference, lane by lane: which verdicts differ, and how near to the
 //! threshold each lies.
 
-use crate::criterion::Criterion;
-use crate::readable::{count, count_of};
-use crate::sweep::{Chunk, LanePlan, Outcome};
-use crate::table::quoted;
+use crate::engine::{Chunk, LanePlan, Outcome};
+use crate::model::criterion::Criterion;
+use crate::support::readable::{count, count_of};
+use crate::support::table::quoted;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::mining::{MiningOptions, RecordingSummary};
-use crate::parameterization::ParameterizationOptions;
-use crate::profile::Profile;
-use crate::score::ScoreOptions;
+use crate::model::profile::Profile;
+use crate::run::score::ScoreOptions;
+use crate::scenario::parameterization::ParameterizationOptions;
+use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Error, Result};
 
 /// Found and kept scenarios of a category, and what became of their lanes.
@@ -97,7 +97,7 @@ pub struct SettingRecord {
 pub struct RunRecord {
     /// Program and version.
     pub program: String,
-    /// [`ENGINE_VERSION`](crate::sweep::ENGINE_VERSION) of the program: what the bits of its lanes are.
+    /// [`ENGINE_VERSION`](crate::engine::ENGINE_VERSION) of the program: what the bits of its lanes are.
     pub engine: u64,
     /// What was swept, in one line.
     pub data: String,

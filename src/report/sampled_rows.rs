@@ -1,9 +1,9 @@
 //! One row per sampled lane: its point, its verdicts and its values. Void samples have no row.
 
-use crate::criterion::Criterion;
-use crate::density::DensityModel;
-use crate::sweep::{Chunk, LanePlan, NO_STEP, Outcome};
-use crate::table::{Cell, Column, Kind, TableWriter};
+use crate::engine::{Chunk, LanePlan, NO_STEP, Outcome};
+use crate::model::criterion::Criterion;
+use crate::stats::density::DensityModel;
+use crate::support::table::{Cell, Column, Kind, TableWriter};
 use crate::{Error, Result};
 
 /// The columns, in their order: units are in the names, parameters come last.

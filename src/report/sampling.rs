@@ -6,15 +6,15 @@ use serde::Serialize;
 
 use super::run_record::DeviceRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
-use crate::density::{DensityModel, Provenance};
-use crate::driver::ModelId;
-use crate::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
-use crate::profile::Profile;
-use crate::readable::{count, count_of, significant, value};
-use crate::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
+use crate::engine::generated::ATTEMPTS;
+use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
 use crate::scenario::Category;
-use crate::sweep::generated::ATTEMPTS;
-use crate::sweep::{ENGINE_VERSION, Headway, LanePlan};
+use crate::stats::density::{DensityModel, Provenance};
+use crate::stats::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
+use crate::support::readable::{count, count_of, significant, value};
 use crate::{Error, Result};
 
 /// The density of a run.

@@ -2,10 +2,10 @@
 
 use super::convergence::{ConvergenceFigure, ConvergencePoint, ConvergenceSeries};
 use super::failure_map::{FailureMap, MapAxis};
-use crate::criterion::Criterion;
-use crate::density::DensityModel;
-use crate::driver::ModelId;
-use crate::sampling::{Checkpoint, MapCounts};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{Checkpoint, MapCounts};
+use crate::stats::density::DensityModel;
 
 /// Line below the heading: what was sampled.
 fn subtitle(density: &DensityModel) -> String {
@@ -47,7 +47,7 @@ pub fn failure_map(
     model: ModelId,
     criterion: Criterion,
 ) -> FailureMap {
-    let axis = |axis: &crate::sampling::MapAxis| MapAxis {
+    let axis = |axis: &crate::run::sampling::MapAxis| MapAxis {
         name: axis.name.clone(),
         unit: axis.unit.clone(),
         edges: axis.edges(),

@@ -3,12 +3,12 @@
 use super::html::{Page, PageFigure, PageTable, Section};
 use super::panels::{Mark, Panel, PanelFigure, PanelSeries};
 use super::sampling::{EstimateFile, interval_text, rate_text, short};
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::readable::{count, count_of, value};
-use crate::sampling::EstimateRow;
+use crate::engine::Headway;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::EstimateRow;
 use crate::scenario::Category;
-use crate::sweep::Headway;
+use crate::support::readable::{count, count_of, value};
 use crate::{Error, Result};
 
 impl EstimateFile {

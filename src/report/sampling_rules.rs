@@ -1,7 +1,7 @@
 //! How the estimates of a sampling run are to be read, in words that its table and its page share.
 
 use super::sampling::EstimateFile;
-use crate::sampling::EstimateRow;
+use crate::run::sampling::EstimateRow;
 
 impl EstimateFile {
     /// The headway of a row, or of how many P is the mean.

@@ -2,11 +2,11 @@
 
 use super::sampling::EstimateFile;
 use crate::Result;
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::estimate::IntervalKind;
-use crate::sampling::{Checkpoint, RiskRate, WorstSample};
-use crate::sweep::{NO_STEP, Outcome};
+use crate::engine::{NO_STEP, Outcome};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{Checkpoint, RiskRate, WorstSample};
+use crate::stats::estimate::IntervalKind;
 
 impl EstimateFile {
     /// `estimates.csv`.
@@ -52,7 +52,7 @@ impl EstimateFile {
         let mut rows = vec![header.map(str::to_owned).to_vec()];
         for row in &self.estimates {
             let e = &row.estimate;
-            let weight = |f: fn(&crate::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
+            let weight = |f: fn(&crate::stats::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
             let rate = |r: Option<RiskRate>| {
                 [r.map(|r| r.estimate), r.map(|r| r.standard_deviation), r.map(|r| r.low), r.map(|r| r.high)]
             };

@@ -8,11 +8,11 @@ use super::run_record::RunRecord;
 use super::study_figures::{HeadwayFailures, f1_by_parameters, legend_name, modes, recall_and_precision};
 use super::{csv, tables};
 use crate::Result;
-use crate::criterion::Criterion;
-use crate::parameterization::ModeShape;
-use crate::run_folder::Results;
+use crate::model::criterion::Criterion;
+use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1};
 use crate::scenario::Category;
-use crate::score::{CategoryScores, ClaimResult, ScoreTable, f1};
+use crate::scenario::parameterization::ModeShape;
+use crate::support::run_dir::Results;
 
 /// What the figures of one category need beside the scores.
 #[derive(Debug, Clone)]

@@ -6,11 +6,11 @@ use super::csv;
 use super::records::{document, records};
 use super::study::StudyReport;
 use crate::Result;
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::parameterization::ParameterizationId;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::score::{published_failures, published_lvd_f1};
 use crate::scenario::Category;
-use crate::score::{published_failures, published_lvd_f1};
+use crate::scenario::parameterization::ParameterizationId;
 
 impl StudyReport {
     /// The same tables as one JSON document, undefined values null; the published numbers where they were asked for.

@@ -2,11 +2,11 @@
 //! number of parameters, the shapes of a decomposition.
 
 use super::panels::{Guide, Mark, Panel, PanelFigure, PanelSeries};
-use crate::criterion::Criterion;
-use crate::driver::ModelId;
-use crate::parameterization::{Kind, ModeShape, ParameterizationId};
-use crate::score::{CategoryScores, f1, precision, recall};
-use crate::sweep::{Confusion, Headway, LanePlan, Partial};
+use crate::engine::{Confusion, Headway, LanePlan, Partial};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::score::{CategoryScores, f1, precision, recall};
+use crate::scenario::parameterization::{Kind, ModeShape, ParameterizationId};
 use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.

@@ -5,12 +5,12 @@ use super::reference::ReferenceComparison;
 use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
-use crate::criterion::Criterion;
-use crate::mining::RecordingSummary;
-use crate::parameterization::{Kind, ParameterizationId};
-use crate::readable::{count, value};
+use crate::model::criterion::Criterion;
+use crate::run::score::{CategoryScores, ClaimVerdict, precision, recall};
 use crate::scenario::Category;
-use crate::score::{CategoryScores, ClaimVerdict, precision, recall};
+use crate::scenario::parameterization::{Kind, ParameterizationId};
+use crate::support::readable::{count, value};
+use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
 
 /// Recordings that are listed; the rest are in `run.json`.
@@ -148,7 +148,7 @@ impl StudyReport {
     }
 
     fn claims(&self) -> Section {
-        let row = |result: &crate::score::ClaimResult| {
+        let row = |result: &crate::run::score::ClaimResult| {
             let overall = &result.overall;
             let difference = overall.value.map_or("-".to_owned(), |value| format!("{value:+.3}"));
             let interval = overall.interval.map_or(String::new(), |i| format!("\n[{:+.3} {:+.3}]", i.low, i.high));

@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-use crate::criterion::Criterion;
-use crate::readable;
-use crate::score::{
+use crate::model::criterion::Criterion;
+use crate::run::score::{
     CategoryScores, ClaimResult, ClaimRow, Interval, ScoreTable, f1, published_failures, published_lvd_f1,
 };
+use crate::support::readable;
 
 /// Columns of a terminal that every table fits in.
 pub(crate) const WIDTH: usize = 120;
@@ -128,11 +128,11 @@ pub fn claims(results: &[ClaimResult]) -> String {
         let count = |verdict| result.rows.iter().filter(|r: &&ClaimRow| r.verdict == verdict).count();
         let mut verdicts = Vec::new();
         for verdict in [
-            crate::score::ClaimVerdict::Holds,
-            crate::score::ClaimVerdict::Contradicted,
-            crate::score::ClaimVerdict::Undecided,
-            crate::score::ClaimVerdict::TooFew,
-            crate::score::ClaimVerdict::NotRun,
+            crate::run::score::ClaimVerdict::Holds,
+            crate::run::score::ClaimVerdict::Contradicted,
+            crate::run::score::ClaimVerdict::Undecided,
+            crate::run::score::ClaimVerdict::TooFew,
+            crate::run::score::ClaimVerdict::NotRun,
         ] {
             let n = count(verdict);
             if n > 0 {

@@ -11,7 +11,7 @@ use super::drawing::{
     self, FONTS, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, rect, text,
 };
 use super::trace_panels::{Curve, Level, Owner, Panel, PanelMark, Reach, Shown};
-use crate::sweep::{Mark, Trace};
+use crate::engine::{Mark, Trace};
 
 /// One lane on the sheet.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 
 use super::axis::plain_end;
 use super::trace_figure::TraceSeries;
-use crate::sweep::{Mark, Trace, TracedStep, TracedVehicle};
+use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
 
 /// Half the width of the lane that is drawn, m: that of the paper's cut-ins and cut-outs, which start or end 3.5 m off.
 const HALF_LANE_M: f64 = 1.75;

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use crate::Result;
-use crate::sweep::{Mark, Trace, TracedStep, TracedVehicle};
-use crate::table::quoted;
+use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
+use crate::support::table::quoted;
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
 const COLUMNS: [&str; 11] =

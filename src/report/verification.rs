@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use super::tables::{aligned, table};
-use crate::criterion::Criterion;
-use crate::readable::{count, value};
-use crate::sweep::{Outcome, words};
-use crate::verify::{Comparison, WORDS};
+use crate::engine::verify::{Comparison, WORDS};
+use crate::engine::{Outcome, words};
+use crate::model::criterion::Criterion;
+use crate::support::readable::{count, value};
 
 /// One set of lanes: per category and model what was compared, and what differs.
 pub fn comparison(comparison: &Comparison) -> String {

@@ -1,7 +1,7 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, in a row of a table.
 
 use super::{Category, LATERAL_DISTANCE_M, PlainCase};
-use crate::plausibility::{Doubts, HELP, Quantity};
+use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::{Error, Place, Result};
 
 /// What was given; speeds in m/s, lengths in m, accelerations in m/s². The names are the flags of `simulate`.

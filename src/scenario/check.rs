@@ -1,8 +1,8 @@
 //! What no type says of a scenario: lengths, signs, what a category needs, and what is plausible on a road.
 
 use super::{Category, Other, Scenario};
-use crate::error::{Error, Place, Result};
-use crate::plausibility::{Doubts, HELP, Quantity};
+use crate::support::error::{Error, Place, Result};
+use crate::support::plausibility::{Doubts, HELP, Quantity};
 
 /// What could not be read again: JSON has no NaN, for instance, and it would be written as null. A recording may hold
 /// speeds and accelerations that no scenario has.

@@ -6,8 +6,8 @@ use super::check::check_written;
 use super::found::ScenarioFile;
 use super::{Scenario, jsonl, table_reader, table_writer};
 use crate::Result;
-use crate::plausibility::Implausible;
-use crate::table::TableFormat;
+use crate::support::plausibility::Implausible;
+use crate::support::table::TableFormat;
 
 /// Formats that scenarios are written in, the one for names without an ending first.
 const WRITTEN: [TableFormat; 2] = [TableFormat::JsonLines, TableFormat::Parquet];

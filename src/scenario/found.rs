@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::Scenario;
 use super::check::{Problem, admit};
-use crate::error::{Error, Place, Result};
-use crate::plausibility::{Doubts, Implausible};
+use crate::support::error::{Error, Place, Result};
+use crate::support::plausibility::{Doubts, Implausible};
 
 /// One scenario in so many may be left out; where more cannot be used, the file is not what it is taken for.
 const ONE_IN: u64 = 10;

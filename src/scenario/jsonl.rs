@@ -13,10 +13,10 @@ use super::Scenario;
 use super::check::{check_written, name};
 use super::found::{Found, ScenarioFile};
 use super::schema::wrong_field;
-use crate::atomic_file::AtomicFile;
-use crate::error::{Error, Place, Result};
-use crate::input_file;
-use crate::plausibility::Implausible;
+use crate::support::atomic_file::AtomicFile;
+use crate::support::error::{Error, Place, Result};
+use crate::support::input_file;
+use crate::support::plausibility::Implausible;
 
 /// Reads a scenario file. A byte-order mark, Windows line ends and empty lines are accepted.
 pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {

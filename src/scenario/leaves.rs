@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::Category;
 use super::schema::{Content, FIELDS, Field, Presence};
-use crate::table::{Column, Kind, Named};
+use crate::support::table::{Column, Kind, Named};
 
 /// A field that is no record.
 pub(super) struct Leaf {

@@ -1,10 +1,9 @@
 //! Scenarios: what was found in a recording ([`Scenario`]) and what is simulated ([`Case`]).
 //!
 //! Here live the mined scenario, its files and tables, and the concrete case with its motions. Here lives
-//! nothing about how scenarios are found or parameterized. Data comes from [`crate::mining`] or from a
-//! scenario file and goes to [`crate::parameterization`].
+//! nothing about how scenarios are found or parameterized. Data comes from [`crate::traffic::mining`] or from a
+//! scenario file and goes to [`crate::scenario::parameterization`].
 
-mod case;
 mod case_parameters;
 mod check;
 mod file;
@@ -12,22 +11,21 @@ mod found;
 mod jsonl;
 mod leaves;
 mod mined;
-mod motion;
 mod parameter_table;
-mod plain_case;
+pub mod parameterization;
 mod schema;
 mod table_reader;
 mod table_writer;
 
-pub use case::{Ahead, Case, Participant};
+pub use crate::model::case::{Ahead, Case, Category, Participant};
+pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
+pub use crate::model::plain_case::{LATERAL_DISTANCE_M, PlainCase};
 pub use case_parameters::CaseParameters;
 pub(crate) use case_parameters::{at_least, needed};
 pub(crate) use check::problem_of;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios};
 pub use found::ScenarioFile;
 pub use jsonl::write_scenarios_to;
-pub use mined::{Category, Ego, Other, Scenario, Side};
-pub use motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
+pub use mined::{Ego, Other, Scenario, Side};
 pub(crate) use parameter_table::ParameterRows;
-pub use plain_case::{LATERAL_DISTANCE_M, PlainCase};
 pub use table_writer::scenario_columns;

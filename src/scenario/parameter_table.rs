@@ -9,9 +9,9 @@ use super::found::{Found, ScenarioFile};
 use super::leaves::number;
 use super::table_reader::{Chosen, HELP, choose};
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
-use crate::error::{Error, Place, Result};
-use crate::plausibility::{Doubts, Implausible};
-use crate::table::{Named, Row, TableReader};
+use crate::support::error::{Error, Place, Result};
+use crate::support::plausibility::{Doubts, Implausible};
+use crate::support::table::{Named, Row, TableReader};
 
 /// Columns and their units.
 const COLUMNS: [(&str, &str); 17] = [

@@ -10,9 +10,9 @@ use super::found::{Found, ScenarioFile};
 use super::leaves::{Leaf, leaves, names};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
-use crate::error::{Error, Place, Result};
-use crate::plausibility::Implausible;
-use crate::table::{Named, Resolved, Row, TableFormat, TableReader, nearest, resolve};
+use crate::support::error::{Error, Place, Result};
+use crate::support::plausibility::Implausible;
+use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, nearest, resolve};
 
 /// Where the columns are told.
 pub(super) const HELP: &str = "the columns are told in the chapter on tables (docs/src/tables.md)";

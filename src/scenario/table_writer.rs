@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::Scenario;
 use super::leaves::{Leaf, leaves};
-use crate::table::{Cell, Column, Kind, TableFacts, TableFormat, TableWriter};
+use crate::support::table::{Cell, Column, Kind, TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
 /// The columns of a table of scenarios.

@@ -4,7 +4,7 @@
 
 use std::io::Write;
 
-use lanesweep::gpu::{Adapters, Api, DeviceKind};
+use lanesweep::engine::gpu::{Adapters, Api, DeviceKind};
 
 /// The devices of this machine and the index of its software Vulkan (Mesa's llvmpipe: on Debian, libvulkan1 and
 /// mesa-vulkan-drivers); where there is none, says so loudly and gives `None`: the test returns. With the

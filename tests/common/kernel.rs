@@ -1,6 +1,6 @@
 //! A WGSL kernel of a test on the software Vulkan: buffers of words in, one buffer of words out.
 
-use lanesweep::gpu::{Checks, exact_spirv, shader::ENTRY};
+use lanesweep::engine::gpu::{Checks, exact_spirv, shader::ENTRY};
 
 use crate::device::software_device;
 

@@ -1,12 +1,13 @@
 //! Lanes to compare backends with: profiles in which every option takes every form, and plans.
 #![allow(dead_code)] // every test binary uses its own part
 
-use lanesweep::criterion::{BtnContact, BtnForm, LateralGate};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::profile::{CutOutJudged, CutOutTarget, Profile};
-use lanesweep::sweep::{LanePlan, StudyOptions, plan_study};
-use lanesweep::trajectory::generator::GeneratorOptions;
-use lanesweep::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+use lanesweep::engine::LanePlan;
+use lanesweep::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
+use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
+use lanesweep::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 /// Every form of every option that decides how a lane runs, and other time steps and caps.
 pub fn forms() -> Vec<Profile> {

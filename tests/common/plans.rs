@@ -1,11 +1,11 @@
 //! Plans and chunks without physics: every verdict is chosen by the test.
 #![allow(dead_code)]
 
-use lanesweep::criterion::{Contact, Criterion};
-use lanesweep::driver::ModelId;
-use lanesweep::profile::Profile;
+use lanesweep::engine::{Block, CaseSource, Chunk, EndReason, Headway, LaneCase, LanePlan, NO_STEP, Outcome, Verdicts};
+use lanesweep::model::criterion::{Contact, Criterion};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
 use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
-use lanesweep::sweep::{Block, CaseSource, Chunk, EndReason, Headway, LaneCase, LanePlan, NO_STEP, Outcome, Verdicts};
 
 struct OneCase(LaneCase<f64>, Tables<f64>);
 

@@ -1,8 +1,8 @@
 //! Problems of structural reliability whose probabilities are known, and a kernel density estimate for tests.
 
 use lanesweep::Result;
-use lanesweep::density::Mixture;
-use lanesweep::estimate::LimitState;
+use lanesweep::stats::density::Mixture;
+use lanesweep::stats::estimate::LimitState;
 
 /// Φ(−β).
 pub fn tail(beta: f64) -> f64 {

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::Result;
-use lanesweep::trajectory::highd::{self, HighdFiles, Loaded, RecordingInfo};
-use lanesweep::trajectory::{Carriageway, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles, Loaded, RecordingInfo};
+use lanesweep::traffic::trajectory::{Carriageway, Recording, Track, VehicleClass};
 
 /// A vehicle at constant speed in the middle of a lane, at 25 samples per second.
 pub fn cruising(

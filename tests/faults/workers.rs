@@ -6,10 +6,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
-use lanesweep::parts::{Journal, Ledger};
-use lanesweep::profile::Profile;
-use lanesweep::sweep::{Backend, Chunk, CpuBackend, LanePlan, Partial, Session, SweepOptions, Wanted, sweep};
-use lanesweep::verify::{RandomOptions, random_plan};
+use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Partial, Session, SweepOptions, Wanted, sweep};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::{Journal, Ledger};
 use lanesweep::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Figures of the traffic in recordings, by definitions of their own: the miner is not used here.
 
-use lanesweep::trajectory::{Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Recording, Track, VehicleClass};
 
 /// Lateral speed above which a vehicle is seen to change lane, m/s.
 const CHANGING_MPS: f64 = 0.1;

@@ -2,22 +2,23 @@
 
 use std::path::Path;
 
-use lanesweep::conformance::{Table, TableKind, compare_functions, compare_jrc, compare_lanes};
-use lanesweep::criterion::Criterion;
-use lanesweep::density::{DensityModel, Exposure, ExposureFile, read_density};
-use lanesweep::driver::ModelId;
-use lanesweep::mining::{MiningOptions, mine, mine_folder};
-use lanesweep::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
-use lanesweep::parameterization::ParameterizationOptions;
-use lanesweep::parts::{Countable, Journal, Ledger, read_part, read_sealed_line, seal};
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, Wanted};
+use lanesweep::interop::conformance::{Table, TableKind, compare_functions, compare_jrc, compare_lanes};
+use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::{Countable, Journal, Ledger, read_part, read_sealed_line, seal};
+use lanesweep::run::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, WeightedTally, plan_samples,
     read_proposal,
 };
+use lanesweep::run::score::ScoreOptions;
+use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
-use lanesweep::score::ScoreOptions;
-use lanesweep::sweep::{Backend, CpuBackend, Headway, LanePlan, Partial, StudyHead, StudyOptions, Wanted, plan_study};
+use lanesweep::stats::density::{DensityModel, Exposure, ExposureFile, read_density};
+use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::{Error, Place, Result};
 use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
@@ -172,7 +173,7 @@ fn parameterization(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()
 /// The plan of a few samples.
 pub fn small_plan(
     density: &DensityModel,
-    proposal: &lanesweep::density::Mixture,
+    proposal: &lanesweep::stats::density::Mixture,
     profile: &Profile,
 ) -> Result<LanePlan> {
     let options = SamplePlanOptions {

@@ -2,19 +2,20 @@
 
 use std::path::Path;
 
-use lanesweep::density::{DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
-use lanesweep::driver::ModelId;
-use lanesweep::estimate::{BlockSums, WeightSums};
-use lanesweep::mining::{MiningOptions, mine_generated};
-use lanesweep::parameterization::{ParameterizationId, ParameterizationOptions};
-use lanesweep::parts::{Journal, Part, seal, write_part};
-use lanesweep::profile::Profile;
-use lanesweep::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
+use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::{Journal, Part, seal, write_part};
+use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
+use lanesweep::run::score::ScoreOptions;
+use lanesweep::run::study::{StudyOptions, outline_study};
+use lanesweep::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
-use lanesweep::score::ScoreOptions;
-use lanesweep::sweep::{Backend, CpuBackend, LanePlan, Partial, StudyOptions, Wanted, outline_study};
-use lanesweep::trajectory::Recording;
-use lanesweep::trajectory::generator::GeneratorOptions;
+use lanesweep::stats::density::{DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use lanesweep::stats::estimate::{BlockSums, WeightSums};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::Recording;
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 use super::plans;
 use super::readers::{CRITERION, PART_UNITS, WEIGHTED_UNITS, small_plan};
@@ -170,7 +171,7 @@ impl Seeds {
             segments: vec![WeightedTally { sums }],
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
-        let lane = |lane: u64| (lanesweep::sweep::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
+        let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
         let partial = Partial::from_chunk_keeping(&study, &plans::chunk(&study, 1..3, &lane, true), 20).unwrap();
         let driven = Driven { hours: Some(1.5), kilometres: Some(90.0) };
         let exposure =

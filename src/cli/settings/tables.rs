@@ -1,0 +1,260 @@
+//! The tables of a configuration.
+
+use clap::ValueEnum;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+use crate::engine::gpu::BackendChoice;
+use crate::model::criterion::Criterion;
+use crate::run::score::ScoreOptions;
+use crate::scenario::parameterization::ParameterizationOptions;
+use crate::traffic::mining::MiningOptions;
+use crate::traffic::trajectory::generator::GeneratorOptions;
+
+/// Everything that may be set.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(title = "lanesweep configuration")]
+pub struct Settings {
+    /// What every verb shares: threads, what computes, profile.
+    pub run: RunSettings,
+    /// The synthetic recordings that verbs run on without data.
+    pub generator: GeneratorOptions,
+    /// Mining: what counts as a cut-in, a cut-out, a leader deceleration, and which are kept.
+    pub mining: MiningOptions,
+    /// Options of the parameterizations.
+    pub parameterization: ParameterizationOptions,
+    /// Scores of a study and their bootstrap.
+    pub score: ScoreOptions,
+    /// `lanesweep fit`.
+    pub fit: FitSettings,
+    /// `lanesweep sample`.
+    pub sample: SampleSettings,
+    /// `lanesweep compare`.
+    pub compare: CompareSettings,
+}
+
+impl Settings {
+    /// Checks what goes beyond single keys.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] naming the key.
+    pub fn validate(&self) -> Result<()> {
+        self.generator.validate()?;
+        self.mining.validate()?;
+        self.parameterization.validate()?;
+        self.score.validate()
+    }
+}
+
+/// What every verb shares.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunSettings {
+    /// Threads; results do not depend on it. Without it: all cores.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 4096))]
+    pub threads: Option<usize>,
+    /// What computes the lanes.
+    pub backend: BackendChoice,
+    /// Device: a part of its name, pci:BUS or its index in `lanesweep devices`. Without it: the first GPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
+    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file. `map --preset jrc` takes jrc-2021 unless it is set.
+    pub profile: String,
+    /// Time step, s. Without it: the profile's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
+    pub dt_s: Option<f64>,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        RunSettings {
+            threads: None,
+            backend: BackendChoice::Auto,
+            device: None,
+            profile: "paper".to_owned(),
+            dt_s: None,
+        }
+    }
+}
+
+/// `lanesweep fit`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FitSettings {
+    /// Interval that the bandwidth is searched in.
+    pub bandwidth_rule: BandwidthInterval,
+    /// Seed of P_valid and of the splits for M.
+    pub seed: u64,
+    /// Draws that P_valid is counted on; 10^9 tell it to 0.01 % where it is 0.1.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
+    pub valid_draws: u64,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        let options = crate::stats::density::FitOptions::default();
+        FitSettings {
+            bandwidth_rule: BandwidthInterval::default(),
+            seed: options.seed,
+            valid_draws: options.valid_draws,
+        }
+    }
+}
+
+/// Interval that a bandwidth is searched in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum BandwidthInterval {
+    /// From 0.2 times Silverman's to Silverman's, as with the reduction of scenarios
+    #[default]
+    Reduction,
+    /// From 0.2 to 5 times Silverman's, up to 1 at least
+    Wide,
+}
+
+/// `lanesweep sample`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SampleSettings {
+    /// Estimator.
+    pub estimator: Estimator,
+    /// Samples at most; of ce: of the final sample; of subset: per level. Without it: 100000, of subset 2000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1))]
+    pub samples: Option<u64>,
+    /// Criterion of the adaptive estimators, of the worst lanes, the map and the stop rule.
+    pub criterion: Criterion,
+    /// Kind of points of mc.
+    pub points: PointKind,
+    /// Kind of interval of mc.
+    pub interval: IntervalKind,
+    /// Level of the intervals.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub level: f64,
+    /// End once the interval's half-width over the estimate is at most this. Without it: all samples are drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub until: Option<f64>,
+    /// End at the first look after so many seconds, s: not reproducible. Without it: no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
+    pub time_limit_s: Option<f64>,
+    /// Worst lanes to list per model; 0 runs faster.
+    pub worst: usize,
+    /// Runs of the pilot of is.
+    #[schemars(range(min = 500, max = 10_000_000))]
+    pub pilot: u64,
+    /// Share of the pilot's worst points that the proposal of is is fitted to.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub worst_share: f64,
+    /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form.
+    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub broad: f64,
+    /// Share of the density in the proposals of is and ce; 0 is the published form.
+    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub defence: f64,
+    /// Replicates over resampled scenarios (mc); 0: none.
+    #[schemars(range(max = 1_048_576))]
+    pub bootstrap: u32,
+    /// Samples of each replicate.
+    #[schemars(range(min = 100, max = 1_099_511_627_776_u64))]
+    pub bootstrap_samples: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+impl Default for SampleSettings {
+    fn default() -> Self {
+        SampleSettings {
+            estimator: Estimator::Mc,
+            samples: None,
+            criterion: Criterion::Collision,
+            points: PointKind::Random,
+            interval: IntervalKind::Wilson,
+            level: 0.95,
+            until: None,
+            time_limit_s: None,
+            worst: 20,
+            pilot: 10_000,
+            worst_share: 0.02,
+            broad: 0.2,
+            defence: 0.1,
+            bootstrap: 0,
+            bootstrap_samples: 10_000,
+            seed: 157,
+        }
+    }
+}
+
+/// Estimator of a probability of failure.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    #[default]
+    #[allow(missing_docs)]
+    Mc,
+    #[allow(missing_docs)]
+    Is,
+    #[allow(missing_docs)]
+    Ce,
+    #[allow(missing_docs)]
+    Subset,
+}
+
+impl Estimator {
+    /// As flags and files name it.
+    pub fn key(self) -> &'static str {
+        match self {
+            Estimator::Mc => "mc",
+            Estimator::Is => "is",
+            Estimator::Ce => "ce",
+            Estimator::Subset => "subset",
+        }
+    }
+}
+
+/// Points of crude Monte Carlo.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointKind {
+    /// Independent draws
+    #[default]
+    Random,
+    /// Owen-scrambled Sobol points
+    Sobol,
+}
+
+/// Interval of crude Monte Carlo.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalKind {
+    #[default]
+    #[allow(missing_docs)]
+    Wilson,
+    #[allow(missing_docs)]
+    ClopperPearson,
+}
+
+/// `lanesweep compare`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CompareSettings {
+    /// Samples of each density; every sample runs from every headway.
+    #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
+    pub samples: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+    /// Rates agree where the interval of their ratio lies from 1/margin to margin (1.25).
+    #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
+    pub margin: f64,
+}
+
+impl Default for CompareSettings {
+    fn default() -> Self {
+        CompareSettings { samples: 20_000, seed: 157, margin: crate::stats::estimate::Enough::default().margin }
+    }
+}

@@ -1,0 +1,276 @@
+//! The CPU backend: parts of the units are tasks of the rayon pool. f32 computes the lane arithmetic that all
+//! backends share, in batches on the widest instructions of the machine; f64 is the reference, lane by lane.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::engine::backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+use crate::engine::cpu::instructions::Instructions;
+use crate::engine::cpu::runner::LaneRunner;
+use crate::engine::cpu::series::most_entries;
+use crate::engine::outcome::{Outcome, Verdicts};
+use crate::engine::plan::LanePlan;
+use crate::model::scalar::Real;
+use crate::scenario::Category;
+
+/// Lanes per model from which on a task keeps its batches full nearly all the time.
+const FULL_TASK: u64 = 8192;
+/// Lanes per model below which tasks are not cut for the sake of more of them.
+const SMALL_TASK: u64 = 2048;
+/// Tasks that every thread should have, so that none is left waiting for long.
+const TASKS_PER_THREAD: u64 = 4;
+/// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
+const TASK_ENTRIES: u64 = 1 << 24;
+
+/// Steps per thread of the lanes of a chunk, should each make every step: about two seconds in batches, one or two as
+/// single lanes, up to five where their criterion iterates.
+const CHUNK_STEPS: u64 = 1 << 29;
+const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
+/// Lanes of a chunk at most.
+const CHUNK_LANES: u64 = 1 << 17;
+
+/// Lanes, of so many steps at most, that all threads together compute in batches within seconds; at least one.
+pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
+    lanes_of_steps(CHUNK_STEPS, step_cap)
+}
+
+fn lanes_of_steps(steps_per_thread: u64, step_cap: u32) -> u64 {
+    let threads = rayon::current_num_threads() as u64;
+    (steps_per_thread.saturating_mul(threads) / u64::from(step_cap.max(1))).clamp(1, CHUNK_LANES)
+}
+
+/// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
+#[derive(Debug)]
+pub struct CpuBackend<R> {
+    instructions: Instructions,
+    every_step: bool,
+    arithmetic: PhantomData<R>,
+}
+
+impl CpuBackend<f32> {
+    /// The lane arithmetic: binary32, on the best instructions of the machine.
+    pub fn lane_arithmetic() -> Self {
+        CpuBackend { instructions: Instructions::best(), every_step: false, arithmetic: PhantomData }
+    }
+
+    /// The lane arithmetic lane by lane: what every other backend is compared with.
+    pub fn scalar() -> Self {
+        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
+    }
+
+    /// The lane arithmetic on chosen instructions.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) where this machine does not have them.
+    pub fn with_instructions(instructions: Instructions) -> Result<Self> {
+        Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
+    }
+
+    /// The same, but it makes every step of every lane as a whole, with all its vehicles; without it, where only verdicts
+    /// are wanted, batches leave out what can change none. The verdicts are the same. For benchmarks and tests.
+    pub fn every_step(self) -> Self {
+        CpuBackend { every_step: true, ..self }
+    }
+}
+
+impl CpuBackend<f64> {
+    /// The reference: binary64, same source, lane by lane.
+    pub fn reference() -> Self {
+        CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
+    }
+}
+
+impl<R: Real> CpuBackend<R> {
+    fn description(&self) -> String {
+        let bits = 8 * std::mem::size_of::<R>();
+        let threads = rayon::current_num_threads();
+        let s = if threads == 1 { "" } else { "s" };
+        format!("CPU, {threads} thread{s}, {} binary{bits}", self.instructions)
+    }
+}
+
+impl Backend for CpuBackend<f32> {
+    /// Steps are left out for verdicts alone.
+    fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
+        let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
+        if wanted == Wanted::Verdicts && !makes_every_step { RecheckBy::Batches } else { RecheckBy::Nothing }
+    }
+
+    fn describe(&self) -> String {
+        self.description()
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        let (runner, instructions) = (LaneRunner::<f32>::new(plan).every_step(self.every_step), self.instructions);
+        if instructions == Instructions::Scalar {
+            return Ok(Box::new(lane_by_lane(plan, runner)));
+        }
+        let in_batches = runner.runs_in_batches(instructions);
+        let run = InBatches { runner, instructions };
+        Ok(Box::new(CpuSession { plan, run, in_batches, arithmetic: PhantomData }))
+    }
+}
+
+impl Backend for CpuBackend<f64> {
+    fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
+        RecheckBy::Nothing
+    }
+
+    fn describe(&self) -> String {
+        self.description()
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        Ok(Box::new(lane_by_lane(plan, LaneRunner::<f64>::new(plan))))
+    }
+}
+
+/// A session that runs scalar lanes.
+fn lane_by_lane<'p, R: Real>(plan: &'p LanePlan, runner: LaneRunner<'p, R>) -> CpuSession<'p, LaneRunner<'p, R>, R> {
+    CpuSession { plan, run: runner, in_batches: false, arithmetic: PhantomData }
+}
+
+/// Runs the lanes of some units of a block.
+trait RunUnits<R>: Sync {
+    /// Gives each outcome with its position, counted from the first unit on.
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
+
+    /// Verdicts alone.
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
+}
+
+/// Lanes in batches.
+struct InBatches<'p> {
+    runner: LaneRunner<'p, f32>,
+    instructions: Instructions,
+}
+
+impl RunUnits<f32> for InBatches<'_> {
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<f32>)) {
+        self.runner.run_units(self.instructions, block, units, each);
+    }
+
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+        self.runner.run_units(self.instructions, block, units, |at, verdict| verdicts[at] = verdict);
+    }
+}
+
+/// Scalar lanes.
+impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
+    fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)) {
+        let per_unit = self.plan().lanes_per_unit(&self.plan().blocks[block]) as usize;
+        for (k, unit) in units.enumerate() {
+            self.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
+        }
+    }
+
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+        self.outcomes(block, units, &mut |at, outcome| verdicts[at] = outcome.verdicts);
+    }
+}
+
+struct CpuSession<'p, F, R> {
+    plan: &'p LanePlan,
+    run: F,
+    /// Tasks want many lanes.
+    in_batches: bool,
+    arithmetic: PhantomData<fn(R)>,
+}
+
+impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
+    /// Units per task: enough lanes to fill batches, but some tasks for every thread where there are more.
+    fn task_units(&self, block: usize, units: u64) -> u64 {
+        if !self.in_batches {
+            return 1;
+        }
+        let block = &self.plan.blocks[block];
+        let variants = block.variants.len().max(1) as u64;
+        let per_unit_and_model = variants * self.plan.headways.len().max(1) as u64;
+        let threads = rayon::current_num_threads() as u64;
+        let vehicles = if block.category == Category::CutOut { 2 } else { 1 };
+        let entries = variants * vehicles * most_entries(self.plan.profile.step_cap());
+        let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_ENTRIES / entries).max(1);
+        let least = SMALL_TASK.div_ceil(per_unit_and_model).min(most);
+        units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)
+    }
+
+    /// Units of a task, counted within the block.
+    fn task(inside: &Range<u64>, task_units: u64, k: usize) -> Range<u64> {
+        let from = inside.start + k as u64 * task_units;
+        from..inside.end.min(from + task_units)
+    }
+}
+
+impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
+    fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
+        let steps = if self.in_batches { CHUNK_STEPS } else { CHUNK_STEPS_OF_SINGLE_LANES };
+        lanes_of_steps(steps, self.plan.profile.step_cap())
+    }
+
+    fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        let plan = self.plan;
+        let run = &self.run;
+        let first_lane = plan.first_lane_of(units.start);
+        let mut verdicts = Vec::new();
+        let mut outcomes = Vec::new();
+        let mut counts = Vec::new();
+        for (block, inside) in plan.segments(units.clone()) {
+            let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
+            let count = (inside.end - inside.start) as usize;
+            let task_units = self.task_units(block, count as u64);
+            let task = |k: usize| Self::task(&inside, task_units, k);
+            let task_lanes = task_units as usize * per_unit;
+            let from = verdicts.len();
+            if wanted != Wanted::Counts {
+                verdicts.resize(from + count * per_unit, Verdicts::default());
+            }
+            match wanted {
+                Wanted::Verdicts => {
+                    verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
+                        run.verdicts(block, task(k), lanes);
+                    });
+                }
+                Wanted::Outcomes => {
+                    outcomes.resize(from + count * per_unit, Outcome::NONE);
+                    let tasks =
+                        outcomes[from..].par_chunks_mut(task_lanes).zip(verdicts[from..].par_chunks_mut(task_lanes));
+                    tasks.enumerate().for_each(|(k, (lanes, verdicts))| {
+                        run.outcomes(block, task(k), &mut |at, outcome| {
+                            lanes[at] = outcome.widen();
+                            verdicts[at] = outcome.verdicts;
+                        });
+                    });
+                }
+                Wanted::Counts => {
+                    counts.resize(plan.cell_count(), CellCounts::EMPTY);
+                    let cells = plan.blocks[block].variants.len() * plan.models.len();
+                    let empty = || vec![CellCounts::EMPTY; cells];
+                    let lanes_per_variant = plan.headways.len() * plan.models.len();
+                    let tasks = count.div_ceil(task_units as usize);
+                    let of_tasks = (0..tasks).into_par_iter().fold(empty, |mut cells, k| {
+                        run.outcomes(block, task(k), &mut |at, outcome| {
+                            let inside = at % per_unit;
+                            let cell = inside / lanes_per_variant * plan.models.len() + inside % plan.models.len();
+                            cells[cell].count(&outcome);
+                        });
+                        cells
+                    });
+                    // Whole numbers and smallest values: the order of the sum does not matter.
+                    let sum = of_tasks.reduce(empty, |mut a, b| {
+                        a.iter_mut().zip(&b).for_each(|(a, b)| a.add(b));
+                        a
+                    });
+                    let first = plan.cell(block, 0, 0);
+                    counts[first..first + cells].iter_mut().zip(&sum).for_each(|(a, b)| a.add(b));
+                }
+            }
+        }
+        if wanted == Wanted::Counts {
+            counts.resize(plan.cell_count(), CellCounts::EMPTY);
+        }
+        Ok(Chunk { units, first_lane, verdicts, outcomes, counts })
+    }
+}

@@ -1,0 +1,355 @@
+//! Many lanes side by side: the step of [`crate::engine::lane_step`] looped over arrays, which a compiler turns into
+//! vector instructions. No second source of any model.
+//!
+//! A burst is [`ROWS`] steps of some batches in turn. One step of a batch needs the step before it, and so does its
+//! next one; the batches need nothing of one another, which keeps the machine busy while results are on their way.
+//! A lane that is over stays as it is until the burst ends; one at ease goes on to its end, which changes no verdict.
+//! Nothing here depends on the instruction set;
+//! [`crate::engine::cpu::simd`] chooses it.
+
+use crate::model::driver::DriverModel;
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+
+use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
+use crate::engine::cpu::fast_forward::calm_steps;
+use crate::engine::cpu::pending::{Lanes, ROOM, Waiting};
+use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::steady_following::ease_steps;
+use crate::engine::cpu::transpose::Window;
+use crate::engine::frame::Simulation;
+use crate::engine::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
+
+/// Batches of a burst.
+pub(in crate::engine) const BATCHES: usize = 3;
+
+/// Steps before a lane is asked again where the answer was no: at least so many. Before calm ones are looked for again,
+/// also a share of those behind.
+const LOOK_AGAIN: u32 = 4 * ROWS as u32;
+const LOOK_AGAIN_SHARE: u32 = 4;
+
+/// Fewer steps at ease are sooner made where the lane is.
+const FEWEST_AT_EASE: u32 = 6 * ROWS as u32;
+
+/// Slots of a batch: one bit each.
+pub(in crate::engine) type Slots = u16;
+
+/// The batches in flight, and the series that their lanes read.
+pub(in crate::engine) struct Fleet<'c> {
+    pub batches: [Batch; BATCHES],
+    entries: &'c [f32],
+}
+
+/// [`LANES`] lanes in flight.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::engine) struct Batch {
+    lanes: LaneArrays<LANES>,
+    /// Where a step that reads the state writes, and the other way round: a vector is never stored in parts.
+    after: StateArrays<LANES>,
+    windows: [[Window; 3]; 2],
+    /// Steps of the first row.
+    from: Words,
+    /// Slots that no lane uses.
+    pub free: Slots,
+    /// Slots whose lane has made its last step in this burst.
+    pub finished: Slots,
+    /// Slots whose lane may have come to calm steps: nothing around it changes any more, nor did its speed.
+    pub calm: Slots,
+    /// Slots whose lane may belong into batches of another kind.
+    pub leaving: Slots,
+    /// Speeds of the egos at the first row, and the gaps before it.
+    speeds: Floats,
+    gaps: Floats,
+}
+
+impl<'c> Fleet<'c> {
+    /// At the beginning of a stream: all slots are free. `vehicles` are those that its batches look at.
+    pub fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
+        let window = |vehicle: usize, quantity: usize| {
+            Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
+        };
+        let windows = vehicles.map(|vehicle| [0, 1, 2].map(|quantity| window(vehicle, quantity)));
+        let lanes = LaneArrays::idle();
+        let batch = Batch {
+            lanes,
+            after: lanes.state,
+            windows,
+            from: [0; LANES],
+            free: !0,
+            finished: 0,
+            calm: 0,
+            leaving: 0,
+            speeds: [0.0; LANES],
+            gaps: [0.0; LANES],
+        };
+        Fleet { batches: [batch; BATCHES], entries }
+    }
+}
+
+impl Batch {
+    /// Which of the stream's lanes stands there.
+    #[inline(always)]
+    pub fn lane(&self, k: usize) -> u32 {
+        self.lanes.fixed.ego.lane[k]
+    }
+
+    /// A lane after its last step, and the other vehicles at that step.
+    #[inline(always)]
+    pub fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [Whereabouts<f32>; 2]) {
+        let state = self.lanes.state.at(k);
+        let row = (state.index - 1 - self.from[k]) as usize;
+        (self.lanes.fixed.at(k), state, places(&self.windows, row, k))
+    }
+
+    /// What is left in a slot that stays free is at no step that holds the others up.
+    #[inline(always)]
+    fn clear_free(&mut self) {
+        let mut left = self.free;
+        while left != 0 {
+            self.lanes.state.moving.index[left.trailing_zeros() as usize] = 0;
+            left &= left - 1;
+        }
+    }
+
+    /// Used slots whose lane is over or has reached the step cap.
+    #[inline(always)]
+    fn find_finished(&mut self, step_cap: u32) {
+        let moving = &self.lanes.state.moving;
+        let ego = &self.lanes.fixed.ego;
+        let (mut finished, mut calm, mut leaving) = (0, 0, 0);
+        for k in 0..LANES {
+            let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
+            finished |= u16::from(is_finished.holds()) << k;
+            let index = moving.index[k];
+            let is_worth_a_look = index > ego.restless_until[k];
+            let is_still = index > ego.still_from[k] && moving.gap[k] == self.gaps[k];
+            calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
+            leaving |= u16::from(index >= ego.leaves_from[k]) << k;
+        }
+        self.finished = finished & !self.free;
+        self.calm = calm & !finished & !self.free;
+        self.leaving = leaving & !finished & !self.free;
+    }
+
+    /// After a burst at ease, which moved only what [`StateArrays::set_at_ease`] says.
+    #[inline(always)]
+    fn end_at_ease(&mut self) {
+        let LaneArrays { fixed, state } = &mut self.lanes;
+        let moving = &mut state.moving;
+        // The state before the last step stands where that step read it.
+        moving.v_before = self.after.moving.v_ego;
+        for k in 0..LANES {
+            let last = moving.index[k] + ROWS as u32 - 1;
+            moving.index[k] = last + 1;
+            // The first such step ended the lane, and no verdict has changed since. At rest it is settled as well:
+            // nobody ahead of a lane at ease drives backwards.
+            let settled = !(moving.v_before[k] - self.windows[0][0].rows[ROWS - 1][k]).is_positive();
+            moving.over[k] = (Flag::reached(last, fixed.ego.horizon[k]) & settled).to_bits();
+        }
+    }
+
+    /// Leaves out calm steps of a lane where it pays, else looks again later.
+    pub fn leave_out_calm<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
+        let (constants, state, places) = self.last_step(k);
+        let LaneArrays { fixed, state: arrays } = &mut self.lanes;
+        let restless_until = &mut fixed.ego.restless_until[k];
+        match calm_steps(simulation, &constants, &state, &places) {
+            Some(calm) => {
+                arrays.moving.index[k] += calm.steps;
+                arrays.moving.gap[k] = calm.gaps[0];
+                arrays.ahead.gap[k] = calm.gaps[1];
+                *restless_until = arrays.moving.index[k];
+            }
+            None => {
+                // One that stood still was looked at for that, and may be due later for the other reason.
+                if state.index > *restless_until {
+                    *restless_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
+                }
+                fixed.ego.still_from[k] = state.index + LOOK_AGAIN;
+            }
+        }
+    }
+
+    /// Frees the slots whose lanes have finished.
+    pub fn free_finished(&mut self) {
+        self.free |= self.finished;
+    }
+
+    /// Lets the lanes go that go on with the second vehicle alone.
+    pub fn set_apart_alone(&mut self, apart: &mut Waiting) {
+        while self.leaving != 0 && apart.has_room(1) {
+            let k = self.leaving.trailing_zeros() as usize;
+            self.leaving &= self.leaving - 1;
+            apart.add_alone(&self.lanes, k);
+            self.free |= 1 << k;
+        }
+    }
+
+    /// Lets lanes go that are at ease for long enough; the others are asked again later.
+    pub fn set_apart_at_ease<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, apart: &mut Waiting) {
+        while self.leaving != 0 {
+            let k = self.leaving.trailing_zeros() as usize;
+            self.leaving &= self.leaving - 1;
+            if self.lanes.state.moving.index[k] - self.from[k] > ROWS as u32 {
+                // It has been set ahead, to a step that this burst has not seen.
+                continue;
+            }
+            let (constants, state, places) = self.last_step(k);
+            let steps = ease_steps(simulation, &constants, &state, &places[0]);
+            if steps < FEWEST_AT_EASE {
+                self.lanes.fixed.ego.leaves_from[k] = state.index + LOOK_AGAIN;
+            } else if apart.has_room(1) {
+                apart.add_lane(&self.lanes, k, state.index + steps - (ROWS as u32 - 1));
+                self.free |= 1 << k;
+            }
+        }
+    }
+
+    /// Lanes whose steps at ease are used up: those no longer at ease go back.
+    pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Waiting) {
+        let ego = &self.lanes.fixed.ego;
+        let mut used_up = 0;
+        for k in 0..LANES {
+            used_up |= u16::from(self.lanes.state.moving.index[k] >= ego.leaves_from[k]) << k;
+        }
+        used_up &= !self.free;
+        while used_up != 0 {
+            let k = used_up.trailing_zeros() as usize;
+            used_up &= used_up - 1;
+            let (constants, state) = (self.lanes.fixed.at(k), self.lanes.state.at(k));
+            let steps = ease_steps(simulation, &constants, &state, &places(&self.windows, ROWS - 1, k)[0]);
+            if steps < ROWS as u32 {
+                back.add_lane(&self.lanes, k, state.index + LOOK_AGAIN);
+                self.free |= 1 << k;
+            } else {
+                self.lanes.fixed.ego.leaves_from[k] = state.index + steps - (ROWS as u32 - 1);
+            }
+        }
+    }
+}
+
+/// The next steps of all lanes; those that wait take the free slots. An instruction set has its own way to `take`: it
+/// gives slots, in their order, the entries of every row from a place on. And to `turn`: that is [`Window::turn`].
+#[inline(always)]
+pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
+    simulation: &Simulation<f32, M>,
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+    take: impl Fn(&mut [[u32; LANES]], &[[u32; ROOM]], usize, Slots),
+    turn: impl Fn(&mut Window, &TrackArrays<LANES>, &Words, &[f32]),
+) {
+    let rules = Rules::from_bits(RULES);
+    let (frame, criteria) = rules.applied(simulation.frame, simulation.criteria);
+    let model = *simulation.model;
+    let simulation =
+        &Simulation { frame: &frame, criteria: &criteria, model: &model, scene: rules.scene, ..*simulation };
+    let Fleet { batches, entries } = fleet;
+    let mut furthest = [0; LANES];
+    for batch in batches.iter_mut() {
+        let slots = lowest(batch.free, waiting.count());
+        if slots != 0 {
+            let from = waiting.take(slots.count_ones() as usize);
+            let values = !rules.is_verdict_only;
+            let waiting = waiting.lanes().parts(rules.scene.is_pair, values);
+            for (rows, waiting) in batch.lanes.parts_mut(rules.scene.is_pair, values).into_iter().zip(waiting) {
+                take(rows, waiting, from, slots);
+            }
+            batch.free &= !slots;
+        }
+        batch.clear_free();
+        batch.from = batch.lanes.state.moving.index;
+        batch.speeds = batch.lanes.state.moving.v_ego;
+        batch.gaps = batch.lanes.state.moving.gap;
+        for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
+            *furthest = index.max(*furthest);
+        }
+        let at_ease = rules.scene.at_ease;
+        let is_seen = [true, !at_ease, M::SEES_LATERAL_SPEED && !at_ease];
+        let Batch { lanes, windows, from, .. } = batch;
+        for (windows, other) in windows.iter_mut().zip(&lanes.fixed.others).take(1 + usize::from(rules.scene.is_pair)) {
+            for ((window, tracks), is_seen) in windows.iter_mut().zip(&other.tracks).zip(is_seen) {
+                window.moves |= slots != 0 && !window.stands;
+                if is_seen && window.moves {
+                    turn(window, tracks, from, entries);
+                }
+            }
+        }
+    }
+    // No lane steps beyond the cap, so no step asks for it; one at ease is far from it.
+    let left = frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize;
+    let rows = if rules.scene.at_ease { ROWS } else { left.min(ROWS) };
+    for row in 0..rows {
+        for batch in batches.iter_mut() {
+            let Batch { lanes, after, windows, .. } = batch;
+            if row % 2 == 0 {
+                step(simulation, rules, &lanes.fixed, windows, row, &lanes.state, after);
+            } else {
+                step(simulation, rules, &lanes.fixed, windows, row, after, &mut lanes.state);
+            }
+        }
+    }
+    for batch in batches.iter_mut() {
+        if rows % 2 == 1 {
+            batch.lanes.state = batch.after;
+        }
+        if rules.scene.at_ease {
+            batch.end_at_ease();
+        }
+        batch.find_finished(frame.step_cap);
+    }
+}
+
+/// One step of a batch.
+#[inline(always)]
+fn step<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    rules: Rules,
+    fixed: &FixedArrays<LANES>,
+    windows: &[[Window; 3]; 2],
+    row: usize,
+    before: &StateArrays<LANES>,
+    after: &mut StateArrays<LANES>,
+) {
+    for k in 0..LANES {
+        if rules.scene.at_ease {
+            let moved = advance(simulation, &fixed.at(k), &before.at_ease(k), &places(windows, row, k));
+            after.set_at_ease::<M>(k, &moved.state);
+        } else {
+            let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
+            after.set::<M>(k, &moved.state, rules);
+        }
+    }
+}
+
+/// The other vehicles as a lane sees them at a row.
+#[inline(always)]
+fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [Whereabouts<f32>; 2] {
+    let place = |vehicle: usize| {
+        let [speed, position, towards] = &windows[vehicle];
+        Whereabouts { speed: speed.rows[row][k], position: position.rows[row][k], towards: towards.rows[row][k] }
+    };
+    [place(0), place(1)]
+}
+
+/// The largest, found by halves: side by side as long as it pays.
+#[inline(always)]
+fn largest(mut words: Words) -> u32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for k in 0..half {
+            words[k] = words[k].max(words[k + half]);
+        }
+        half /= 2;
+    }
+    words[0]
+}
+
+/// The first so many of these slots.
+#[inline(always)]
+fn lowest(slots: Slots, count: usize) -> Slots {
+    let mut beyond = slots;
+    for _ in 0..count.min(LANES) {
+        beyond &= beyond.wrapping_sub(1);
+    }
+    slots & !beyond
+}

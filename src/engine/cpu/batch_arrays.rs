@@ -1,0 +1,476 @@
+//! Lanes side by side: what [`crate::engine::lane_step`] calls one lane, as arrays over `N` lanes.
+
+// Arrays of words seen as rows of words.
+#![allow(unsafe_code)]
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::model::driver::{DriverModel, DriverState};
+use crate::model::flag::Flag;
+
+use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::series::{Track, VehicleTracks};
+use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
+use crate::engine::outcome::NO_STEP;
+
+/// Lanes of a batch: one AVX-512 register of binary32.
+pub(in crate::engine) const LANES: usize = 16;
+/// Steps of a burst: a square of lanes and rows is turned in registers.
+pub(in crate::engine) const ROWS: usize = 16;
+
+/// Where a lane leaves its batch at no step.
+pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
+
+/// Parts of [`LaneArrays`].
+const PARTS: usize = 6;
+
+/// One number per lane.
+pub(in crate::engine) type Floats = [f32; LANES];
+/// One word per lane.
+pub(in crate::engine) type Words = [u32; LANES];
+
+/// All of `N` lanes but the other vehicles' motions, which lie in series.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(in crate::engine) struct LaneArrays<const N: usize> {
+    pub fixed: FixedArrays<N>,
+    pub state: StateArrays<N>,
+}
+
+/// [`LaneConstants`] as arrays, and where the motions of the other vehicles lie.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(in crate::engine) struct FixedArrays<const N: usize> {
+    pub ego: EgoArrays<N>,
+    pub others: [OtherArrays<N>; 2],
+}
+
+/// What is constant within the lanes and no other vehicle's.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct EgoArrays<const N: usize> {
+    /// Which of the stream's lanes it is.
+    pub lane: [u32; N],
+    width: [f32; N],
+    pub horizon: [u32; N],
+    /// Up to this step it is not worth looking for calm ones.
+    pub restless_until: [u32; N],
+    /// From this step on a lane may stand still: the other vehicles keep speed and lateral position.
+    pub still_from: [u32; N],
+    /// From this step on it may belong into batches of another kind.
+    pub leaves_from: [u32; N],
+}
+
+/// What is constant within the lanes for another vehicle.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct OtherArrays<const N: usize> {
+    half_lengths: [f32; N],
+    half_widths: [f32; N],
+    present_from: [u32; N],
+    present_until: [u32; N],
+    attend_from: [u32; N],
+    judged: [u32; N],
+    /// Its speed, lateral position and lateral speed.
+    pub tracks: [TrackArrays<N>; 3],
+}
+
+/// Where the series of one quantity lie.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct TrackArrays<const N: usize> {
+    /// First entries.
+    pub first: [u32; N],
+    /// Last ones, counted from the first.
+    pub last: [u32; N],
+}
+
+/// [`LaneState`] as arrays.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(in crate::engine) struct StateArrays<const N: usize> {
+    pub moving: MovingArrays<N>,
+    pub ahead: AheadArrays<N>,
+    pub values: ValueArrays<N>,
+}
+
+/// What every step moves.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct MovingArrays<const N: usize> {
+    pub index: [u32; N],
+    pub v_ego: [f32; N],
+    pub v_before: [f32; N],
+    pub gap: [f32; N],
+    deceleration: [f32; N],
+    delay_steps: [u32; N],
+    ttc_failed: [u32; N],
+    btn_failed: [u32; N],
+    pub over: [u32; N],
+}
+
+/// What a step moves where there is a second vehicle.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct AheadArrays<const N: usize> {
+    pub gap: [f32; N],
+}
+
+/// What a step moves where more than verdicts is wanted.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct ValueArrays<const N: usize> {
+    reaction_step: [u32; N],
+    ttc_gap: [f32; N],
+    ttc_closing: [f32; N],
+    btn_numerator: [f32; N],
+    btn_denominator: [f32; N],
+    min_gap: [f32; N],
+}
+
+/// Arrays of `N` words each, which can be handled without their names.
+pub(in crate::engine) trait Rows<const N: usize>: Pod {
+    /// Each of them.
+    fn rows(&self) -> &[[u32; N]] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+
+    /// The same, to be changed.
+    fn rows_mut(&mut self) -> &mut [[u32; N]] {
+        bytemuck::cast_slice_mut(std::slice::from_mut(self))
+    }
+}
+
+macro_rules! made_of_rows {
+    ($($arrays:ident)+) => {
+        $(
+            // SAFETY: arrays of binary32 or 32-bit words, in the order of the source: 0 is one, and every word is.
+            unsafe impl<const N: usize> Zeroable for $arrays<N> {}
+            // SAFETY: the same; all have 4 bytes per entry and their alignment, so nothing lies between them.
+            unsafe impl<const N: usize> Pod for $arrays<N> {}
+            impl<const N: usize> Rows<N> for $arrays<N> {}
+        )+
+    };
+}
+made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays }
+
+impl<const N: usize> LaneArrays<N> {
+    /// No lane anywhere: all are over.
+    pub fn idle() -> Self {
+        let moving = MovingArrays { over: [Flag::TRUE.to_bits(); N], ..Zeroable::zeroed() };
+        let state = StateArrays { moving, ahead: Zeroable::zeroed(), values: Zeroable::zeroed() };
+        LaneArrays { fixed: FixedArrays { ego: Zeroable::zeroed(), others: Zeroable::zeroed() }, state }
+    }
+
+    /// All rows that such a stream needs, part by part.
+    #[inline(always)]
+    pub fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
+        let FixedArrays { ego, others: [principal, second] } = &self.fixed;
+        let StateArrays { moving, ahead, values: gathered } = &self.state;
+        let (second, ahead): (&[_], &[_]) = if is_pair { (second.rows(), ahead.rows()) } else { (&[], &[]) };
+        let gathered: &[_] = if values { gathered.rows() } else { &[] };
+        [ego.rows(), principal.rows(), second, moving.rows(), ahead, gathered]
+    }
+
+    /// The same, to be changed.
+    #[inline(always)]
+    pub fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
+        let FixedArrays { ego, others: [principal, second] } = &mut self.fixed;
+        let StateArrays { moving, ahead, values: gathered } = &mut self.state;
+        let (second, ahead): (&mut [_], &mut [_]) =
+            if is_pair { (second.rows_mut(), ahead.rows_mut()) } else { (&mut [], &mut []) };
+        let gathered: &mut [_] = if values { gathered.rows_mut() } else { &mut [] };
+        [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered]
+    }
+
+    /// Puts one case into [`LANES`] lanes; `state` may differ between them in its gaps, which
+    /// [`LaneArrays::start`] gives.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        from: usize,
+        constants: &LaneConstants<f32>,
+        tracks: &[VehicleTracks],
+        state: &LaneState<f32>,
+        leaves_from: u32,
+        values: bool,
+    ) {
+        for ((other, constants), tracks) in self.fixed.others.iter_mut().zip(&constants.others).zip(tracks) {
+            fill(&mut other.half_lengths, from, constants.half_lengths);
+            fill(&mut other.half_widths, from, constants.half_widths);
+            fill(&mut other.present_from, from, constants.present_from);
+            fill(&mut other.present_until, from, constants.present_until);
+            fill(&mut other.attend_from, from, constants.attend_from);
+            fill(&mut other.judged, from, constants.judged.to_bits());
+            for (rows, Track { first, last }) in other.tracks.iter_mut().zip(tracks.all()) {
+                fill(&mut rows.first, from, first);
+                fill(&mut rows.last, from, last);
+            }
+        }
+        fill(&mut self.fixed.ego.width, from, constants.ego_width);
+        fill(&mut self.fixed.ego.horizon, from, constants.horizon);
+        let steady_from = steady_from(tracks);
+        fill(&mut self.fixed.ego.restless_until, from, steady_from);
+        fill(&mut self.fixed.ego.still_from, from, steady_from);
+        fill(&mut self.fixed.ego.leaves_from, from, leaves_from);
+        let moving = &mut self.state.moving;
+        fill(&mut moving.index, from, state.index);
+        fill(&mut moving.v_ego, from, state.v_ego);
+        fill(&mut moving.v_before, from, state.v_before);
+        fill(&mut moving.deceleration, from, state.driver.deceleration);
+        fill(&mut moving.delay_steps, from, state.driver.delay_steps);
+        fill(&mut moving.ttc_failed, from, state.record.ttc.failed.to_bits());
+        fill(&mut moving.btn_failed, from, state.record.btn.failed.to_bits());
+        fill(&mut moving.over, from, state.over.to_bits());
+        if values {
+            let values = &mut self.state.values;
+            fill(&mut values.reaction_step, from, state.reaction_step);
+            fill(&mut values.ttc_gap, from, state.record.ttc.gap);
+            fill(&mut values.ttc_closing, from, state.record.ttc.closing);
+            fill(&mut values.btn_numerator, from, state.record.btn.numerator);
+            fill(&mut values.btn_denominator, from, state.record.btn.denominator);
+            fill(&mut values.min_gap, from, state.record.min_gap);
+        }
+    }
+
+    /// Puts one of these lanes into place `to`, as it goes on with one of its vehicles alone; where only verdicts are
+    /// wanted.
+    #[inline]
+    pub fn set_single(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
+        let (fixed, state) = (&lanes.fixed, &lanes.state);
+        copy(self.fixed.ego.rows_mut(), to, fixed.ego.rows(), k);
+        copy(self.fixed.others[0].rows_mut(), to, fixed.others[vehicle].rows(), k);
+        copy(self.state.moving.rows_mut(), to, state.moving.rows(), k);
+        self.fixed.ego.leaves_from[to] = leaves_from;
+        if vehicle == 1 {
+            self.state.moving.gap[to] = state.ahead.gap[k];
+            let steady_from = lanes.steady_from(k, 1);
+            (self.fixed.ego.restless_until[to], self.fixed.ego.still_from[to]) = (steady_from, steady_from);
+        }
+    }
+
+    /// The step from which on a vehicle keeps speed and lateral position.
+    #[inline]
+    pub fn steady_from(&self, k: usize, vehicle: usize) -> u32 {
+        let [speed, position, towards] = &self.fixed.others[vehicle].tracks;
+        speed.last[k].max(position.last[k]).max(towards.last[k])
+    }
+
+    /// Says which lane of the stream stands here, and how far the other vehicles are from it.
+    #[inline(always)]
+    pub fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
+        self.fixed.ego.lane[k] = lane;
+        self.state.moving.gap[k] = gaps[0];
+        self.state.ahead.gap[k] = gaps[1];
+    }
+}
+
+impl<const N: usize> FixedArrays<N> {
+    /// The constants of a lane.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> LaneConstants<f32> {
+        let other = |vehicle: usize| {
+            let other = &self.others[vehicle];
+            OtherConstants {
+                half_lengths: other.half_lengths[k],
+                half_widths: other.half_widths[k],
+                present_from: other.present_from[k],
+                present_until: other.present_until[k],
+                attend_from: other.attend_from[k],
+                judged: Flag::from_bits(other.judged[k]),
+            }
+        };
+        LaneConstants { others: [other(0), other(1)], ego_width: self.ego.width[k], horizon: self.ego.horizon[k] }
+    }
+}
+
+/// The step from which on these vehicles keep speed and lateral position.
+pub(in crate::engine) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
+    tracks.iter().flat_map(VehicleTracks::all).map(|track| track.last).max().unwrap_or(0)
+}
+
+/// Puts entry `k` of every row into place `to`.
+#[inline(always)]
+fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[Words], k: usize) {
+    for (row, from) in rows.iter_mut().zip(from) {
+        row[to] = from[k];
+    }
+}
+
+/// Writes a value for [`LANES`] lanes.
+#[inline(always)]
+fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
+    row[from..from + LANES].fill(value);
+}
+
+impl<const N: usize> StateArrays<N> {
+    /// Of one lane.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> LaneState<f32> {
+        let StateArrays { moving, ahead, values } = self;
+        LaneState {
+            index: moving.index[k],
+            v_ego: moving.v_ego[k],
+            v_before: moving.v_before[k],
+            gaps: [moving.gap[k], ahead.gap[k]],
+            driver: DriverState { deceleration: moving.deceleration[k], delay_steps: moving.delay_steps[k] },
+            reaction_step: values.reaction_step[k],
+            record: Record {
+                ttc: TtcMinimum {
+                    gap: values.ttc_gap[k],
+                    closing: values.ttc_closing[k],
+                    failed: Flag::from_bits(moving.ttc_failed[k]),
+                },
+                btn: BrakeThreatMaximum {
+                    numerator: values.btn_numerator[k],
+                    denominator: values.btn_denominator[k],
+                    failed: Flag::from_bits(moving.btn_failed[k]),
+                },
+                min_gap: values.min_gap[k],
+            },
+            over: Flag::from_bits(moving.over[k]),
+        }
+    }
+
+    /// Of one lane at ease, as far as its steps look at it: they are not the first, the reaction time is over, and
+    /// nothing is judged.
+    #[inline(always)]
+    pub fn at_ease(&self, k: usize) -> LaneState<f32> {
+        let moving = &self.moving;
+        let record = Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: f32::INFINITY };
+        LaneState {
+            index: 1,
+            v_ego: moving.v_ego[k],
+            v_before: moving.v_ego[k],
+            gaps: [moving.gap[k]; 2],
+            driver: DriverState { deceleration: moving.deceleration[k], delay_steps: 0 },
+            reaction_step: NO_STEP,
+            record,
+            over: Flag::FALSE,
+        }
+    }
+
+    /// What moves in a step at ease.
+    #[inline(always)]
+    pub fn set_at_ease<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
+        self.moving.v_ego[k] = lane.v_ego;
+        self.moving.gap[k] = lane.gaps[0];
+        if M::KEEPS_DECELERATION {
+            self.moving.deceleration[k] = lane.driver.deceleration;
+        }
+    }
+
+    /// What moves in a step of a model under these rules.
+    #[inline(always)]
+    pub fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
+        let StateArrays { moving, ahead, values } = self;
+        moving.index[k] = lane.index;
+        moving.v_ego[k] = lane.v_ego;
+        if M::SEES_OWN_ACCELERATION || !rules.is_verdict_only {
+            moving.v_before[k] = lane.v_before;
+        }
+        moving.gap[k] = lane.gaps[0];
+        if M::KEEPS_DECELERATION {
+            moving.deceleration[k] = lane.driver.deceleration;
+        }
+        moving.delay_steps[k] = lane.driver.delay_steps;
+        moving.ttc_failed[k] = lane.record.ttc.failed.to_bits();
+        moving.btn_failed[k] = lane.record.btn.failed.to_bits();
+        moving.over[k] = lane.over.to_bits();
+        if rules.scene.is_pair {
+            ahead.gap[k] = lane.gaps[1];
+        }
+        if rules.is_verdict_only {
+            return;
+        }
+        values.reaction_step[k] = lane.reaction_step;
+        values.ttc_gap[k] = lane.record.ttc.gap;
+        values.ttc_closing[k] = lane.record.ttc.closing;
+        values.btn_numerator[k] = lane.record.btn.numerator;
+        values.btn_denominator[k] = lane.record.btn.denominator;
+        values.min_gap[k] = lane.record.min_gap;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::driver::Fsm;
+
+    #[test]
+    fn rows_lie_in_the_order_of_their_names() {
+        let mut ego = EgoArrays::<4>::zeroed();
+        ego.horizon[3] = 7;
+        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7], [0; 4], [0; 4], [0; 4]]);
+        let mut moving = MovingArrays::<4>::zeroed();
+        moving.rows_mut().last_mut().unwrap()[1] = 5;
+        assert_eq!(moving.over, [0, 5, 0, 0]);
+    }
+
+    /// What is put into a slot, and what a step gives it, reaches every row, and comes back.
+    #[test]
+    fn no_row_of_a_lane_is_forgotten() {
+        let other = OtherConstants {
+            half_lengths: 1.0,
+            half_widths: 2.0,
+            present_from: 3,
+            present_until: 4,
+            attend_from: 5,
+            judged: Flag::TRUE,
+        };
+        let constants = LaneConstants { others: [other; 2], ego_width: 6.0, horizon: 7 };
+        let track = Track { first: 8, last: 9 };
+        let tracks = [VehicleTracks { speed: track, position: track, towards: track }; 2];
+        let record = Record {
+            ttc: TtcMinimum { gap: 10.0, closing: 11.0, failed: Flag::TRUE },
+            btn: BrakeThreatMaximum { numerator: 12.0, denominator: 13.0, failed: Flag::TRUE },
+            min_gap: 14.0,
+        };
+        let state = LaneState {
+            index: 15,
+            v_ego: 16.0,
+            v_before: 17.0,
+            gaps: [18.0, 19.0],
+            driver: DriverState { deceleration: 20.0, delay_steps: 21 },
+            reaction_step: 22,
+            record,
+            over: Flag::TRUE,
+        };
+        let mut lanes = LaneArrays::<32>::idle();
+        lanes.fill(16, &constants, &tracks, &state, 24, true);
+        lanes.start(31, 23, state.gaps);
+        assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
+        assert_eq!(lanes.state.at(31), state);
+
+        // One that goes on with the second vehicle alone has it first, and its gap.
+        let mut batch = LaneArrays::<LANES>::idle();
+        let second = Track { first: 31, last: 32 };
+        let second = VehicleTracks { speed: second, position: second, towards: second };
+        let ahead = OtherConstants { half_lengths: 33.0, attend_from: 34, ..other };
+        let pair = LaneConstants { others: [other, ahead], ..constants };
+        batch.fill(0, &pair, &[tracks[0], second], &state, 24, false);
+        batch.start(5, 23, state.gaps);
+        let mut waiting = LaneArrays::<32>::idle();
+        waiting.set_single(31, &batch, 5, 1, NEVER_LEAVES);
+        let alone = waiting.fixed.at(31);
+        assert_eq!((alone.others[0].half_lengths, alone.others[0].attend_from, alone.horizon), (33.0, 34, 7));
+        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
+        assert!(waiting.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
+        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
+        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
+
+        // One that goes on with its first vehicle keeps all it has but the step at which it leaves.
+        let mut waiting = LaneArrays::<32>::idle();
+        waiting.set_single(31, &batch, 5, 0, 25);
+        assert_eq!(waiting.fixed.at(31).others[0].half_lengths, 1.0);
+        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, 25));
+        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[0]));
+        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
+
+        let mut after: StateArrays<LANES> = LaneArrays::idle().state;
+        let everything = Rules::from_bits(1);
+        after.set::<Fsm<f32>>(3, &state, everything);
+        assert_eq!(after.at(3), state);
+    }
+}

@@ -1,0 +1,427 @@
+//! Steps in which nothing can happen, which batches do not make where only verdicts are wanted.
+//!
+//! Once the other vehicles have ended their manoeuvres and the ego keeps its speed, a lane often goes on for minutes in
+//! which only the gap changes, each step by the same number, until it is small enough for the driver or a criterion.
+//! Those steps are counted instead of made: [`calm_gap`] is the gap down to which all is well, [`carried`] tells how many
+//! steps the lane stays above it, and where that leaves the gap to the bit.
+//!
+//! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Without a promise go
+//! steps that change no bit of a lane: all that follow change none either.
+
+use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::model::driver::{DriverModel, DriverState};
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+
+use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::frame::Simulation;
+use crate::engine::lane_step::{
+    Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, criteria_safe_gap, judge, see,
+};
+
+/// Fewer steps are sooner made than counted.
+const FEWEST: u32 = 4 * ROWS as u32;
+
+/// Steps without an event, and the gaps after them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::engine) struct Calm {
+    pub steps: u32,
+    pub gaps: [f32; 2],
+}
+
+/// How many of a lane's next steps need not be made, if it pays: neither the driver nor a criterion nor the end of the
+/// lane comes before. `state` is between two steps, at `state.index` at least 1; the other vehicles keep speed and
+/// lateral position of `places` for ever.
+pub(in crate::engine) fn calm_steps<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    state: &LaneState<f32>,
+    places: &[Whereabouts<f32>; 2],
+) -> Option<Calm> {
+    let index = state.index;
+    // A burst is left to be made, so that the lane's end is reached as any other's.
+    let mut most = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
+    let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
+    for other in &lane.others[..vehicles] {
+        if index < other.present_from {
+            return None;
+        }
+        for event in [other.present_until, other.attend_from] {
+            if event > index {
+                most = most.min(event - index);
+            }
+        }
+    }
+    if is_still(simulation, lane, state, places) {
+        let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
+        return (steps >= FEWEST).then_some(Calm { steps, gaps: state.gaps });
+    }
+    // A model that does not see its acceleration has no speed before kept.
+    if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
+        return None;
+    }
+    let mut lowest = [None; 2];
+    let mut settled = true;
+    for vehicle in 0..vehicles {
+        let (other, place) = (&lane.others[vehicle], &places[vehicle]);
+        if index >= other.present_until {
+            continue;
+        }
+        if is_out_of_the_way(simulation, lane, other, place).holds() {
+            continue;
+        }
+        settled &= state.v_ego <= place.speed;
+        lowest[vehicle] = Some(calm_gap(simulation, lane, state, places, vehicle)?);
+    }
+    if settled || state.v_ego <= 0.0 {
+        // The step at the horizon ends the lane.
+        most = most.min(lane.horizon.saturating_sub(index));
+    }
+    let mut gaps = state.gaps;
+    let mut steps = most;
+    for vehicle in 0..vehicles {
+        // Nobody will ever look at one that is out of the way: its gap stays as it is.
+        let Some(lowest) = lowest[vehicle] else { continue };
+        let by = |vehicle: usize| (places[vehicle].speed - state.v_ego) * simulation.frame.dt;
+        if steps < FEWEST || gaps[vehicle] + by(vehicle) * (FEWEST as f32) < lowest {
+            return None;
+        }
+        let most = steps;
+        (steps, gaps[vehicle]) = carried(gaps[vehicle], by(vehicle), most, lowest);
+        if steps < most && vehicle == 1 && gaps[0] != state.gaps[0] {
+            gaps[0] = carried(state.gaps[0], by(0), steps, 0.0).1;
+        }
+    }
+    (steps >= FEWEST).then_some(Calm { steps, gaps })
+}
+
+/// The next step changes nothing: a driver often follows so closely to the speed ahead that what it would brake, and
+/// what the gap would lose, is lost in rounding. Then no step changes anything before an event.
+fn is_still<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    state: &LaneState<f32>,
+    places: &[Whereabouts<f32>; 2],
+) -> bool {
+    // Seldom so: what it is about comes first.
+    let change = (places[0].speed - state.v_ego) * simulation.frame.dt;
+    if state.gaps[0] + change != state.gaps[0] {
+        return false;
+    }
+    // All that a lane has, by name: what is new has to be looked at here, or left out as what verdicts do not ask for.
+    let bits = |state: &LaneState<f32>| {
+        let &LaneState { index: _, v_ego, v_before, gaps, driver, reaction_step: _, record, over } = state;
+        let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _ }) = (driver, record);
+        let TtcMinimum { failed: ttc_failed, gap: _, closing: _ } = ttc;
+        let BrakeThreatMaximum { failed: btn_failed, numerator: _, denominator: _ } = btn;
+        // What a model does not look at is not kept: see `StateArrays::set`.
+        let v_before = if M::SEES_OWN_ACCELERATION { v_before } else { 0.0 };
+        let deceleration = if M::KEEPS_DECELERATION { deceleration } else { 0.0 };
+        let numbers = [v_ego, v_before, gaps[0], gaps[1], deceleration];
+        (numbers.map(f32::to_bits), delay_steps, [ttc_failed, btn_failed, over].map(Flag::holds))
+    };
+    bits(&advance(simulation, lane, state, places).state) == bits(state)
+}
+
+/// Beside the ego's lane, where it meets no contact, no criterion and no reaction, wherever it is along the road.
+#[inline(always)]
+pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    other: &OtherConstants<f32>,
+    place: &Whereabouts<f32>,
+) -> Flag {
+    let lateral_gap = place.position.abs() - other.half_widths;
+    let judged = simulation.criteria.sees(0.0, other.half_lengths, lateral_gap, place.position, lane.ego_width);
+    !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards)
+}
+
+/// A gap down to which nothing happens with a vehicle; none where it is not in the ego's lane, or already too near.
+fn calm_gap<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    state: &LaneState<f32>,
+    places: &[Whereabouts<f32>; 2],
+    vehicle: usize,
+) -> Option<f32> {
+    let (other, place) = (&lane.others[vehicle], &places[vehicle]);
+    let (record, criteria, index) = (&state.record, simulation.criteria, state.index);
+    if place.position.abs() - other.half_widths >= 0.0 {
+        return None;
+    }
+    let of_criteria = criteria_safe_gap(criteria, record, state.v_ego - place.speed);
+    // What is no number stays none: the larger of two takes that of its second.
+    let safe = of_criteria.larger(simulation.model.safe_gap(state.v_ego, place.speed));
+    // Enough for what rounding does to it; at a gap that does not grow smaller all is well if it is well now.
+    let lowest = 1.001 * safe + 0.001;
+    if lowest.is_nan() || lowest > state.gaps[vehicle] {
+        return None;
+    }
+    // The safe distances are an advice; what counts is what the step itself would say.
+    let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
+    let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
+    // Every criterion that a record keeps has its say here.
+    let Record { ttc, btn, min_gap: _ } = judge(criteria, record, &seen);
+    let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
+    // The driver may not yet attend to it: then less is calm than could be.
+    let reacts = check(simulation, &seen, other, Flag::LATEST_STEP).is_unsafe;
+    (!(fails | reacts).holds()).then_some(lowest)
+}
+
+/// Adds `change` to a positive gap again and again, each sum rounded as a step rounds it, at most so many times and as
+/// long as it does not fall below `lowest`: how many times, and what comes out.
+///
+/// Between two powers of two the numbers have one distance, so each sum goes on by the same whole number of them; at a
+/// tie the even one is taken, which settles it after one sum. So only a few sums between two powers of two are worked out.
+fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
+    const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
+    let (mut gap, mut made) = (gap, 0);
+    while made < most {
+        let next = gap + change;
+        if next < lowest || next <= 0.0 {
+            break;
+        }
+        // This sum settles ties; the one after it tells how far every sum goes on.
+        let (before, bits, after) = (gap.to_bits(), next.to_bits(), (next + change).to_bits());
+        if bits == before || bits == after {
+            // Lost in rounding, for good.
+            return (most, next);
+        }
+        (gap, made) = (next, made + 1);
+        let binade = bits / BINADE;
+        if before / BINADE != binade || after / BINADE != binade {
+            continue;
+        }
+        // One number short of both powers of two the sum itself lies between them, rounded or not.
+        let way = if after > bits {
+            (binade + 1) * BINADE - 1 - bits
+        } else {
+            bits - (binade * BINADE + 1).max(lowest.to_bits()).min(bits)
+        };
+        let by = after.abs_diff(bits);
+        let times = (way / by).min(most - made);
+        gap = f32::from_bits(if after > bits { bits + times * by } else { bits - times * by });
+        made += times;
+    }
+    (made, gap)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::drivers::Constants;
+    use crate::engine::frame::Frame;
+    use crate::engine::lane_case::NEVER;
+    use crate::engine::scene::Scene;
+    use crate::model::criterion::Criteria;
+    use crate::model::profile::Profile;
+    use crate::scenario::Category;
+
+    /// The same, sum by sum.
+    fn added(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
+        let mut gap = gap;
+        for made in 0..most {
+            let next = gap + change;
+            if next < lowest || next <= 0.0 {
+                return (made, gap);
+            }
+            gap = next;
+        }
+        (most, gap)
+    }
+
+    /// A word, other for every number.
+    fn mixed(number: u64) -> u64 {
+        let word = (number ^ number >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        word ^ word >> 31
+    }
+
+    #[test]
+    fn carried_gaps_are_the_sums_to_the_bit() {
+        for number in 0..200_000_u64 {
+            let word = mixed(number + 1);
+            let unit = |shift: u32| f32::from((word >> shift) as u16) / 65536.0;
+            let gap = 2f32.powf(unit(0) * 12.0 - 3.0);
+            // From changes that are lost in rounding to those that leave the gap behind in one step.
+            let size = 2f32.powf(unit(16) * 30.0 - 26.0);
+            let change = if word >> 63 == 0 { size } else { -size };
+            let lowest = if number % 3 == 0 { 0.0 } else { gap * unit(32) };
+            let most = (word >> 48) as u32 % 3000;
+            assert_eq!(
+                carried(gap, change, most, lowest),
+                added(gap, change, most, lowest),
+                "{gap:e} {change:e} {most}"
+            );
+        }
+    }
+
+    /// Ties: changes of a whole number and a half of the numbers' distance, from even and odd gaps, across powers of two.
+    #[test]
+    fn ties_are_settled_as_sums_settle_them() {
+        for odd in 0..4_u32 {
+            for whole in 0..40_i32 {
+                for sign in [1.0, -1.0] {
+                    let gap = f32::from_bits(8f32.to_bits() + 200 + odd);
+                    let change = sign * (whole as f32 + 0.5) * (f32::from_bits(8f32.to_bits() + 1) - 8.0);
+                    for most in [0, 1, 2, 3, 7, 100, 1000] {
+                        assert_eq!(carried(gap, change, most, 0.0), added(gap, change, most, 0.0), "{odd} {change:e}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// A lane among vehicles that keep speed and lateral position, somewhere in its run.
+    fn lane(number: u64) -> (LaneConstants<f32>, LaneState<f32>, [Whereabouts<f32>; 2]) {
+        let mut drawn = 0;
+        let mut between = |least: f32, most: f32| {
+            drawn += 1;
+            least + (most - least) * f32::from(mixed(64 * number + drawn) as u16) / 65536.0
+        };
+        let v_ego = between(0.0, 40.0);
+        let place = |between: &mut dyn FnMut(f32, f32) -> f32| Whereabouts {
+            speed: (v_ego + between(-8.0, 6.0)).max(0.0),
+            position: if between(0.0, 1.0) < 0.6 { between(-1.0, 1.0) } else { between(-5.0, 5.0) },
+            towards: if between(0.0, 1.0) < 0.8 { 0.0 } else { between(-1.0, 1.0) },
+        };
+        let places = [place(&mut between), place(&mut between)];
+        let mut step =
+            |never: f32, most: f32| if between(0.0, 1.0) < never { NEVER } else { between(0.0, most) as u32 };
+        let mut other = || OtherConstants {
+            half_lengths: 4.5,
+            half_widths: 1.9,
+            present_from: if step(0.9, 900.0) == NEVER { 0 } else { step(0.0, 900.0) },
+            present_until: step(0.8, 2000.0).min(Flag::LATEST_STEP),
+            attend_from: if step(0.8, 0.0) == NEVER { 0 } else { step(0.2, 2000.0).min(Flag::LATEST_STEP) },
+            judged: Flag::of(step(0.8, 1.0) == NEVER),
+        };
+        let lane = LaneConstants {
+            others: [other(), other()],
+            ego_width: 1.9,
+            horizon: step(0.3, 2000.0).min(Flag::LATEST_STEP),
+        };
+        let first = between(-10.0, 150.0);
+        let state = LaneState {
+            index: between(1.0, 2990.0) as u32,
+            v_ego,
+            v_before: v_ego,
+            gaps: [first, first + between(5.0, 60.0)],
+            driver: DriverState { deceleration: 0.0, delay_steps: between(0.0, 5.0) as u32 },
+            reaction_step: 0,
+            record: Record {
+                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
+                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
+                min_gap: 0.0,
+            },
+            over: Flag::FALSE,
+        };
+        (lane, state, places)
+    }
+
+    /// Steps that are left out: made one by one they change nothing but the gaps, which come out the same to the bit.
+    fn nothing_happens<M: DriverModel<f32>>(simulation: &Simulation<f32, M>, name: &str) {
+        let (mut found, mut lasting) = (0, 0);
+        for number in 0..20_000 {
+            let (lane, start, places) = lane(number);
+            let calm = calm_steps(simulation, &lane, &start, &places);
+            let slowing = LaneState { v_before: start.v_ego + 0.1, ..start };
+            assert!(!M::SEES_OWN_ACCELERATION || calm_steps(simulation, &lane, &slowing, &places).is_none(), "{name}");
+            let Some(calm) = calm else { continue };
+            make_one_by_one(simulation, &lane, &start, &places, &calm, &format!("{name}, lane {number}"));
+            found += 1;
+            lasting += u32::from(calm.steps > 500);
+        }
+        assert!(found > 200 && lasting > 20, "{name}: {found} found, {lasting} of them long");
+    }
+
+    /// Makes calm steps; gives the lane after them.
+    fn make_one_by_one<M: DriverModel<f32>>(
+        simulation: &Simulation<f32, M>,
+        lane: &LaneConstants<f32>,
+        start: &LaneState<f32>,
+        places: &[Whereabouts<f32>; 2],
+        calm: &Calm,
+        name: &str,
+    ) -> LaneState<f32> {
+        let mut state = *start;
+        for _ in 0..calm.steps {
+            state = advance(simulation, lane, &state, places).state;
+            assert!(!state.over.holds(), "{name} ends at step {}: {calm:?}", state.index);
+        }
+        let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
+        assert_eq!(state.index, start.index + calm.steps);
+        assert!(state.v_ego == start.v_ego && state.driver == start.driver, "{name}: {calm:?}");
+        assert_eq!(failed(&state), failed(start), "{name}: {calm:?}");
+        let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
+        for (vehicle, place) in places.iter().enumerate().take(vehicles) {
+            let out_of_the_way = is_out_of_the_way(simulation, lane, &lane.others[vehicle], place).holds();
+            let gone = start.index >= lane.others[vehicle].present_until;
+            let gaps = (calm.gaps[vehicle], state.gaps[vehicle]);
+            assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}: {calm:?} {gaps:?}");
+        }
+        state
+    }
+
+    /// FSM comes nearer and nearer to the speed ahead, until rounding lets it brake no more and the gap lose no more:
+    /// from there on one look leaves out all steps to the end, although the driver counts as unsafe at every one.
+    #[test]
+    fn one_who_follows_comes_to_stand_still_in_rounding() {
+        let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
+        let frame = &Frame { step_cap: 6000, ..constants.frames[0] };
+        let criteria = &Criteria { keeps_values: false, ..constants.criteria };
+        let scene = Scene::in_lane();
+        let simulation = Simulation { frame, criteria, model: &constants.fsm, model_index: 0, scene };
+        let mut stood_still = 0;
+        for number in 0..200 {
+            let (lane, start, places) = lane(number);
+            let speed = start.v_ego.max(5.0) - 0.01 * (number % 100) as f32;
+            let place = Whereabouts { speed, position: 0.0, towards: 0.0 };
+            let always =
+                OtherConstants { present_from: 0, present_until: Flag::LATEST_STEP, attend_from: 0, ..lane.others[0] };
+            let lane = LaneConstants { others: [always; 2], horizon: Flag::LATEST_STEP, ..lane };
+            let mut state =
+                LaneState { index: 1, v_ego: start.v_ego.max(5.0), v_before: start.v_ego.max(5.0), ..start };
+            state.gaps = [state.v_ego * (1.5 + (number % 7) as f32 / 2.0); 2];
+            let places = [place, places[1]];
+            while !state.over.holds() && state.index < frame.step_cap {
+                let Some(calm) = calm_steps(&simulation, &lane, &state, &places) else {
+                    state = advance(&simulation, &lane, &state, &places).state;
+                    continue;
+                };
+                let is_unsafe = advance(&simulation, &lane, &state, &places).hazard.is_unsafe.holds();
+                stood_still += u32::from(is_unsafe);
+                state = make_one_by_one(&simulation, &lane, &state, &places, &calm, &format!("lane {number}"));
+                assert!(
+                    !is_unsafe || state.index == frame.step_cap - ROWS as u32,
+                    "lane {number}: {calm:?} is not all"
+                );
+            }
+        }
+        assert!(stood_still > 100, "{stood_still}");
+    }
+
+    #[test]
+    fn in_steps_that_are_left_out_nothing_happens() {
+        for name in Profile::names() {
+            let profile = Profile::load(name).unwrap();
+            let constants = Constants::<f32>::resolve(&profile, Category::CutIn);
+            let frame = &Frame { abort_above_ttc: 0.0, step_cap: 3000, ..constants.frames[0] };
+            let criteria = &Criteria { keeps_values: false, ..constants.criteria };
+            for is_pair in [false, true] {
+                let (model_index, scene) = (0, Scene::unknown(is_pair));
+                macro_rules! check {
+                    ($model:ident) => {
+                        let model = &constants.$model;
+                        let simulation = Simulation { frame, criteria, model, model_index, scene };
+                        nothing_happens(&simulation, &format!("{name}, {}, pair {is_pair}", stringify!($model)));
+                    };
+                }
+                check!(reg157);
+                check!(cchdm);
+                check!(rss);
+                check!(fsm);
+            }
+        }
+    }
+}

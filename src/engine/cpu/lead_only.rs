@@ -1,0 +1,166 @@
+//! Two vehicles ahead of which only the second can matter any more: from then on it is alone.
+//!
+//! Once a vehicle that cuts out is beside the lane, where it meets no contact, no criterion and no reaction, and stays
+//! there, the lane goes on as one of a single vehicle, the one that was ahead of it. Where only verdicts are wanted,
+//! batches make these steps among lanes of single vehicles, with half of the work.
+
+use crate::model::driver::DriverModel;
+use crate::model::flag::Flag;
+
+use crate::engine::cpu::batch_arrays::{NEVER_LEAVES, ROWS};
+use crate::engine::cpu::fast_forward::is_out_of_the_way;
+use crate::engine::cpu::series::{Track, VehicleTracks};
+use crate::engine::frame::Simulation;
+use crate::engine::lane_step::{LaneConstants, Whereabouts};
+
+/// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
+/// [`NEVER_LEAVES`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
+/// `entries`.
+pub(in crate::engine) fn alone_from<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    tracks: &[VehicleTracks; 2],
+    entries: &[f32],
+) -> u32 {
+    let [principal, second] = &lane.others;
+    if second.present_until < Flag::LATEST_STEP || !second.judged.holds() {
+        return NEVER_LEAVES;
+    }
+    let VehicleTracks { position, towards, .. } = tracks[0];
+    // So many entries of a series from a step on; its last one is repeated.
+    let at = |track: Track, step: u32, count: usize| {
+        let from = (track.first + step.min(track.last)) as usize;
+        &entries[from..from + count]
+    };
+    // Beside the lane at all of these steps; without a branch, so that a compiler can ask for many at once.
+    let is_out = |step: u32, count: usize| {
+        let mut is_out = Flag::TRUE;
+        for (&position, &towards) in at(position, step, count).iter().zip(at(towards, step, count)) {
+            let place = Whereabouts { speed: 0.0, position, towards };
+            is_out = is_out & is_out_of_the_way(simulation, lane, principal, &place);
+        }
+        is_out.holds()
+    };
+    let gone_from = if principal.present_from == Flag::LATEST_STEP { 0 } else { principal.present_until };
+    // From the end, where it stays: back to the last step at which it is in the way.
+    let mut from = position.last.max(towards.last).min(gone_from);
+    if from < gone_from && !is_out(from, 1) {
+        from = gone_from;
+    }
+    while from >= ROWS as u32 && is_out(from - ROWS as u32, ROWS) {
+        from -= ROWS as u32;
+    }
+    while from > 0 && is_out(from - 1, 1) {
+        from -= 1;
+    }
+    from.max(second.present_from).max(second.attend_from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::LanePlan;
+    use crate::engine::cpu::series::Series;
+    use crate::engine::drivers::Constants;
+    use crate::engine::frame::Start;
+    use crate::engine::lane_case::LaneCase;
+    use crate::engine::lane_step::{LaneState, advance};
+    use crate::engine::scene::Scene;
+    use crate::model::criterion::Criteria;
+    use crate::model::driver::ModelId;
+    use crate::model::profile::Profile;
+    use crate::run::study::{StudyOptions, plan_study};
+    use crate::scenario::{Category, Tables};
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    /// Cut-outs of a synthetic recording, recorded and parameterized.
+    fn cut_outs(profile: &Profile) -> LanePlan {
+        let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+        let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+        let options = StudyOptions { categories: vec![Category::CutOut], ..StudyOptions::default() };
+        plan_study(&mined.scenarios, profile, &options).unwrap().plan
+    }
+
+    /// Two lanes step side by side, one with both vehicles and, from there on, one with the second alone: ego, gap,
+    /// criteria and end are the same at every step. Gives how many steps it was alone.
+    fn steps_side_by_side<M: DriverModel<f32>>(
+        pair: &Simulation<f32, M>,
+        case: &LaneCase<f32>,
+        tables: &Tables<f32>,
+        name: &str,
+    ) -> u32 {
+        let cases = std::slice::from_ref(case);
+        let alone = &Simulation { scene: Scene::of_second_alone(cases), ..*pair };
+        assert!(alone.scene.in_lane, "{name}");
+        let mut series = Series::default();
+        let tracks = series.unroll(case, tables, pair.frame.step_cap);
+        let constants = LaneConstants::new(pair, case);
+        let from = alone_from(pair, &constants, &tracks, series.entries());
+        let second = constants.others[1];
+        let on_its_own = LaneConstants { others: [second; 2], ..constants };
+        let mut state = LaneState::new(pair, case, Start::Headway(1.4));
+        let mut other: Option<LaneState<f32>> = None;
+        let mut saved = 0;
+        while !state.over.holds() && state.index < pair.frame.step_cap {
+            let places = [0, 1].map(|k: usize| Whereabouts::of(&case.others[k].motion, tables, state.index));
+            if state.index >= from && other.is_none() {
+                other = Some(LaneState { gaps: [state.gaps[1]; 2], ..state });
+            }
+            state = advance(pair, &constants, &state, &places).state;
+            if let Some(other) = &mut other {
+                *other = advance(alone, &on_its_own, other, &[places[1]; 2]).state;
+                let same = LaneState { gaps: [state.gaps[1]; 2], ..state };
+                assert_eq!(LaneState { gaps: [other.gaps[0]; 2], ..*other }, same, "{name}");
+                saved += 1;
+            }
+        }
+        // The step before it may matter: the first vehicle is in the way, or the second not there or not attended to.
+        if from != NEVER_LEAVES && from > second.present_from.max(second.attend_from) {
+            let first = Whereabouts::of(&case.others[0].motion, tables, from - 1);
+            let present = from - 1 < constants.others[0].present_until;
+            let is_out = is_out_of_the_way(pair, &constants, &constants.others[0], &first).holds();
+            assert!(present && !is_out, "{name}");
+        }
+        let ignores = pair.model.ignores(10.0, 0.0).holds();
+        let comes = constants.others[0].present_from < Flag::LATEST_STEP;
+        assert!(ignores || !comes || other.is_none(), "{name}");
+        saved
+    }
+
+    #[test]
+    fn from_there_on_the_second_vehicle_alone_decides() {
+        for name in Profile::names() {
+            let profile = Profile::load(name).unwrap();
+            let plan = cut_outs(&profile);
+            let constants = Constants::<f32>::resolve(&profile, Category::CutOut);
+            let criteria = &Criteria { keeps_values: false, ..constants.criteria };
+            let tables = plan.tables().cast();
+            let (mut saved, mut alone, mut all) = (0, 0, 0);
+            for id in ModelId::ALL {
+                for unit in 0..plan.unit_count() {
+                    for variant in 0..plan.blocks[0].variants.len() {
+                        let case: LaneCase<f32> = plan.case(0, unit, variant).cast();
+                        let (frame, model_index) = (&constants.frames[id.index()], id.index());
+                        let what = format!("{name}, {}, unit {unit}, variant {variant}", id.name());
+                        macro_rules! run {
+                            ($model:ident) => {{
+                                let (model, scene) = (&constants.$model, Scene::unknown(true));
+                                let pair = Simulation { frame, criteria, model, model_index, scene };
+                                steps_side_by_side(&pair, &case, &tables, &what)
+                            }};
+                        }
+                        let steps = match id {
+                            ModelId::Reg157 => run!(reg157),
+                            ModelId::Cchdm => run!(cchdm),
+                            ModelId::Rss => run!(rss),
+                            ModelId::Fsm => run!(fsm),
+                        };
+                        (saved, alone, all) = (saved + steps, alone + u32::from(steps > 0), all + 1);
+                    }
+                }
+            }
+            assert!(alone * 2 > all && saved > 100 * all, "{name}: {alone} of {all}, {saved}");
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Lanes on the CPU: single lanes, batches on vector instructions, and what batches leave out where only verdicts are
+//! wanted ([`fast_forward`], [`steady_following`], [`lead_only`]). The step itself is [`lane_step`](super::lane_step)'s.
+
+pub(crate) mod backend;
+mod batch;
+mod batch_arrays;
+mod fast_forward;
+pub(in crate::engine) mod instructions;
+pub(in crate::engine) mod lane_result;
+mod lead_only;
+pub(in crate::engine) mod pending;
+pub(in crate::engine) mod rules;
+pub(in crate::engine) mod runner;
+pub(in crate::engine) mod series;
+mod simd;
+mod steady_following;
+pub(in crate::engine) mod stream;
+mod transpose;

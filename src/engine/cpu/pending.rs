@@ -1,0 +1,190 @@
+//! Lanes that wait for a slot, side by side already: a case is written once for all its headways, and slots that are
+//! free take what they need row by row.
+
+use crate::model::driver::DriverModel;
+
+use crate::engine::cpu::batch::Slots;
+use crate::engine::cpu::batch_arrays::{LANES, LaneArrays, NEVER_LEAVES, Words, steady_from};
+use crate::engine::cpu::lead_only::alone_from;
+use crate::engine::cpu::series::VehicleTracks;
+use crate::engine::frame::{Simulation, Start};
+use crate::engine::lane_case::LaneCase;
+use crate::engine::lane_step::{LaneConstants, LaneState};
+
+/// Lanes that wait at most: 29 KiB with one other vehicle and verdicts alone, 49 KiB with all there is, their room included.
+pub(in crate::engine) const MOST: usize = 256;
+
+/// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
+pub(in crate::engine) const ROOM: usize = MOST + LANES;
+
+/// The lanes of a stream: every case with every start, the starts of a case one after the other.
+#[derive(Clone, Copy)]
+pub(in crate::engine) struct Lanes<'c> {
+    /// Its cases.
+    pub cases: &'c [LaneCase<f32>],
+    /// Their motions, unrolled.
+    pub tracks: &'c [[VehicleTracks; 2]],
+    /// The headways.
+    pub starts: &'c [Start<f32>],
+    /// Every case has one start, that of its number, instead of all of them.
+    pub one_start_each: bool,
+    /// Calm steps are made as well, and no lane is set apart.
+    pub every_step: bool,
+    /// A step of one of its lanes [may cross](crate::engine::scene::may_cross) another vehicle.
+    pub may_cross: bool,
+}
+
+impl<'c> Lanes<'c> {
+    /// The starts of a case.
+    #[inline(always)]
+    fn starts_of(&self, case: usize) -> &'c [Start<f32>] {
+        if self.one_start_each { &self.starts[case..=case] } else { self.starts }
+    }
+}
+
+/// Lanes that wait for slots of one kind of batches: the next ones of a stream, and those set apart.
+pub(in crate::engine) struct Waiting {
+    lanes: Box<LaneArrays<ROOM>>,
+    /// Continuous values are wanted, not verdicts alone.
+    values: bool,
+    /// Lanes with a single vehicle are asked whether they are at ease.
+    asks_ease: bool,
+    /// The first that waits.
+    first: usize,
+    /// The end of them.
+    end: usize,
+    /// The case to come, and its start to come.
+    case: usize,
+    start: usize,
+    /// The lane to come, counted within the stream.
+    lane: u32,
+}
+
+impl Waiting {
+    /// At the beginning of a stream.
+    pub fn new(values: bool, asks_ease: bool) -> Self {
+        Waiting { lanes: Box::new(LaneArrays::idle()), values, asks_ease, first: 0, end: 0, case: 0, start: 0, lane: 0 }
+    }
+
+    /// How many wait.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.end - self.first
+    }
+
+    /// Takes the next lanes; gives the place of the first of them.
+    #[inline(always)]
+    pub fn take(&mut self, count: usize) -> usize {
+        let from = self.first;
+        self.first += count;
+        from
+    }
+
+    /// All lanes, those that wait among them.
+    #[inline(always)]
+    pub fn lanes(&self) -> &LaneArrays<ROOM> {
+        &self.lanes
+    }
+
+    /// Sees to it that at least so many lanes wait, if there are more.
+    ///
+    /// `sets_apart`: the series, where lanes are set apart that go on with the second vehicle alone.
+    #[inline]
+    pub fn have<M: DriverModel<f32>>(
+        &mut self,
+        least: usize,
+        simulation: &Simulation<f32, M>,
+        stream: &Lanes<'_>,
+        sets_apart: Option<&[f32]>,
+    ) {
+        if self.count() >= least || self.case == stream.cases.len() {
+            return;
+        }
+        self.close_up(simulation.scene.is_pair);
+        while self.end < MOST && self.case < stream.cases.len() {
+            self.add(simulation, stream, sets_apart);
+        }
+    }
+
+    /// So many more may wait.
+    #[inline(always)]
+    pub fn has_room(&self, count: usize) -> bool {
+        self.count() + count <= MOST
+    }
+
+    /// Adds a lane that goes on with the second vehicle alone.
+    pub fn add_alone(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
+        let leaves_from = if self.asks_ease { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
+        self.add_single(lanes, k, 1, leaves_from);
+    }
+
+    /// Adds a lane as it is, with a single vehicle.
+    pub fn add_lane(&mut self, lanes: &LaneArrays<LANES>, k: usize, leaves_from: u32) {
+        self.add_single(lanes, k, 0, leaves_from);
+    }
+
+    fn add_single(&mut self, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
+        if self.end == MOST {
+            self.close_up(false);
+        }
+        self.lanes.set_single(self.end, lanes, k, vehicle, leaves_from);
+        self.end += 1;
+    }
+
+    /// Moves those that wait to the front.
+    fn close_up(&mut self, is_pair: bool) {
+        for part in self.lanes.parts_mut(is_pair, self.values) {
+            for row in part {
+                row.copy_within(self.first..self.end, 0);
+            }
+        }
+        (self.first, self.end) = (0, self.end - self.first);
+    }
+
+    /// Adds lanes of the case to come.
+    fn add<M: DriverModel<f32>>(
+        &mut self,
+        simulation: &Simulation<f32, M>,
+        stream: &Lanes<'_>,
+        sets_apart: Option<&[f32]>,
+    ) {
+        let case = &stream.cases[self.case];
+        let tracks = &stream.tracks[self.case];
+        let constants = LaneConstants::new(simulation, case);
+        let leaves_from = match sets_apart {
+            Some(entries) => alone_from(simulation, &constants, tracks, entries),
+            None if self.asks_ease => steady_from(&tracks[..1]) + 1,
+            None => NEVER_LEAVES,
+        };
+        let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
+        let all = stream.starts_of(self.case);
+        let starts = &all[self.start..];
+        let starts = &starts[..starts.len().min(MOST - self.end)];
+        for starts in starts.chunks(LANES) {
+            let state = LaneState::new(simulation, case, starts[0]);
+            self.lanes.fill(self.end, &constants, tracks, &state, leaves_from, self.values);
+            for &start in starts {
+                self.lanes.start(self.end, self.lane, LaneState::new(simulation, case, start).gaps);
+                self.end += 1;
+                self.lane += 1;
+            }
+        }
+        self.start += starts.len();
+        if self.start == all.len() {
+            (self.start, self.case) = (0, self.case + 1);
+        }
+    }
+}
+
+/// Gives the slots, in their order, the entries of every row from a place on: one by one, on every machine.
+#[inline(always)]
+pub(in crate::engine) fn take(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
+    for (row, waiting) in rows.iter_mut().zip(waiting) {
+        let (mut left, mut from) = (slots, from);
+        while left != 0 {
+            row[left.trailing_zeros() as usize] = waiting[from];
+            left &= left - 1;
+            from += 1;
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What all lanes of a stream share and a loop need not ask: each set of rules has a loop of its own.
+
+use crate::model::criterion::{BtnForm, Criteria, LateralGate};
+
+use crate::engine::frame::Frame;
+use crate::engine::scene::Scene;
+
+/// A set of rules.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::engine) struct Rules {
+    /// What is known of the other vehicles.
+    pub scene: Scene,
+    is_ratio: bool,
+    sees_overlap: bool,
+    aborts: bool,
+    /// Only verdicts are wanted: smallest and largest values are not gathered.
+    pub is_verdict_only: bool,
+}
+
+impl Rules {
+    /// Number of sets.
+    pub(in crate::engine) const SETS: u32 = 26;
+
+    const IN_LANE: u32 = 20;
+    const AT_EASE: u32 = 21;
+    const CROSSING: u32 = 22;
+
+    /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
+    /// `values`: continuous ones are wanted, not verdicts alone.
+    pub(in crate::engine) fn of(
+        frame: &Frame<f32>,
+        criteria: &Criteria<f32>,
+        scene: Scene,
+        values: bool,
+    ) -> Option<Rules> {
+        let is_ratio = match criteria.btn.form() {
+            BtnForm::EquivalentDelay => false,
+            BtnForm::DistanceRatio => true,
+            BtnForm::Exact => return None,
+        };
+        let sees_overlap = criteria.gate == LateralGate::Overlap;
+        let aborts = frame.abort_above_ttc > 0.0;
+        // Seldom used rules have no loop of their own for verdicts alone.
+        let is_verdict_only = !values && !is_ratio && !aborts;
+        // Seldom used rules always look for contacts between two steps.
+        let may_cross = scene.may_cross || is_ratio || aborts;
+        let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
+        Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
+    }
+
+    /// Of the steps at ease of lanes with a single vehicle, where only verdicts are wanted.
+    pub(in crate::engine) fn at_ease() -> Rules {
+        Rules::from_bits(Rules::AT_EASE)
+    }
+
+    /// As a number below [`Rules::SETS`].
+    pub(in crate::engine) const fn bits(self) -> u32 {
+        if self.scene.at_ease {
+            return Rules::AT_EASE;
+        }
+        if self.scene.in_lane {
+            // Nothing is seen across the road, so there is no gate.
+            return Rules::IN_LANE;
+        }
+        let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
+        if self.scene.may_cross && (seldom == 0 || seldom == 4) {
+            return Rules::CROSSING + (self.sees_overlap as u32 | (self.is_verdict_only as u32) << 1);
+        }
+        self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
+    }
+
+    /// From that number.
+    pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
+        if bits >= Rules::CROSSING {
+            let scene = Scene { is_pair: true, always_there: false, in_lane: false, at_ease: false, may_cross: true };
+            let sees_overlap = (bits - Rules::CROSSING) & 1 != 0;
+            let is_verdict_only = (bits - Rules::CROSSING) & 2 != 0;
+            return Rules { scene, is_ratio: false, sees_overlap, aborts: false, is_verdict_only };
+        }
+        if bits >= Rules::IN_LANE {
+            let scene = Scene { at_ease: bits == Rules::AT_EASE, ..Scene::in_lane() };
+            return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
+        }
+        let seldom = bits >> 2;
+        let is_pair = bits & 1 != 0;
+        Rules {
+            scene: Scene {
+                is_pair,
+                always_there: !is_pair,
+                in_lane: false,
+                at_ease: false,
+                may_cross: seldom != 0 && seldom != 4,
+            },
+            sees_overlap: bits & 2 != 0,
+            is_ratio: seldom & 1 != 0,
+            aborts: seldom & 2 != 0,
+            is_verdict_only: seldom & 4 != 0,
+        }
+    }
+
+    /// The constants with everything that these rules decide written as constants.
+    #[inline(always)]
+    pub(in crate::engine) fn applied(
+        self,
+        frame: &Frame<f32>,
+        criteria: &Criteria<f32>,
+    ) -> (Frame<f32>, Criteria<f32>) {
+        let form = if self.is_ratio { BtnForm::DistanceRatio } else { BtnForm::EquivalentDelay };
+        let gate = if self.sees_overlap { LateralGate::Overlap } else { LateralGate::EgoWidth };
+        let abort_above_ttc = if self.aborts { frame.abort_above_ttc } else { 0.0 };
+        let frame = Frame { abort_above_ttc, ..*frame };
+        let keeps_values = !self.is_verdict_only;
+        (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_of_a_set_comes_back_from_its_rules() {
+        for bits in 0..Rules::SETS {
+            assert_eq!(Rules::from_bits(bits).bits(), bits);
+        }
+    }
+}

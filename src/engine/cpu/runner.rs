@@ -1,0 +1,240 @@
+//! Single lanes on the CPU: what the CPU backend is made of, and what any other backend is checked with.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Mutex;
+
+use crate::engine::cpu::instructions::Instructions;
+use crate::engine::cpu::lane_result::Ending;
+use crate::engine::cpu::pending::Lanes;
+use crate::engine::cpu::series::Series;
+use crate::engine::drivers::Constants;
+use crate::engine::frame::Start;
+use crate::engine::lane::Silent;
+use crate::engine::lane_case::LaneCase;
+use crate::engine::outcome::{Outcome, Verdicts};
+use crate::engine::plan::{LaneKey, LanePlan};
+use crate::engine::scene::{Scene, may_cross};
+use crate::model::driver::ModelId;
+use crate::model::scalar::Real;
+use crate::scenario::Tables;
+
+/// Runs lanes of a plan one by one, in the arithmetic `R`.
+pub struct LaneRunner<'p, R> {
+    plan: &'p LanePlan,
+    /// All series, rounded; empty where each case brings its own.
+    tables: Tables<R>,
+    /// One per block.
+    constants: Vec<Constants<R>>,
+    starts: Vec<Start<R>>,
+    has_tables: bool,
+    /// Lanes do no more than batches for verdicts.
+    as_in_batches: bool,
+    /// Batches spare nothing.
+    every_step: bool,
+    /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
+    spare: Mutex<Vec<Series>>,
+}
+
+impl<'p, R: Real> LaneRunner<'p, R> {
+    /// Rounds what the plan holds, once.
+    pub fn new(plan: &'p LanePlan) -> Self {
+        let tables = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
+        LaneRunner { tables, has_tables: true, ..LaneRunner::of_few(plan) }
+    }
+
+    /// Rounds what each lane needs when it runs: for a few lanes, whose plan's series need not lie in memory twice.
+    pub(in crate::engine) fn of_few(plan: &'p LanePlan) -> Self {
+        LaneRunner {
+            plan,
+            tables: Tables::default(),
+            has_tables: false,
+            constants: plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect(),
+            starts: plan.headways.iter().map(|h| h.start()).collect(),
+            as_in_batches: false,
+            every_step: false,
+            spare: Mutex::default(),
+        }
+    }
+
+    /// The same, but each lane does no more than batches do for verdicts: it gathers no smallest and largest values,
+    /// so that only verdicts and steps of its outcome mean something, and asks for nothing that is known.
+    pub fn verdicts_as_in_batches(mut self) -> Self {
+        self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
+        self.as_in_batches = true;
+        self
+    }
+
+    /// The same, but batches make every step as a whole, with all vehicles; without it, where only verdicts are wanted,
+    /// they leave out what can change none. The verdicts are the same.
+    pub fn every_step(mut self, every_step: bool) -> Self {
+        self.every_step = every_step;
+        self
+    }
+
+    /// One lane, of which nothing is known before it runs.
+    pub fn run(&self, key: &LaneKey) -> Outcome<R> {
+        let (case, tables) = self.case(key.block, key.unit, key.variant);
+        let scene = Scene::unknown(case.pair != 0);
+        self.constants[key.block].run_in(
+            self.plan.models[key.model],
+            scene,
+            &case,
+            &tables,
+            self.starts[key.headway],
+            &mut Silent,
+        )
+    }
+
+    fn dt(&self) -> R {
+        R::from_f64(self.plan.profile.frame.dt_s)
+    }
+
+    /// The plan whose lanes it runs.
+    pub(in crate::engine) fn plan(&self) -> &'p LanePlan {
+        self.plan
+    }
+
+    /// A case and the tables that it points into.
+    pub(crate) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+        if self.has_tables && self.plan.generator().is_none() {
+            return (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables));
+        }
+        let mut tables = Tables::default();
+        let case = self.case_with_series(block, unit, variant, &mut tables);
+        (case, Cow::Owned(tables))
+    }
+
+    /// A case whose series go to the end of `tables`.
+    fn case_with_series(&self, block: usize, unit: u64, variant: usize, tables: &mut Tables<R>) -> LaneCase<R> {
+        match self.plan.generator() {
+            Some(generator) => generator.case(unit, tables),
+            None => self.plan.case(block, unit, variant).cast_with_series(self.plan.tables(), tables),
+        }
+    }
+
+    /// All lanes of one unit, in the plan's order: position within the unit, outcome.
+    pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
+        let mut at = 0;
+        for variant in 0..self.plan.blocks[block].variants.len() {
+            let (case, tables) = self.case(block, unit, variant);
+            let may_cross = may_cross(&case, &tables, self.dt());
+            for &start in &self.starts {
+                for &model in &self.plan.models {
+                    each(at, self.run_case(block, &case, &tables, may_cross, start, model));
+                    at += 1;
+                }
+            }
+        }
+    }
+
+    fn run_case(
+        &self,
+        block: usize,
+        case: &LaneCase<R>,
+        tables: &Tables<R>,
+        may_cross: bool,
+        start: Start<R>,
+        model: ModelId,
+    ) -> Outcome<R> {
+        let scene = if self.as_in_batches {
+            Scene::of(std::slice::from_ref(case), model.index(), may_cross)
+        } else {
+            Scene { may_cross, ..Scene::unknown(case.pair != 0) }
+        };
+        self.constants[block].run_in(model, scene, case, tables, start, &mut Silent)
+    }
+}
+
+impl LaneRunner<'_, f32> {
+    /// All lanes of some units of a block, in batches: position counted from the first unit on, what is wanted of its
+    /// end. In no particular order.
+    pub fn run_units<E: Ending>(
+        &self,
+        instructions: Instructions,
+        block: usize,
+        units: Range<u64>,
+        mut each: impl FnMut(usize, E),
+    ) {
+        let variants = self.plan.blocks[block].variants.len();
+        let mut made = Tables::default();
+        let (cases, tables): (Vec<LaneCase<f32>>, _) = match self.plan.generator() {
+            Some(generator) => (units.map(|unit| generator.case(unit, &mut made)).collect(), &made),
+            None => {
+                let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
+                let cases = keys.map(|(unit, variant)| self.plan.case(block, unit, variant).cast()).collect();
+                (cases, &self.tables)
+            }
+        };
+        let constants = &self.constants[block];
+        let in_batches = constants.run_in_batches(instructions);
+        let step_cap = self.plan.profile.step_cap();
+        let mut series = self.spare.lock().ok().and_then(|mut spare| spare.pop()).unwrap_or_default();
+        series.clear();
+        let unrolled = if in_batches { &cases[..] } else { &[] };
+        let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
+        let may_cross = unrolled.iter().any(|case| may_cross(case, tables, self.dt()));
+        let (starts, every_step) = (&self.starts[..], self.every_step);
+        let stream = Lanes { cases: &cases, tracks: &tracks, starts, one_start_each: false, every_step, may_cross };
+        let models = self.plan.models.len();
+        for (at_model, &model) in self.plan.models.iter().enumerate() {
+            let each = |lane: usize, end: E| each(lane * models + at_model, end);
+            if in_batches {
+                constants.run_stream(model, instructions, &stream, series.entries(), each);
+            } else {
+                self.one_by_one(block, &cases, tables, model, each);
+            }
+        }
+        if let Ok(mut spare) = self.spare.lock() {
+            spare.push(series);
+        }
+    }
+
+    /// Do all lanes run in batches on these instructions? Some criteria iterate and run lane by lane.
+    pub(in crate::engine) fn runs_in_batches(&self, instructions: Instructions) -> bool {
+        self.constants.iter().all(|constants| constants.run_in_batches(instructions))
+    }
+
+    /// Chosen lanes of one block and model in a batch that makes every step; one by one where they do not run in
+    /// batches. Gives the verdicts with their position in `keys`.
+    pub(in crate::engine) fn run_keys(
+        &self,
+        instructions: Instructions,
+        keys: &[LaneKey],
+        mut each: impl FnMut(usize, Verdicts),
+    ) {
+        let Some(&LaneKey { block, model, .. }) = keys.first() else { return };
+        let constants = &self.constants[block];
+        if !constants.run_in_batches(instructions) {
+            return keys.iter().enumerate().for_each(|(at, key)| each(at, self.run(key).verdicts));
+        }
+        let mut tables = Tables::default();
+        let case = |key: &LaneKey| self.case_with_series(key.block, key.unit, key.variant, &mut tables);
+        let cases: Vec<LaneCase<f32>> = keys.iter().map(case).collect();
+        let starts: Vec<Start<f32>> = keys.iter().map(|key| self.starts[key.headway]).collect();
+        let (mut series, step_cap) = (Series::default(), self.plan.profile.step_cap());
+        let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, step_cap)).collect();
+        let may_cross = cases.iter().any(|case| may_cross(case, &tables, self.dt()));
+        let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
+        let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
+        constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
+    }
+
+    /// All lanes of a model, each for itself.
+    fn one_by_one<E: Ending>(
+        &self,
+        block: usize,
+        cases: &[LaneCase<f32>],
+        tables: &Tables<f32>,
+        model: ModelId,
+        mut each: impl FnMut(usize, E),
+    ) {
+        for (at_case, case) in cases.iter().enumerate() {
+            let may_cross = may_cross(case, tables, self.dt());
+            for (at_start, &start) in self.starts.iter().enumerate() {
+                let outcome = self.run_case(block, case, tables, may_cross, start, model);
+                each(at_case * self.starts.len() + at_start, outcome.into());
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! The motions of a task's cases, unrolled: one series per quantity and vehicle, made once for all lanes of a case.
+//! Every series is followed by repetitions of its last entry, so that a batch reads [`ROWS`] entries at a time
+//! without asking where it ends.
+
+use crate::model::scalar::Real;
+use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
+
+use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::lane_case::LaneCase;
+
+/// The pool that series lie in.
+#[derive(Debug, Default)]
+pub(in crate::engine) struct Series {
+    entries: Vec<f32>,
+}
+
+/// One series in the pool; from its last entry on nothing changes.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::engine) struct Track {
+    /// Its first entry.
+    pub first: u32,
+    /// Its last entry, counted from the first.
+    pub last: u32,
+}
+
+/// Where another vehicle is, step by step.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::engine) struct VehicleTracks {
+    /// Speed, m/s.
+    pub speed: Track,
+    /// Lateral position, m.
+    pub position: Track,
+    /// Lateral speed towards the ego, m/s.
+    pub towards: Track,
+}
+
+impl VehicleTracks {
+    /// Speed, lateral position, lateral speed.
+    #[inline(always)]
+    pub fn all(&self) -> [Track; 3] {
+        [self.speed, self.position, self.towards]
+    }
+}
+
+/// Entries that a vehicle's motion takes at most.
+pub(in crate::engine) fn most_entries(step_cap: u32) -> u64 {
+    3 * (u64::from(step_cap) + 1 + ROWS as u64)
+}
+
+impl Series {
+    /// Empty, with its memory.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// All entries.
+    pub fn entries(&self) -> &[f32] {
+        &self.entries
+    }
+
+    /// Unrolls the motions of a case, up to the step cap: principal vehicle, then the one ahead of it. A case without
+    /// the latter has the principal's tracks twice.
+    pub fn unroll(&mut self, case: &LaneCase<f32>, tables: &Tables<f32>, step_cap: u32) -> [VehicleTracks; 2] {
+        let principal = self.vehicle(&case.others[0].motion, tables, step_cap);
+        let ahead = if case.pair != 0 { self.vehicle(&case.others[1].motion, tables, step_cap) } else { principal };
+        [principal, ahead]
+    }
+
+    fn vehicle(&mut self, motion: &Motion<f32>, tables: &Tables<f32>, step_cap: u32) -> VehicleTracks {
+        let cap = step_cap.max(1);
+        let speed = if motion.kind & SPEED_SAMPLED != 0 {
+            let from = motion.speed_offset as usize;
+            let table = &tables.speed[from..from + motion.speed_len.min(cap) as usize];
+            self.track(|entries| entries.extend_from_slice(table))
+        } else {
+            let steps = motion.speed_until.saturating_add(1).min(cap);
+            self.track(|entries| {
+                let speed = |step| (motion.speed_initial + f32::from_step(step) * motion.speed_per_step).larger(0.0);
+                entries.extend((0..steps).map(speed));
+                entries.push(motion.speed_end);
+            })
+        };
+        if motion.kind & LATERAL_SAMPLED != 0 {
+            let from = motion.lateral_offset as usize;
+            let table = &tables.lateral[from..from + motion.lateral_len.min(cap) as usize];
+            let position = self.track(|entries| entries.extend(table.iter().map(|&[position, _]| position)));
+            let towards = self.track(|entries| {
+                entries.extend(table.iter().map(|&[_, towards]| towards));
+                entries.push(0.0);
+            });
+            return VehicleTracks { speed, position, towards };
+        }
+        let steps = motion.lateral_until.saturating_add(1).min(cap);
+        let position = self.track(|entries| {
+            let position = |step| motion.lateral_initial + f32::from_step(step) * motion.lateral_per_step;
+            entries.extend((0..steps).map(position));
+            entries.push(motion.lateral_end);
+        });
+        let towards = self.track(|entries| {
+            entries.resize(entries.len() + steps as usize, motion.lateral_towards);
+            entries.push(0.0);
+        });
+        VehicleTracks { speed, position, towards }
+    }
+
+    /// Adds a series of at least one entry.
+    fn track(&mut self, add: impl FnOnce(&mut Vec<f32>)) -> Track {
+        let first = self.entries.len();
+        add(&mut self.entries);
+        let end = self.entries[self.entries.len() - 1];
+        let held = self.entries[first..].iter().rev().take_while(|v| v.to_bits() == end.to_bits()).count();
+        let last = self.entries.len() - held;
+        self.entries.resize(last + ROWS, end);
+        // A task's share of memory is far below this.
+        let place = |at: usize| u32::try_from(at).expect("a task's series have less than 2^32 entries");
+        Track { first: place(first), last: place(last - first) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Lateral, Speed};
+
+    /// What a lane of the task sees is what the motion itself says, at every step, beyond the end too.
+    #[test]
+    fn unrolled_series_are_the_motions() {
+        let sampled = Speed::Sampled(vec![10.0, 9.0, 8.5, 8.5, 8.5]);
+        let braking = Speed::Kinematic { initial_mps: 3.0, acceleration_mps2: -2.0, until_s: 2.0 };
+        let change = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.25 };
+        let recorded = Lateral::Sampled { position_m: vec![2.0, 1.9, 1.9], towards_mps: vec![1.0, 1.0, 0.5] };
+        for (speed, lateral) in [(&sampled, &change), (&braking, &recorded), (&Speed::constant(7.0), &Lateral::Centred)]
+        {
+            let mut tables = Tables::default();
+            let motion: Motion<f32> = Motion::encode(speed, lateral, 0.1, &mut tables).cast();
+            let tables: Tables<f32> = tables.cast();
+            let mut series = Series::default();
+            let tracks = series.vehicle(&motion, &tables, 1200);
+            let at = |track: Track, step: u32| series.entries[(track.first + step.min(track.last)) as usize];
+            for step in 0..1200 {
+                assert_eq!(at(tracks.speed, step), motion.speed(&tables, step), "{speed:?} {step}");
+                let state = motion.lateral(&tables, step);
+                assert_eq!(at(tracks.position, step), state.position, "{lateral:?} {step}");
+                assert_eq!(at(tracks.towards, step), state.towards, "{lateral:?} {step}");
+            }
+            for track in [tracks.speed, tracks.position, tracks.towards] {
+                let from = (track.first + track.last) as usize;
+                assert!(series.entries[from..from + ROWS].iter().all(|&v| v == series.entries[from]));
+            }
+        }
+    }
+
+    /// A motion that goes on to the cap takes no more entries than the lane has steps.
+    #[test]
+    fn a_motion_without_end_is_unrolled_to_the_cap() {
+        let speed = Speed::Kinematic { initial_mps: 3.0, acceleration_mps2: 0.5, until_s: f64::MAX };
+        let motion = Motion::encode(&speed, &Lateral::Centred, 0.1, &mut Tables::default()).cast();
+        let mut series = Series::default();
+        series.vehicle(&motion, &Tables::default(), 100);
+        assert!(series.entries.len() as u64 <= most_entries(100));
+    }
+}

@@ -1,0 +1,191 @@
+//! The instruction sets that a batch of lanes can run on, chosen at run time: one binary is fast everywhere.
+//!
+//! Every set computes the same words. None has a fused multiply-add switched on: lanes round after every operation.
+
+// Calls of functions compiled for an instruction set, after the machine was asked for it; loads and stores in them.
+#![allow(unsafe_code)]
+
+#[cfg(target_arch = "x86_64")]
+use super::{
+    batch::Slots,
+    batch_arrays::{LANES, ROWS, TrackArrays, Words},
+    pending::ROOM,
+    transpose::{goes_on, places},
+};
+use crate::engine::cpu::batch::{Fleet, burst};
+use crate::engine::cpu::instructions::Instructions;
+use crate::engine::cpu::pending::{Waiting, take};
+use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::transpose::Window;
+use crate::engine::frame::Simulation;
+use crate::model::driver::DriverModel;
+
+/// [`burst`] compiled for an instruction set and a set of rules.
+///
+/// Only [`burst_for`] makes one, and only for instructions that the machine has.
+pub(in crate::engine) struct Burst<M> {
+    run: unsafe fn(&Simulation<f32, M>, &mut Fleet<'_>, &mut Waiting),
+}
+
+impl<M> Burst<M> {
+    /// Runs it.
+    #[inline]
+    pub(in crate::engine) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, waiting: &mut Waiting) {
+        // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
+        // asked the machine for them.
+        unsafe { (self.run)(simulation, fleet, waiting) }
+    }
+}
+
+/// The function of a set of rules: one instance per set.
+macro_rules! for_rules {
+    ($burst:ident, $model:ty, $rules:expr) => {
+        match $rules.bits() {
+            0 => $burst::<$model, 0>,
+            1 => $burst::<$model, 1>,
+            2 => $burst::<$model, 2>,
+            3 => $burst::<$model, 3>,
+            4 => $burst::<$model, 4>,
+            5 => $burst::<$model, 5>,
+            6 => $burst::<$model, 6>,
+            7 => $burst::<$model, 7>,
+            8 => $burst::<$model, 8>,
+            9 => $burst::<$model, 9>,
+            10 => $burst::<$model, 10>,
+            11 => $burst::<$model, 11>,
+            12 => $burst::<$model, 12>,
+            13 => $burst::<$model, 13>,
+            14 => $burst::<$model, 14>,
+            15 => $burst::<$model, 15>,
+            16 => $burst::<$model, 16>,
+            17 => $burst::<$model, 17>,
+            18 => $burst::<$model, 18>,
+            19 => $burst::<$model, 19>,
+            20 => $burst::<$model, 20>,
+            21 => $burst::<$model, 21>,
+            22 => $burst::<$model, 22>,
+            23 => $burst::<$model, 23>,
+            24 => $burst::<$model, 24>,
+            25 => $burst::<$model, 25>,
+            Rules::SETS.. => return None,
+        }
+    };
+}
+
+/// The burst for these rules on an instruction set; `None` where lanes run one by one.
+pub(in crate::engine) fn burst_for<M: DriverModel<f32>>(instructions: Instructions, rules: Rules) -> Option<Burst<M>> {
+    if !instructions.is_available() {
+        return None;
+    }
+    match instructions {
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => Some(Burst { run: for_rules!(burst_avx2, M, rules) }),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512 => Some(Burst { run: for_rules!(burst_avx512, M, rules) }),
+        #[cfg(target_arch = "aarch64")]
+        Instructions::Neon => Some(Burst { run: for_rules!(burst_neon, M, rules) }),
+        _ => None,
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
+    simulation: &Simulation<f32, M>,
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
+    simulation: &Simulation<f32, M>,
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(
+        simulation,
+        fleet,
+        waiting,
+        |rows, waiting, from, slots| take_avx512(rows, waiting, from, slots),
+        |window, tracks, steps, entries| turn_avx512(window, tracks, steps, entries),
+    );
+}
+
+#[cfg(target_arch = "aarch64")]
+fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
+    simulation: &Simulation<f32, M>,
+    fleet: &mut Fleet<'_>,
+    waiting: &mut Waiting,
+) {
+    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
+}
+
+/// [`take`] in registers: the entries of a row, expanded into the slots.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+#[inline]
+fn take_avx512(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
+    use std::arch::x86_64::*;
+    assert!(from + LANES <= ROOM, "lanes are taken from beyond the room");
+    for (row, waiting) in rows.iter_mut().zip(waiting) {
+        // SAFETY: a row of those that wait has LANES entries from there on, as has just been asserted; a row of a
+        // batch has LANES.
+        unsafe {
+            let next = _mm512_loadu_si512(waiting.as_ptr().add(from).cast());
+            let old = _mm512_loadu_si512(row.as_ptr().cast());
+            _mm512_storeu_si512(row.as_mut_ptr().cast(), _mm512_mask_expand_epi32(old, slots, next));
+        }
+    }
+}
+
+/// [`Window::turn`] in registers: a square of 16 lanes and 16 steps is transposed by 64 shuffles.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+#[inline]
+fn turn_avx512(window: &mut Window, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
+    use std::arch::x86_64::*;
+    const { assert!(LANES == 16 && ROWS == 16) };
+    let places = places(tracks, steps);
+    let mut furthest = 0;
+    for &from in &places {
+        furthest = furthest.max(from);
+    }
+    assert!(furthest as usize + ROWS <= entries.len(), "a lane reads beyond the series");
+    // No closure and no adapter here: those of the standard library are not compiled for these instructions.
+    let mut r = [_mm512_setzero_ps(); 16];
+    for (register, &from) in r.iter_mut().zip(&places) {
+        // SAFETY: each place has ROWS entries after it, as has just been asserted.
+        *register = unsafe { _mm512_loadu_ps(entries.as_ptr().add(from as usize)) };
+    }
+    // Squares of 4 by 4, within the quarters of the registers.
+    for lanes in r.chunks_exact_mut(4) {
+        let low_01 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[0], lanes[1]));
+        let high_01 = _mm512_castps_pd(_mm512_unpackhi_ps(lanes[0], lanes[1]));
+        let low_23 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[2], lanes[3]));
+        let high_23 = _mm512_castps_pd(_mm512_unpackhi_ps(lanes[2], lanes[3]));
+        lanes[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(low_01, low_23));
+        lanes[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(low_01, low_23));
+        lanes[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(high_01, high_23));
+        lanes[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(high_01, high_23));
+    }
+    // Register 4q + j has, in quarter p, step 4p + j of lanes 4q to 4q + 3: the quarters change places.
+    for j in 0..4 {
+        let (a, b, c, d) = (r[j], r[4 + j], r[8 + j], r[12 + j]);
+        let (low_ab, high_ab) = (_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b));
+        let (low_cd, high_cd) = (_mm512_shuffle_f32x4::<0x44>(c, d), _mm512_shuffle_f32x4::<0xee>(c, d));
+        let rows = [
+            _mm512_shuffle_f32x4::<0x88>(low_ab, low_cd),
+            _mm512_shuffle_f32x4::<0xdd>(low_ab, low_cd),
+            _mm512_shuffle_f32x4::<0x88>(high_ab, high_cd),
+            _mm512_shuffle_f32x4::<0xdd>(high_ab, high_cd),
+        ];
+        for (p, row) in rows.into_iter().enumerate() {
+            // SAFETY: a row has 16 numbers.
+            unsafe { _mm512_storeu_ps(window.rows[4 * p + j].as_mut_ptr(), row) };
+        }
+    }
+    window.moves = goes_on(tracks, steps);
+}

@@ -1,0 +1,189 @@
+//! Lanes in which a driver only follows: at ease.
+//!
+//! A driver who keeps a comfortable distance from a vehicle that keeps its speed often comes near it ever more slowly, in
+//! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part is
+//! left, [`DriverModel::check_at_ease`], however hard the driver brakes by it. Where only verdicts are wanted, batches make these steps
+//! among lanes at ease, which work out nothing else. [`ease_steps`] says for how long that is the whole step, to the bit.
+
+use crate::model::driver::DriverModel;
+use crate::model::scalar::Real;
+
+use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::frame::Simulation;
+use crate::engine::lane_step::{LaneConstants, LaneState, Whereabouts, criteria_safe_gap};
+
+/// At most so many steps are foreseen at once: few enough for what rounding does to their gaps.
+const MOST: u32 = 1024;
+
+/// How many of a lane's next steps are at ease for certain, at most [`MOST`]. `state` is between two steps, at
+/// `state.index` at least 1; the other vehicle, the only one, keeps speed and lateral position of `place` for ever.
+pub(in crate::engine) fn ease_steps<M: DriverModel<f32>>(
+    simulation: &Simulation<f32, M>,
+    lane: &LaneConstants<f32>,
+    state: &LaneState<f32>,
+    place: &Whereabouts<f32>,
+) -> u32 {
+    let &Simulation { frame, criteria, model, scene, .. } = simulation;
+    let (other, index, gap) = (&lane.others[0], state.index, state.gaps[0]);
+    let in_lane = scene.in_lane || place.position.abs() - other.half_widths < 0.0 && index >= other.attend_from;
+    let there = scene.always_there || index >= other.present_from && other.present_until >= frame.step_cap;
+    // Behind one that drives backwards a lane can end at rest without being settled, which nobody asks at ease.
+    if !in_lane || !there || state.driver.delay_steps > 0 || place.speed < 0.0 {
+        return 0;
+    }
+    // From here on the closing speed grows no more, so what is safe at it is safe at every later one.
+    let closing = (state.v_ego - place.speed).max(0.0);
+    let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
+    // What is no number stays none: the larger of two takes that of its second.
+    let safe = of_criteria.larger(model.ease_gap(state.v_ego, place.speed));
+    // Thousandths and a millimetre for what rounding does to the distances and to the sums.
+    let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
+    let by = 1.001 * closing * frame.dt;
+    let most = MOST.min(frame.step_cap.saturating_sub(index + ROWS as u32));
+    // None where there is no room or no number.
+    ((room / by) as u32).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::drivers::Constants;
+    use crate::engine::lane_step::{OtherConstants, Record, advance};
+    use crate::engine::outcome::NO_STEP;
+    use crate::engine::scene::Scene;
+    use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
+    use crate::model::driver::{DriverProfile, DriverState};
+    use crate::model::flag::Flag;
+    use crate::model::profile::Profile;
+    use crate::scenario::Category;
+    use crate::stats::random::{philox4x32_10, unit_uniform};
+
+    /// A lane behind a vehicle that keeps its speed, somewhere in its run: the ego brakes or has braked.
+    fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, Whereabouts<f32>) {
+        let mut drawn = 0;
+        let mut between = |least: f32, most: f32| {
+            drawn += 1;
+            least + (most - least) * unit_uniform(philox4x32_10([drawn, number, 0, 0], [11, 0])[0])
+        };
+        let speed = between(0.0, 40.0);
+        let place = Whereabouts { speed, position: between(-2.2, 2.2), towards: 0.0 };
+        let other = OtherConstants {
+            half_lengths: 4.5,
+            half_widths: 1.9,
+            present_from: 0,
+            present_until: Flag::LATEST_STEP,
+            attend_from: if between(0.0, 1.0) < 0.9 { 0 } else { between(0.0, 3000.0) as u32 },
+            judged: Flag::of(between(0.0, 1.0) < 0.9),
+        };
+        let horizon = if between(0.0, 1.0) < 0.5 { between(0.0, 3000.0) as u32 } else { Flag::LATEST_STEP };
+        let lane = LaneConstants { others: [other; 2], ego_width: 1.9, horizon };
+        let v_ego = (speed + between(-0.2, 1.0) * between(0.0, 10.0)).max(0.0);
+        let deceleration = between(0.0, 4.0);
+        let state = LaneState {
+            index: between(1.0, 2900.0) as u32,
+            v_ego,
+            v_before: v_ego + between(0.0, 1.0) * deceleration * 0.04,
+            gaps: [v_ego * between(0.3, 3.0); 2],
+            driver: DriverState { deceleration, delay_steps: u32::from(between(0.0, 1.0) < 0.05) },
+            reaction_step: NO_STEP,
+            record: Record {
+                ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
+                btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
+                min_gap: 0.0,
+            },
+            over: Flag::FALSE,
+        };
+        (lane, state, place)
+    }
+
+    /// Steps at ease are those that the lane makes anyway: same speed, gap and deceleration, to the bit, and no verdict
+    /// changes. A lane that ends among them does so because it is settled, from the first such step past the horizon
+    /// on.
+    #[test]
+    fn steps_at_ease_are_the_whole_step() {
+        for name in Profile::names() {
+            let constants = Constants::<f32>::resolve(&Profile::load(name).unwrap(), Category::Lvd);
+            let criteria = &Criteria { keeps_values: false, ..constants.criteria };
+            let frame = &crate::engine::frame::Frame { step_cap: 3000, abort_above_ttc: 0.0, ..constants.frames[3] };
+            let whole =
+                Simulation { frame, criteria, model: &constants.fsm, model_index: 3, scene: Scene::unknown(false) };
+            let short = Simulation { scene: Scene { at_ease: true, ..Scene::in_lane() }, ..whole };
+            let (mut eased, mut braking, mut settled) = (0, 0, 0);
+            for number in 0..20_000 {
+                let (lane, start, place) = lane(number);
+                let steps = ease_steps(&whole, &lane, &start, &place);
+                let what = |index: u32| format!("{name}, lane {number}, step {index} of {}+{steps}", start.index);
+                let mut state = start;
+                for _ in 0..steps {
+                    let index = state.index;
+                    let of_ease = LaneState {
+                        index: 1,
+                        v_before: state.v_ego,
+                        driver: DriverState { delay_steps: 0, ..state.driver },
+                        ..state
+                    };
+                    let eased = advance(&short, &lane, &of_ease, &[place; 2]).state;
+                    let next = advance(&whole, &lane, &state, &[place; 2]).state;
+                    let is_settled = state.v_ego <= place.speed && index >= lane.horizon;
+                    assert_eq!(next.over.holds(), is_settled, "{}", what(index));
+                    let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
+                    assert_eq!(failed(&next), failed(&start), "{}", what(index));
+                    let moved = |state: &LaneState<f32>| (state.v_ego, state.gaps[0], state.driver.deceleration);
+                    assert_eq!(moved(&eased), moved(&next), "{}", what(index));
+                    assert!(next.v_ego <= state.v_ego, "{}", what(index));
+                    braking += u32::from(next.v_ego < state.v_ego);
+                    state = next;
+                    if is_settled {
+                        settled += 1;
+                        break;
+                    }
+                }
+                eased += u32::from(steps > 0);
+            }
+            assert!(eased > 5000 && braking > 200_000 && settled > 200, "{name}: {eased} {braking} {settled}");
+        }
+    }
+
+    /// No lane is at ease whose driver does not attend yet or waits, whose leader is beside the lane or drives
+    /// backwards, or that is about to reach the cap.
+    #[test]
+    fn who_does_not_follow_is_not_at_ease() {
+        let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
+        let frame = &constants.frames[3];
+        let (criteria, model) = (&constants.criteria, &constants.fsm);
+        let simulation = Simulation { frame, criteria, model, model_index: 3, scene: Scene::unknown(false) };
+        let (lane, state, place) = lane(1);
+        let lane = LaneConstants { others: [OtherConstants { attend_from: 0, ..lane.others[0] }; 2], ..lane };
+        let driver = DriverState { deceleration: 0.0, delay_steps: 0 };
+        let state = LaneState { index: 100, gaps: [80.0; 2], v_ego: 20.0, v_before: 20.0, driver, ..state };
+        let place = Whereabouts { speed: 19.0, position: 0.0, ..place };
+        let steps = |lane: &LaneConstants<f32>, state: &LaneState<f32>, place: &Whereabouts<f32>| {
+            ease_steps(&simulation, lane, state, place)
+        };
+        assert!(steps(&lane, &state, &place) > 500);
+        let with = |other: OtherConstants<f32>| LaneConstants { others: [other; 2], ..lane };
+        let other = lane.others[0];
+        assert_eq!(steps(&with(OtherConstants { attend_from: 101, ..other }), &state, &place), 0);
+        assert_eq!(steps(&with(OtherConstants { present_from: 101, ..other }), &state, &place), 0);
+        assert_eq!(steps(&with(OtherConstants { present_until: 150, ..other }), &state, &place), 0);
+        assert_eq!(steps(&lane, &LaneState { driver: DriverState { delay_steps: 1, ..driver }, ..state }, &place), 0);
+        assert_eq!(steps(&lane, &state, &Whereabouts { position: 3.5, ..place }), 0);
+        assert_eq!(steps(&lane, &state, &Whereabouts { speed: -1.0, ..place }), 0);
+        assert_eq!(steps(&lane, &LaneState { index: frame.step_cap - ROWS as u32, ..state }, &place), 0);
+        // Nearer, and faster: fewer steps.
+        let nearer = LaneState { gaps: [10.0; 2], ..state };
+        let faster = LaneState { v_ego: 25.0, ..state };
+        let near = (steps(&lane, &nearer, &place), steps(&lane, &faster, &place));
+        assert!(near.0 > 10 && near.0 < 250 && near.1 > 100 && near.1 < 500, "{near:?}");
+        // A model whose distance is no number promises nothing.
+        let mut profile = Profile::load("paper").unwrap().fsm;
+        profile.comfortable_deceleration_mps2 = 0.0;
+        let model = &profile.resolve::<f32>(0.04, Category::Lvd);
+        let place = Whereabouts { speed: state.v_ego, ..place };
+        assert!(model.ease_gap(state.v_ego, place.speed).is_nan());
+        assert_eq!(ease_steps(&Simulation { model, ..simulation }, &lane, &state, &place), 0);
+        for gap in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(steps(&lane, &LaneState { gaps: [gap; 2], ..state }, &place), 0, "{gap}");
+        }
+    }
+}

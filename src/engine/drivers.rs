@@ -1,0 +1,121 @@
+//! The profile's constants for one category, resolved, and the dispatch over driver models.
+
+use crate::model::criterion::Criteria;
+use crate::model::driver::{self, DriverModel, DriverProfile, ModelId};
+use crate::model::profile::Profile;
+use crate::model::scalar::Real;
+use crate::scenario::{Category, Tables};
+
+use super::cpu::instructions::Instructions;
+use super::cpu::lane_result::Ending;
+use super::cpu::pending::Lanes;
+use super::cpu::rules::Rules;
+use super::cpu::stream::run_stream;
+use super::frame::{Frame, Simulation, Start};
+use super::lane::{Observer, run_lane};
+use super::lane_case::LaneCase;
+use super::outcome::Outcome;
+use super::scene::Scene;
+
+/// Makes [`Constants`] and its dispatch from the registry of driver models.
+macro_rules! declare_constants {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// Everything a lane of one category takes from the profile, as plain constants.
+        #[derive(Debug, Clone, Copy)]
+        pub struct Constants<R> {
+            /// Criteria.
+            pub criteria: Criteria<R>,
+            /// Time and end rules, per model in the order of [`ModelId::ALL`].
+            pub frames: [Frame<R>; driver::MODELS],
+            $(
+                #[doc = $name]
+                pub $file: driver::$model<R>,
+            )+
+        }
+
+        impl<R: Real> Constants<R> {
+            /// Resolves a profile, in f64, and rounds once.
+            pub fn resolve(profile: &Profile, category: Category) -> Self {
+                let dt_s = profile.frame.dt_s;
+                Constants {
+                    criteria: profile.criteria.resolve(),
+                    frames: [$(Frame::resolve(&profile.frame, profile.$file.abort_above_ttc_s())),+],
+                    $($file: profile.$file.resolve(dt_s, category),)+
+                }
+            }
+
+            /// Runs one lane with the chosen model.
+            #[inline]
+            pub fn run(
+                &self,
+                id: ModelId,
+                case: &LaneCase<R>,
+                tables: &Tables<R>,
+                start: Start<R>,
+                observer: &mut impl Observer<R>,
+            ) -> Outcome<R> {
+                self.run_in(id, Scene::unknown(case.pair != 0), case, tables, start, observer)
+            }
+
+            /// The same where something is known of the case.
+            #[inline]
+            pub(super) fn run_in(
+                &self,
+                id: ModelId,
+                scene: Scene,
+                case: &LaneCase<R>,
+                tables: &Tables<R>,
+                start: Start<R>,
+                observer: &mut impl Observer<R>,
+            ) -> Outcome<R> {
+                let (criteria, model_index) = (&self.criteria, id.index());
+                let frame = &self.frames[model_index];
+                match id {
+                    $(ModelId::$model => {
+                        let model = &self.$file;
+                        let simulation = Simulation { frame, criteria, model, model_index, scene };
+                        run_lane(&simulation, case, tables, start, observer)
+                    })+
+                }
+            }
+
+            /// The constants of a model by the names that its shader gives them.
+            pub fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
+                match id {
+                    $(ModelId::$model => self.$file.shader_constants(),)+
+                }
+            }
+        }
+
+        impl Constants<f32> {
+            /// Do lanes run in batches on such instructions, or one by one?
+            pub(super) fn run_in_batches(&self, instructions: Instructions) -> bool {
+                let has_burst = instructions != Instructions::Scalar && instructions.is_available();
+                has_burst && Rules::of(&self.frames[0], &self.criteria, Scene::unknown(true), true).is_some()
+            }
+
+            /// Runs a stream of lanes of the chosen model in batches, where they [run in
+            /// batches](Constants::run_in_batches), and gives what they say in the order in which they end: lane,
+            /// counted within the stream, and its end. `entries` are the series that the stream's tracks point into.
+            pub(super) fn run_stream<E: Ending>(
+                &self,
+                id: ModelId,
+                instructions: Instructions,
+                stream: &Lanes<'_>,
+                entries: &[f32],
+                each: impl FnMut(usize, E),
+            ) {
+                let model_index = id.index();
+                let (criteria, frame) = (&self.criteria, &self.frames[model_index]);
+                let scene = Scene::of(stream.cases, model_index, stream.may_cross);
+                match id {
+                    $(ModelId::$model => {
+                        let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
+                        run_stream(&simulation, instructions, stream, entries, each);
+                    })+
+                }
+            }
+        }
+    };
+}
+for_every_driver_model!(declare_constants);

@@ -1,0 +1,186 @@
+//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points, or
+//! a table of given points. Twin: `shaders/shared/points.wgsl`.
+
+use crate::stats::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
+
+/// Parameters of a point at most.
+pub const MOST_PARAMETERS: usize = 14;
+
+/// Draws of a sample index at most: where all are invalid, the sample is void.
+pub const ATTEMPTS: u32 = 64;
+
+/// Blocks of four words per draw.
+const BLOCKS: u32 = 4;
+
+/// Where a sample's words come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PointSource {
+    /// Philox: independent, redrawn where a point is invalid.
+    Random(Stream),
+    /// Owen-scrambled Sobol points; an invalid point is void, as a redraw would break their balance. Two coordinates
+    /// choose the component, one more per parameter.
+    Sobol(Sobol),
+    /// Point `i` is mean `i`.
+    Given,
+}
+
+/// A sample's point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// One value per parameter, then zeros. Means nothing where the sample is void.
+    pub values: [f32; MOST_PARAMETERS],
+    /// Draws that it took; [`ATTEMPTS`] + 1 where all were invalid.
+    pub tries: u32,
+}
+
+impl Drawn {
+    /// No draw was valid: the sample has no case.
+    pub fn is_void(&self) -> bool {
+        self.tries > ATTEMPTS
+    }
+}
+
+/// How points are drawn, in the numbers of every backend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points {
+    /// Where words come from.
+    pub source: PointSource,
+    /// Parameters of a point, 1 to [`MOST_PARAMETERS`].
+    pub dimensions: usize,
+    /// Component by its weight; `None` where all weigh the same.
+    pub weights: Option<AliasTable>,
+    /// Means, `dimensions` per component.
+    pub means: Vec<f32>,
+    /// Index of each component's factor.
+    pub factor_of: Vec<u32>,
+    /// Factors: `dimensions`² each, row by row, zeros above the diagonal.
+    pub factors: Vec<f32>,
+}
+
+impl Points {
+    /// Number of components.
+    pub fn components(&self) -> u32 {
+        self.factor_of.len() as u32
+    }
+
+    /// Number of points; `None` where every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
+    pub fn count(&self) -> Option<u64> {
+        match &self.source {
+            PointSource::Random(_) => None,
+            PointSource::Sobol(_) => Some(SOBOL_POINTS),
+            PointSource::Given => Some(u64::from(self.components())),
+        }
+    }
+
+    /// The first valid draw of an index.
+    ///
+    /// # Panics
+    /// For an index beyond [`Points::count`]: there is no such point, and none may stand in for it.
+    #[inline]
+    pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> Drawn {
+        let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
+        for attempt in 0..attempts {
+            let values = self.candidate(index, attempt);
+            if is_valid(&values[..self.dimensions]) {
+                return Drawn { values, tries: attempt + 1 };
+            }
+        }
+        Drawn { values: [0.0; MOST_PARAMETERS], tries: ATTEMPTS + 1 }
+    }
+
+    /// The component that a draw comes from: that of draw `tries` (from 1) of an index. `None` for given points.
+    pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
+        let [a, b] = match &self.source {
+            PointSource::Random(stream) => {
+                let [a, b, ..] = stream.words(index, tries.checked_sub(1)? * BLOCKS);
+                [a, b]
+            }
+            PointSource::Sobol(sobol) => [sobol.word(index, 0)?, sobol.word(index, 1)?],
+            PointSource::Given => return None,
+        };
+        Some(self.chosen(a, b))
+    }
+
+    #[inline]
+    fn chosen(&self, word_a: u32, word_b: u32) -> u32 {
+        match &self.weights {
+            Some(table) => table.pick(word_a, word_b),
+            None => choose(word_a, self.components()),
+        }
+    }
+
+    /// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
+    #[inline]
+    fn candidate(&self, index: u64, attempt: u32) -> [f32; MOST_PARAMETERS] {
+        let d = self.dimensions;
+        let mut words = [0_u32; 4 * BLOCKS as usize];
+        match &self.source {
+            PointSource::Random(stream) => {
+                let blocks = (2 + d).div_ceil(4);
+                for (block, four) in words.chunks_exact_mut(4).take(blocks).enumerate() {
+                    four.copy_from_slice(&stream.words(index, attempt * BLOCKS + block as u32));
+                }
+            }
+            PointSource::Sobol(sobol) => {
+                for (dimension, word) in words.iter_mut().take(2 + d).enumerate() {
+                    // A plan holds no index beyond the points, and `Sobol` was made with 2 + d dimensions.
+                    *word = sobol.word(index, dimension as u32).expect("the sequence has this point");
+                }
+            }
+            PointSource::Given => {
+                let mut values = [0.0; MOST_PARAMETERS];
+                let first = index as usize * d;
+                values[..d].copy_from_slice(&self.means[first..first + d]);
+                return values;
+            }
+        }
+        let component = self.chosen(words[0], words[1]) as usize;
+        let factor = &self.factors[self.factor_of[component] as usize * d * d..][..d * d];
+        let mean = &self.means[component * d..][..d];
+        let mut deviates = [0.0; MOST_PARAMETERS];
+        for (deviate, &word) in deviates.iter_mut().zip(&words[2..2 + d]) {
+            *deviate = standard_normal(word);
+        }
+        let mut values = [0.0; MOST_PARAMETERS];
+        for j in 0..d {
+            let mut value = mean[j];
+            for k in 0..=j {
+                value += factor[j * d + k] * deviates[k];
+            }
+            values[j] = value;
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(source: PointSource) -> Points {
+        let (means, factor_of) = (vec![1.0, 2.0, 3.0], vec![0, 0, 0]);
+        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0] }
+    }
+
+    #[test]
+    fn every_point_that_is_counted_can_be_drawn() {
+        let given = points(PointSource::Given);
+        let values = (0..given.count().unwrap()).map(|index| given.draw(index, |_| true).values[0]);
+        assert_eq!(values.collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+        let sobol = points(PointSource::Sobol(Sobol::new(7, 3).unwrap()));
+        assert!(!sobol.draw(sobol.count().unwrap() - 1, |_| true).is_void());
+        assert_eq!(points(PointSource::Random(Stream { seed: 7, purpose: 0 })).count(), None);
+    }
+
+    #[test]
+    #[should_panic(expected = "the sequence has this point")]
+    fn no_word_stands_in_for_a_sobol_point_that_there_is_not() {
+        points(PointSource::Sobol(Sobol::new(7, 3).unwrap())).draw(SOBOL_POINTS, |_| true);
+    }
+
+    #[test]
+    #[should_panic(expected = "out of range")]
+    fn no_given_point_stands_in_for_one_that_was_not_given() {
+        points(PointSource::Given).draw(3, |_| true);
+    }
+}

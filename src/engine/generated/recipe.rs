@@ -1,0 +1,191 @@
+//! What a point's numbers mean, as one flat record that host and device share. Twin: `Recipe` in
+//! `shaders/shared/recipe.wgsl`.
+
+use crate::engine::lane_case::{LaneCase, LaneOther};
+use crate::model::driver::{AttentionRule, MODELS};
+use crate::model::scalar::Real;
+use crate::scenario::Motion;
+
+use super::points::MOST_PARAMETERS;
+
+/// A quantity that a case is made of; its code is its place in [`Recipe::slots`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Quantity {
+    /// Speed of cutter or cutting-out vehicle at t = 0, m/s; LVD: of the leader.
+    TargetSpeed,
+    /// Size of the lateral speed, m/s.
+    LateralSpeed,
+    /// Speed of the ego, m/s; LVD: that of the leader where it has no slot.
+    EgoSpeed,
+    /// Acceleration of the target over [0, T], m/s².
+    TargetAcceleration,
+    /// Speed of the vehicle ahead at t = 0, m/s.
+    LeadSpeed,
+    /// Its acceleration over [0, T], m/s².
+    LeadAcceleration,
+    /// Gap D, m.
+    LeadGap,
+    /// T, s.
+    Duration,
+    /// LVD: speed of the leader at the end, m/s.
+    FinalSpeed,
+    /// LVD: (v0 − v1)/T, m/s².
+    MeanDeceleration,
+    /// Time headway, s.
+    TimeHeadway,
+}
+
+/// Number of quantities.
+pub const QUANTITIES: usize = 11;
+/// A quantity that no parameter gives.
+pub const NO_SLOT: u32 = u32::MAX;
+
+/// How speeds and lateral positions follow from a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Path {
+    /// Constant speeds and accelerations.
+    Kinematic,
+    /// LVD ii: half a cosine.
+    Sinusoid,
+    /// Coefficients of a decomposition.
+    Reduced,
+}
+
+/// Lateral motion of the principal vehicle on kinematic paths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Lateral {
+    /// In the middle of the ego's lane.
+    Centred,
+    /// From the side into the ego's lane at constant lateral speed.
+    Entering,
+    /// Out of the ego's lane at constant lateral speed.
+    Leaving,
+    /// Beside the ego's lane from the start.
+    Gone,
+}
+
+/// Columns of a reduction's vector.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ReducedColumns {
+    /// Columns of the vector in all.
+    pub width: u32,
+    /// Instants per series, at least 2.
+    pub instants: u32,
+    /// Coefficients.
+    pub coefficients: u32,
+    /// First column of the lateral series; [`NO_SLOT`] in LVD.
+    pub lateral: u32,
+    /// First column of the target's speed.
+    pub speed: u32,
+    /// First column of the speed ahead; [`NO_SLOT`] but in cut-out.
+    pub lead_speed: u32,
+    /// Column of the ego's speed; LVD: first column of the leader's.
+    pub ego_speed: u32,
+    /// Column of D; [`NO_SLOT`] but in cut-out.
+    pub lead_gap: u32,
+    /// Column of T.
+    pub duration: u32,
+}
+
+/// From a point to a case. Words and binary32 numbers only: host and device hold the same bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recipe {
+    /// [`Path`] as a number.
+    pub path: u32,
+    /// [`Lateral`] as a number.
+    pub lateral: u32,
+    /// Parameters of a point.
+    pub dimensions: u32,
+    /// 1 where a second vehicle stands ahead of the principal one.
+    pub pair: u32,
+    /// 1 where v1 < v0 and T = (v0 − v1)/ā in its range are asked for (LVD i and ii).
+    pub decelerates: u32,
+    /// 1 where accelerations go on after T.
+    pub unlimited: u32,
+    /// 1 where the criteria judge the principal vehicle.
+    pub judged: u32,
+    /// Last step of every lane.
+    pub step_cap: u32,
+    /// Index of the parameter that gives each [`Quantity`], or [`NO_SLOT`].
+    pub slots: [u32; QUANTITIES],
+    /// Columns of the reduction.
+    pub columns: ReducedColumns,
+    /// Least valid value of each parameter.
+    pub lower: [f32; MOST_PARAMETERS],
+    /// Largest valid value of each parameter.
+    pub upper: [f32; MOST_PARAMETERS],
+    /// Least valid T that follows from other numbers, s.
+    pub least_duration: f32,
+    /// Largest valid T that follows from other numbers, s.
+    pub longest_duration: f32,
+    /// Time step, s.
+    pub dt: f32,
+    /// 1/dt, 1/s.
+    pub inverse_dt: f32,
+    /// Lateral way of a lane change, m.
+    pub lane_change: f32,
+    /// (L_e + L_o)/2 of the principal vehicle and of the one ahead, m.
+    pub half_lengths: [f32; 2],
+    /// (W_e + W_o)/2 of both, m.
+    pub half_widths: [f32; 2],
+    /// Length of the principal vehicle, m.
+    pub principal_length: f32,
+    /// Width of the ego, m.
+    pub ego_width: f32,
+    /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+    pub attention: [AttentionRule<f32>; MODELS],
+}
+
+impl Recipe {
+    /// How motions follow from a point.
+    pub fn path(&self) -> Path {
+        match self.path {
+            0 => Path::Kinematic,
+            1 => Path::Sinusoid,
+            _ => Path::Reduced,
+        }
+    }
+
+    /// Entries of the longest series that a valid point can have.
+    pub fn longest_series(&self) -> u32 {
+        let steps = (f64::from(self.longest_duration) * f64::from(self.inverse_dt)).ceil() as u32;
+        steps.min(self.step_cap) + 1
+    }
+
+    /// Speed series of a reduced case.
+    pub(super) fn speed_series(&self) -> u32 {
+        1 + u32::from(self.columns.lead_speed != NO_SLOT)
+    }
+
+    /// Lateral series of a reduced case.
+    pub(super) fn lateral_series(&self) -> u32 {
+        u32::from(self.columns.lateral != NO_SLOT)
+    }
+
+    /// The case of a void sample: nobody is there, and the ego stands. Its lanes end at once and fail nothing.
+    pub(super) fn void<R: Real>(&self) -> LaneCase<R> {
+        let nobody = LaneOther {
+            motion: Motion::resting(),
+            half_lengths: R::from_f64(self.half_lengths[0].into()),
+            half_widths: R::from_f64(self.half_widths[0].into()),
+            gap_offset: R::ZERO,
+            present_from: 0,
+            present_until: 0,
+            attend_from: [0; MODELS],
+            used: 0,
+            judged: 0,
+        };
+        LaneCase {
+            others: [nobody; 2],
+            ego_speed: R::ZERO,
+            ego_width: R::from_f64(self.ego_width.into()),
+            horizon: 0,
+            pair: 0,
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The GPU as a backend: opened once, used by any number of sessions.
+
+use std::sync::mpsc::Sender;
+use std::thread::JoinHandle;
+
+use super::adapters::{AdapterCard, Adapters};
+use super::device::GpuOptions;
+use super::owner::{self, Command};
+use super::session::GpuSession;
+use crate::Result;
+use crate::engine::{Backend, LanePlan, Session};
+
+/// Lanes as invocations of a WGSL kernel on one device.
+#[derive(Debug)]
+pub struct GpuBackend {
+    card: AdapterCard,
+    exact: bool,
+    options: GpuOptions,
+    commands: Sender<Command>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl std::fmt::Debug for Command {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Command")
+    }
+}
+
+impl GpuBackend {
+    /// Opens the device with this index.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] where its driver refuses.
+    pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
+        let adapter = adapters.take(index)?;
+        let card = adapters.cards()[index].clone();
+        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
+        Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
+    }
+
+    /// What is known of the device.
+    pub fn card(&self) -> &AdapterCard {
+        &self.card
+    }
+
+    /// Float operations reach the driver as written, so that equality is promised and not only checked.
+    pub fn is_exact(&self) -> bool {
+        self.exact
+    }
+}
+
+impl Drop for GpuBackend {
+    fn drop(&mut self) {
+        // A session may outlive it, and holds a sender of its own: waiting for the last one would wait for ever.
+        let _ = self.commands.send(Command::End);
+        if let Some(thread) = self.thread.take() {
+            // A panic in it was told to whoever waited.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Backend for GpuBackend {
+    fn describe(&self) -> String {
+        let path = if self.exact { "exact" } else { "plain" };
+        let driver = [&self.card.driver[..], &self.card.driver_info].join(" ").trim().to_owned();
+        format!("GPU {} ({}, {driver}), binary32, {path} path", self.card.name, self.card.api)
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        let commands = self.commands.clone();
+        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, self.options.first_lanes)?))
+    }
+}

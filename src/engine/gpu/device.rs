@@ -1,0 +1,332 @@
+//! The open device: its pipelines, its shared tables and its troubles. Only its owner's thread uses it.
+
+// `create_shader_module_passthrough` hands SPIR-V to the driver unseen; it is naga's own output, from shaders
+// that are part of this crate, with decorations added. `create_shader_module_trusted` leaves out run-time checks.
+#![allow(unsafe_code)]
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use super::adapters::AdapterCard;
+use super::shader::{self, ENTRY, GENERATE, WORKGROUP};
+use super::spirv::{Checks, exact_spirv};
+use crate::model::driver::ModelId;
+use crate::{Error, Result};
+
+/// How a device is used.
+#[derive(Debug, Clone)]
+pub struct GpuOptions {
+    /// Run-time checks of the shaders.
+    pub checks: Checks,
+    /// A dispatch that takes longer than this is given up, and the device with it.
+    pub timeout: Duration,
+    /// Lanes per model of the first job; later ones follow the device's speed.
+    pub first_lanes: u64,
+    /// Takes the plain path where the exact one exists, as on other interfaces: for tests.
+    pub plain: bool,
+    /// Replaces text of the shaders before they are compiled, to see that verification finds it: for tests.
+    pub planted: Option<(String, String)>,
+    /// Makes one job fail: for tests.
+    pub fault: Option<Fault>,
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        GpuOptions {
+            checks: Checks::Checked,
+            timeout: Duration::from_secs(60),
+            first_lanes: 1 << 14,
+            plain: false,
+            planted: None,
+            fault: None,
+        }
+    }
+}
+
+/// A job that fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fault {
+    /// Which job, counted from 0 over the device's life.
+    pub at_job: u64,
+    /// How.
+    pub kind: FaultKind,
+}
+
+/// How a job fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultKind {
+    /// The device is lost for good.
+    Lost,
+    /// The device has no memory left for this job.
+    OutOfMemory,
+}
+
+/// One model's pipeline, as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PipelineSpec {
+    pub model: ModelId,
+    pub constants: Vec<(&'static str, f64)>,
+}
+
+/// The open device.
+pub(super) struct Device {
+    pub name: String,
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    /// Float operations reach the driver as written.
+    pub exact: bool,
+    pub timestamps: bool,
+    pub layout: wgpu::BindGroupLayout,
+    pub options: GpuOptions,
+    /// Bindings of the generator.
+    pub generator_layout: wgpu::BindGroupLayout,
+    pipeline_layout: wgpu::PipelineLayout,
+    pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
+    generator: Option<wgpu::ComputePipeline>,
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+impl Device {
+    /// Opens a device with everything it can.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the driver refuses.
+    pub fn open(adapter: &wgpu::Adapter, card: &AdapterCard, options: GpuOptions) -> Result<Device> {
+        let exact = card.exact_path && !options.plain;
+        let mut features = wgpu::Features::empty();
+        features.set(wgpu::Features::TIMESTAMP_QUERY, card.timestamps);
+        features.set(wgpu::Features::PASSTHROUGH_SHADERS, exact);
+        let asked = adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("lanesweep"),
+            required_features: features,
+            // Not the 128 MiB of every browser: what this device can.
+            required_limits: adapter.limits(),
+            experimental_features: wgpu::ExperimentalFeatures::disabled(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            trace: wgpu::Trace::Off,
+        });
+        let (device, queue) = pollster::block_on(asked).map_err(|e| {
+            Error::device(&card.name, format!("it cannot be opened: {e}"), "choose another device, or --backend cpu")
+        })?;
+        // Without these handlers an error of the device would be a panic.
+        let trouble = Arc::new(Mutex::new(None));
+        let note = |trouble: &Arc<Mutex<Option<String>>>| {
+            let trouble = Arc::clone(trouble);
+            move |what: String| {
+                let mut first = trouble.lock().unwrap_or_else(PoisonError::into_inner);
+                first.get_or_insert(what);
+            }
+        };
+        let (uncaptured, lost) = (note(&trouble), note(&trouble));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaptured(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| lost(format!("it was lost ({reason:?}): {message}")));
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("lane"), entries: &entries() });
+        let generator_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("generator"),
+            entries: &generator_entries(),
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("lane"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let timestamps = card.timestamps;
+        let name = card.name.clone();
+        let pipelines = Vec::new();
+        let opened = Device {
+            name,
+            device,
+            queue,
+            exact,
+            timestamps,
+            layout,
+            generator_layout,
+            options,
+            pipeline_layout,
+            pipelines,
+            generator: None,
+            trouble,
+        };
+        opened.untroubled()?;
+        Ok(opened)
+    }
+
+    /// The pipeline of a model with its constants; compiled once.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a shader that does not compile, [`Error::Device`] where the driver refuses it.
+    pub fn pipeline(&mut self, spec: &PipelineSpec) -> Result<wgpu::ComputePipeline> {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| known == spec) {
+            return Ok(pipeline.clone());
+        }
+        let pipeline = self.compile(
+            spec.model.name(),
+            shader::assemble(spec.model),
+            ENTRY,
+            &spec.constants,
+            &self.pipeline_layout,
+        )?;
+        self.pipelines.push((spec.clone(), pipeline.clone()));
+        Ok(pipeline)
+    }
+
+    /// The pipeline of the generator; compiled once.
+    ///
+    /// # Errors
+    /// As [`Device::pipeline`].
+    pub fn generator(&mut self) -> Result<wgpu::ComputePipeline> {
+        if let Some(pipeline) = &self.generator {
+            return Ok(pipeline.clone());
+        }
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("generator"),
+            bind_group_layouts: &[Some(&self.generator_layout)],
+            immediate_size: 0,
+        });
+        let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, &[], &layout)?;
+        self.generator = Some(pipeline.clone());
+        Ok(pipeline)
+    }
+
+    fn compile(
+        &self,
+        label: &str,
+        mut source: String,
+        entry: &str,
+        values: &[(&'static str, f64)],
+        layout: &wgpu::PipelineLayout,
+    ) -> Result<wgpu::ComputePipeline> {
+        if let Some((from, to)) = &self.options.planted {
+            source = source.replace(from, to);
+        }
+        let label = Some(label);
+        let module = if self.exact {
+            let words = exact_spirv(&source, entry, values, self.options.checks)?;
+            let entry =
+                wgpu::PassthroughShaderEntryPoint { name: entry.to_owned().into(), workgroup_size: (WORKGROUP, 1, 1) };
+            // SAFETY: valid SPIR-V from naga, with the bindings of `entries` and decorations added.
+            unsafe {
+                self.device.create_shader_module_passthrough(wgpu::ShaderModuleDescriptorPassthrough {
+                    label,
+                    entry_points: vec![entry].into(),
+                    spirv: Some(words.into()),
+                    ..Default::default()
+                })
+            }
+        } else {
+            let source = wgpu::ShaderSource::Wgsl(source.into());
+            let descriptor = wgpu::ShaderModuleDescriptor { label, source };
+            match self.options.checks {
+                Checks::Checked => self.device.create_shader_module(descriptor),
+                // SAFETY: every loop of the shaders is bounded, every index comes from a record that the host
+                // made, every integer divisor is at least 1.
+                Checks::Unchecked => unsafe {
+                    self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+                },
+            }
+        };
+        // A passed-through module takes no constants: they are resolved in it.
+        let constants: &[(&str, f64)] = if self.exact { &[] } else { values };
+        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(layout),
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
+            cache: None,
+        });
+        self.untroubled()?;
+        Ok(pipeline)
+    }
+
+    /// A buffer of at least one element.
+    pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let size = bytes.max(64).next_multiple_of(4);
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A storage buffer with this content.
+    pub fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
+        let bytes: &[u8] = bytemuck::cast_slice(content);
+        let limits = self.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes.len() as u64 > most {
+            let problem = format!("the {label} take {} bytes, and it can hold {most} at once", bytes.len());
+            return Err(Error::device(&self.name, problem, "use --backend cpu, or split the data"));
+        }
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let buffer = self.buffer(label, bytes.len() as u64, usage);
+        self.queue.write_buffer(&buffer, 0, bytes);
+        self.untroubled()?;
+        Ok(buffer)
+    }
+
+    /// Lanes per model that a job may hold at most: what fits into the buffers of results.
+    pub fn most_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
+        let limits = self.device.limits();
+        // The read-back buffer holds the counts and times as well.
+        let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
+        let most = limits.max_storage_buffer_binding_size.min(room).min(MOST_RESULT_BYTES);
+        ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MOST_LANES)
+    }
+
+    /// Workgroups of a dispatch in two dimensions, because one ends at 65,535.
+    pub fn workgroups(&self, lanes: u32) -> (u32, u32) {
+        let groups = lanes.div_ceil(WORKGROUP).max(1);
+        let most = self.device.limits().max_compute_workgroups_per_dimension.max(1);
+        let rows = groups.div_ceil(most);
+        (groups.div_ceil(rows), rows)
+    }
+
+    /// # Errors
+    /// [`Error::Device`] if something went wrong since the last time.
+    pub fn untroubled(&self) -> Result<()> {
+        let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        match trouble {
+            None => Ok(()),
+            Some(what) => Err(self.failed(what)),
+        }
+    }
+
+    /// The error of this device.
+    pub fn failed(&self, what: impl Into<String>) -> Error {
+        Error::device(&self.name, what, "the CPU backend computes the same: --backend cpu")
+    }
+}
+
+/// Results of one job at most, bytes.
+const MOST_RESULT_BYTES: u64 = 256 << 20;
+/// Left for counts, times and rounding beside them.
+const SMALL_RESULT_BYTES: u64 = 4 << 20;
+/// Lanes per model of one job at most: their number and every index into their results stay far below 2³².
+const MOST_LANES: u64 = 1 << 27;
+
+/// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
+fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    buffer_entries(4, 3, true)
+}
+
+/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases and tables.
+fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    buffer_entries(5, 3, false)
+}
+
+/// A uniform buffer, inputs, results.
+fn buffer_entries(inputs: usize, results: usize, dynamic: bool) -> Vec<wgpu::BindGroupLayoutEntry> {
+    let kinds = std::iter::once(wgpu::BufferBindingType::Uniform)
+        .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: true }, inputs))
+        .chain(std::iter::repeat_n(wgpu::BufferBindingType::Storage { read_only: false }, results));
+    let entry = |(binding, ty)| wgpu::BindGroupLayoutEntry {
+        binding: binding as u32,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: dynamic && binding == 0, min_binding_size: None },
+        count: None,
+    };
+    kinds.enumerate().map(entry).collect()
+}

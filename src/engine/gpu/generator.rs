@@ -1,0 +1,194 @@
+//! The generator on the device: what it reads, and the dispatch that fills a session's cases and tables.
+
+// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the sizes
+// below are checked when this is compiled.
+#![allow(unsafe_code)]
+
+use bytemuck::{Pod, Zeroable};
+
+use super::device::Device;
+use super::ring::Inputs;
+use crate::Result;
+use crate::engine::LaneCase;
+use crate::engine::generated::{Generator, MOST_PARAMETERS, PointSource, Recipe, ReducedColumns};
+use crate::model::driver::{AttentionRule, MODELS};
+use crate::stats::random::normal_table;
+
+const _: () = assert!(size_of::<AttentionRule<f32>>() == 20);
+const _: () = assert!(size_of::<ReducedColumns>() == 36);
+const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MOST_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
+
+// SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
+unsafe impl Zeroable for Recipe {}
+// SAFETY: as above.
+unsafe impl Pod for Recipe {}
+
+/// One dispatch of the generator.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct Generation {
+    /// First sample index, low word.
+    pub index_low: u32,
+    /// Its high word.
+    pub index_high: u32,
+    /// Samples.
+    pub count: u32,
+    /// 0 random, 1 Sobol, 2 given.
+    pub source: u32,
+    /// Seed, low word.
+    pub seed_low: u32,
+    /// Its high word.
+    pub seed_high: u32,
+    /// Purpose of the stream.
+    pub purpose: u32,
+    /// Components of the mixture, or points given.
+    pub components: u32,
+    /// 1 where components have weights.
+    pub weighted: u32,
+    /// Place of the first mean among the numbers.
+    pub first_mean: u32,
+    /// Place of the first factor.
+    pub first_factor: u32,
+    /// Place of the components' indices of factors.
+    pub first_factor_of: u32,
+    /// Entries of each sample in the table of speeds.
+    pub speed_stride: u32,
+    /// Entries of each sample in the table of lateral states.
+    pub lateral_stride: u32,
+}
+
+/// What a device needs to make cases.
+pub(super) struct GeneratorSetup {
+    generation: Generation,
+    recipe: Recipe,
+    numbers: Vec<u32>,
+    aliases: Vec<[u32; 2]>,
+    sobol: Vec<u32>,
+}
+
+impl GeneratorSetup {
+    pub fn new(generator: &Generator) -> Self {
+        let points = &generator.points;
+        let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let mut numbers = bits(&generator.basis);
+        let first_mean = numbers.len() as u32;
+        numbers.extend(bits(&points.means));
+        let first_factor = numbers.len() as u32;
+        numbers.extend(bits(&points.factors));
+        let first_factor_of = numbers.len() as u32;
+        numbers.extend(&points.factor_of);
+        let [speed_stride, lateral_stride] = generator.table_entries();
+        let mut generation = Generation {
+            components: points.components(),
+            weighted: u32::from(points.weights.is_some()),
+            first_mean,
+            first_factor,
+            first_factor_of,
+            speed_stride,
+            lateral_stride,
+            ..Generation::default()
+        };
+        let mut sobol_words = Vec::new();
+        match &points.source {
+            PointSource::Random(stream) => {
+                generation.seed_low = stream.seed as u32;
+                generation.seed_high = (stream.seed >> 32) as u32;
+                generation.purpose = stream.purpose;
+            }
+            PointSource::Sobol(sobol) => {
+                generation.source = 1;
+                sobol_words = sobol.table().concat();
+            }
+            PointSource::Given => generation.source = 2,
+        }
+        let aliases = points.weights.as_ref().map_or(Vec::new(), |table| table.table().to_vec());
+        GeneratorSetup { generation, recipe: generator.recipe, numbers, aliases, sobol: sobol_words }
+    }
+
+    /// Bytes that one sample takes in cases and tables.
+    pub fn sample_bytes(&self) -> u64 {
+        let tables = 4 * u64::from(self.generation.speed_stride) + 8 * u64::from(self.generation.lateral_stride);
+        size_of::<LaneCase<f32>>() as u64 + tables
+    }
+
+    /// Brings everything to the device.
+    pub fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
+        device.generator()?;
+        use wgpu::BufferUsages as Use;
+        Ok(GeneratorInputs {
+            template: self.generation,
+            generation: device.buffer("generation", size_of::<Generation>() as u64, Use::UNIFORM | Use::COPY_DST),
+            recipe: device.upload("recipe", &[self.recipe])?,
+            numbers: device.upload("numbers of the density", &self.numbers)?,
+            aliases: device.upload("weights of the density", &self.aliases)?,
+            sobol: device.upload("Sobol directions", &self.sobol)?,
+            normal: device.upload("normal deviates", normal_table())?,
+        })
+    }
+}
+
+/// The generator's buffers of one session.
+pub(super) struct GeneratorInputs {
+    template: Generation,
+    generation: wgpu::Buffer,
+    recipe: wgpu::Buffer,
+    numbers: wgpu::Buffer,
+    aliases: wgpu::Buffer,
+    sobol: wgpu::Buffer,
+    normal: wgpu::Buffer,
+}
+
+/// Fills cases and tables with the samples from `first` on. Jobs that were submitted before still read the old ones:
+/// a queue keeps its order.
+pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, count: u32) -> Result<()> {
+    let Some(made) = &inputs.generator else { return Err(device.failed("the session makes no cases")) };
+    let template = made.template;
+    let room = |bytes: u64, buffer: &wgpu::Buffer| (buffer.size() < bytes).then_some(bytes);
+    let samples = u64::from(count);
+    let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    if let Some(bytes) = room(samples * size_of::<LaneCase<f32>>() as u64, &inputs.cases) {
+        inputs.cases = device.buffer("cases", bytes, storage);
+    }
+    if let Some(bytes) = room(4 * samples * u64::from(template.speed_stride), &inputs.speed) {
+        inputs.speed = device.buffer("speeds", bytes, storage);
+    }
+    if let Some(bytes) = room(8 * samples * u64::from(template.lateral_stride), &inputs.lateral) {
+        inputs.lateral = device.buffer("lateral motions", bytes, storage);
+    }
+    let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
+    device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
+    let buffers = [
+        &made.generation,
+        &made.recipe,
+        &made.numbers,
+        &made.aliases,
+        &made.sobol,
+        &made.normal,
+        &inputs.cases,
+        &inputs.speed,
+        &inputs.lateral,
+    ];
+    let entries: Vec<wgpu::BindGroupEntry> = buffers
+        .iter()
+        .enumerate()
+        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: binding as u32, resource: buffer.as_entire_binding() })
+        .collect();
+    let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("generator"),
+        layout: &device.generator_layout,
+        entries: &entries,
+    });
+    let pipeline = device.generator()?;
+    let (x, y) = device.workgroups(count);
+    let mut encoder =
+        device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("generator") });
+    {
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("generator"), timestamp_writes: None };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+    device.queue.submit([encoder.finish()]);
+    device.untroubled()
+}

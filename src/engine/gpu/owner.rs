@@ -1,0 +1,274 @@
+//! One thread owns the device. It submits jobs as long as the ring has room, and waits for the oldest.
+
+use std::collections::{HashMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use super::adapters::AdapterCard;
+use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
+use super::generator::{GeneratorSetup, generate};
+use super::records::StartRecord;
+use super::ring::{Answer, Flight, Inputs, Job, RING, Slot};
+use crate::engine::LaneCase;
+use crate::{Error, Result};
+
+/// What a session needs on the device.
+pub(super) struct Setup {
+    pub starts: Vec<StartRecord>,
+    pub speed: Vec<f32>,
+    pub lateral: Vec<[f32; 2]>,
+    /// What makes the cases on the device, where the host does not.
+    pub generator: Option<GeneratorSetup>,
+    /// Models of a job.
+    pub models: u64,
+    /// Compiled before the first job, so that a refusal is known at once.
+    pub pipelines: Vec<PipelineSpec>,
+}
+
+/// The cases that a session holds from now on.
+pub(super) enum Cases {
+    /// From the host.
+    Given(Vec<LaneCase<f32>>),
+    /// Made on the device: first sample, number of samples.
+    Made(u64, u32),
+}
+
+/// A job and the cases it needs, where they are not there yet.
+pub(super) struct Request {
+    pub session: u64,
+    pub cases: Option<Cases>,
+    pub job: Job,
+    pub reply: Sender<Result<Answer>>,
+}
+
+pub(super) enum Command {
+    Prepare {
+        setup: Box<Setup>,
+        reply: Sender<Result<Prepared>>,
+    },
+    Run(Box<Request>),
+    Close {
+        session: u64,
+    },
+    /// The backend goes; sessions that it leaves behind hear that the device is gone.
+    End,
+}
+
+/// A session on the device.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prepared {
+    pub session: u64,
+    /// Lanes per model of a job at most: verdicts, outcomes, counts.
+    pub most_lanes: [u64; 3],
+    /// Cases that the device holds at most at once.
+    pub most_cases: u64,
+}
+
+/// What is known of the device once it is open.
+#[derive(Debug, Clone)]
+pub(super) struct Opened {
+    pub exact: bool,
+}
+
+/// Starts the thread and opens the device in it.
+pub(super) fn start(
+    adapter: wgpu::Adapter,
+    card: AdapterCard,
+    options: GpuOptions,
+) -> Result<(Sender<Command>, Opened, JoinHandle<()>)> {
+    let (sender, commands) = mpsc::channel();
+    let (opened_sender, opened) = mpsc::channel();
+    let name = card.name.clone();
+    let work = move || match Device::open(&adapter, &card, options) {
+        Ok(device) => {
+            let _ = opened_sender.send(Ok(Opened { exact: device.exact }));
+            Owner::new(device).serve(&commands);
+        }
+        Err(error) => {
+            let _ = opened_sender.send(Err(error));
+        }
+    };
+    // A panic in a driver binding ends the thread; whoever waits for an answer is told so.
+    let guarded = move || drop(catch_unwind(AssertUnwindSafe(work)));
+    let thread = std::thread::Builder::new()
+        .name("lanesweep device".to_owned())
+        .spawn(guarded)
+        .map_err(|e| Error::io("the device's thread", "start", e))?;
+    let opened = opened.recv().map_err(|_| gone(&name))??;
+    Ok((sender, opened, thread))
+}
+
+/// The error of a thread that ended.
+pub(super) fn gone(device: &str) -> Error {
+    Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
+}
+
+struct Owner {
+    device: Device,
+    sessions: HashMap<u64, Inputs>,
+    next_session: u64,
+    jobs: u64,
+    free: Vec<Slot>,
+    flying: VecDeque<(Slot, Flight, Sender<Result<Answer>>)>,
+    /// When the last job was done.
+    last_done: Option<Instant>,
+    /// Why nothing more is tried.
+    dead: Option<String>,
+}
+
+impl Owner {
+    fn new(device: Device) -> Owner {
+        let free = (0..RING).map(|_| Slot::default()).collect();
+        let (sessions, flying) = (HashMap::new(), VecDeque::new());
+        Owner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
+    }
+
+    fn serve(&mut self, commands: &Receiver<Command>) {
+        loop {
+            let command = if self.flying.is_empty() {
+                commands.recv().map_err(|_| TryRecvError::Disconnected)
+            } else if self.free.is_empty() {
+                Err(TryRecvError::Empty)
+            } else {
+                commands.try_recv()
+            };
+            match command {
+                Ok(Command::End) | Err(TryRecvError::Disconnected) => {
+                    while !self.flying.is_empty() {
+                        self.finish_oldest();
+                    }
+                    return;
+                }
+                Ok(command) => self.obey(command),
+                Err(TryRecvError::Empty) => self.finish_oldest(),
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Prepare { setup, reply } => {
+                let prepared = self.prepare(&setup);
+                let _ = reply.send(prepared);
+            }
+            Command::Run(request) => {
+                let Request { session, cases, job, reply } = *request;
+                match self.submit(session, cases, job) {
+                    Ok((slot, flight)) => self.flying.push_back((slot, flight, reply)),
+                    Err(error) => {
+                        let _ = reply.send(Err(error));
+                    }
+                }
+            }
+            Command::Close { session } => {
+                self.sessions.remove(&session);
+            }
+            Command::End => (),
+        }
+    }
+
+    fn prepare(&mut self, setup: &Setup) -> Result<Prepared> {
+        self.alive()?;
+        for spec in &setup.pipelines {
+            self.device.pipeline(spec)?;
+        }
+        let generator = setup.generator.as_ref().map(|g| g.upload(&mut self.device)).transpose()?;
+        let sample_bytes = setup.generator.as_ref().map_or(size_of::<LaneCase<f32>>() as u64, |g| g.sample_bytes());
+        let inputs = Inputs {
+            starts: self.device.upload("headways", &setup.starts)?,
+            speed: self.device.upload("speeds", &setup.speed)?,
+            lateral: self.device.upload("lateral motions", &setup.lateral)?,
+            cases: self.device.upload::<LaneCase<f32>>("cases", &[])?,
+            generator,
+        };
+        let session = self.next_session;
+        self.next_session += 1;
+        self.sessions.insert(session, inputs);
+        let models = setup.models;
+        let record = size_of::<super::records::OutcomeRecord>() as f64;
+        let most_lanes = [0.5, record + 0.5, 1e-3].map(|bytes| self.device.most_lanes(models, bytes));
+        let limits = self.device.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = most.min(if setup.generator.is_some() { MOST_MADE_BYTES } else { MOST_CASE_BYTES });
+        Ok(Prepared { session, most_lanes, most_cases: (most / sample_bytes).max(1) })
+    }
+
+    fn submit(&mut self, session: u64, cases: Option<Cases>, job: Job) -> Result<(Slot, Flight)> {
+        self.alive()?;
+        self.strike()?;
+        let device = &mut self.device;
+        let inputs = self.sessions.get_mut(&session).ok_or_else(|| device.failed("the session is closed"))?;
+        match cases {
+            None => (),
+            Some(Cases::Made(first, count)) => generate(device, inputs, first, count)?,
+            Some(Cases::Given(cases)) => {
+                let bytes: &[u8] = bytemuck::cast_slice(&cases);
+                if inputs.cases.size() >= bytes.len() as u64 {
+                    // Ordered after the jobs under way, which still read the old ones.
+                    device.queue.write_buffer(&inputs.cases, 0, bytes);
+                } else {
+                    inputs.cases = device.upload("cases", &cases)?;
+                }
+            }
+        }
+        let mut slot = self.free.pop().unwrap_or_default();
+        match slot.submit(device, inputs, job) {
+            Ok(flight) => Ok((slot, flight)),
+            Err(error) => {
+                // Its buffers may be half made.
+                self.free.push(Slot::default());
+                self.dead = Some(error.to_string());
+                Err(error)
+            }
+        }
+    }
+
+    fn finish_oldest(&mut self) {
+        let Some((mut slot, flight, reply)) = self.flying.pop_front() else { return };
+        let finished = self.alive().and_then(|()| slot.finish(&self.device, flight, self.last_done));
+        self.last_done = Some(Instant::now());
+        let answer = match finished {
+            Ok(answer) => {
+                self.free.push(slot);
+                answer
+            }
+            Err(error) => {
+                self.free.push(Slot::default());
+                self.dead.get_or_insert_with(|| error.to_string());
+                Err(error)
+            }
+        };
+        let _ = reply.send(answer);
+    }
+
+    /// After a failure the device's state is unknown: nothing more is asked of it.
+    fn alive(&self) -> Result<()> {
+        match &self.dead {
+            None => Ok(()),
+            Some(why) => Err(self.device.failed(format!("it failed before ({why})"))),
+        }
+    }
+
+    /// The fault that a test asked for.
+    fn strike(&mut self) -> Result<()> {
+        let job = self.jobs;
+        self.jobs += 1;
+        match self.device.options.fault {
+            Some(fault) if fault.at_job == job => match fault.kind {
+                FaultKind::Lost => {
+                    self.device.device.destroy();
+                    Ok(())
+                }
+                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory left for this job")),
+            },
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Cases on the device at once, bytes.
+const MOST_CASE_BYTES: u64 = 64 << 20;
+/// The same where the device makes them, with their tables.
+const MOST_MADE_BYTES: u64 = 512 << 20;

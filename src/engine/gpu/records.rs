@@ -1,0 +1,150 @@
+//! The records that cross to the device and back, and their leave to be seen as bytes. `tests/shaders.rs`
+//! compares each with its WGSL twin, size and offsets, through naga.
+
+// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the
+// sizes below are checked when this is compiled. bytemuck's derive cannot do that for generic types.
+#![allow(unsafe_code)]
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
+use crate::model::criterion::{BrakeThreatMaximum, Contact, Criteria};
+use crate::model::driver::MODELS;
+use crate::model::flag::Flag;
+use crate::scenario::Motion;
+
+const _: () = assert!(size_of::<Motion<f32>>() == 64);
+const _: () = assert!(size_of::<LaneOther<f32>>() == 64 + 4 * (7 + MODELS));
+const _: () = assert!(size_of::<LaneCase<f32>>() == 2 * size_of::<LaneOther<f32>>() + 16);
+
+// SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
+unsafe impl Zeroable for Motion<f32> {}
+// SAFETY: as above.
+unsafe impl Pod for Motion<f32> {}
+// SAFETY: as above.
+unsafe impl Zeroable for LaneOther<f32> {}
+// SAFETY: as above.
+unsafe impl Pod for LaneOther<f32> {}
+// SAFETY: as above.
+unsafe impl Zeroable for LaneCase<f32> {}
+// SAFETY: as above.
+unsafe impl Pod for LaneCase<f32> {}
+
+/// The headway of a lane.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct StartRecord {
+    /// 1 where the value is a gap.
+    pub is_gap: u32,
+    /// s or m.
+    pub value: f32,
+}
+
+impl From<Start<f32>> for StartRecord {
+    fn from(start: Start<f32>) -> Self {
+        match start {
+            Start::Headway(value) => StartRecord { is_gap: 0, value },
+            Start::Gap(value) => StartRecord { is_gap: 1, value },
+        }
+    }
+}
+
+/// One dispatch: the lanes of one model over an interval of cases.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Launch {
+    /// Lanes of this dispatch.
+    pub lanes: u32,
+    /// Headways per case, at least 1.
+    pub headways: u32,
+    /// Variants per unit, at least 1.
+    pub variants: u32,
+    /// First case in the buffer of cases.
+    pub first_case: u32,
+    /// First word of this dispatch in the verdicts.
+    pub first_word: u32,
+    /// First record of this dispatch in the outcomes.
+    pub first_outcome: u32,
+    /// First word of this dispatch's cells in the counts: one cell per variant.
+    pub first_cell_word: u32,
+    /// Word of the counts that counts the lanes of this dispatch.
+    pub done_word: u32,
+    /// 0 verdicts, 1 outcomes, 2 counts.
+    pub wanted: u32,
+}
+
+/// What a lane says when it is over.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct OutcomeRecord {
+    /// Bits 0–3 verdicts, 4–5 contact, 6 vehicle of the contact, 8–10 end.
+    pub word: u32,
+    /// First unsafe step.
+    pub reaction_step: u32,
+    /// Last evaluated step.
+    pub end_step: u32,
+    /// m/s; 0 without a contact.
+    pub impact_speed: f32,
+    /// m/s; 0 without a contact.
+    pub impact_closing_speed: f32,
+    /// Bits of the smallest TTC, s.
+    pub min_ttc_bits: u32,
+    /// Largest Brake Threat Number: numerator.
+    pub btn_numerator: f32,
+    /// Its denominator.
+    pub btn_denominator: f32,
+    /// Bits of the smallest gap, m.
+    pub min_gap_bits: u32,
+}
+
+impl OutcomeRecord {
+    /// The outcome, in the lane's own numbers; `None` where the word is none that a lane writes.
+    pub fn outcome(&self, criteria: &Criteria<f32>) -> Option<Outcome<f32>> {
+        let verdicts = Verdicts((self.word & 0xf) as u8);
+        let contact = match (self.word >> 4) & 3 {
+            0 => Contact::None,
+            1 => Contact::BySide,
+            2 => Contact::Frontal,
+            _ => return None,
+        };
+        let end = match self.word >> 8 {
+            // A record that no lane wrote reads as 0.
+            0 if contact != Contact::None => EndReason::Contact,
+            1 => EndReason::Settled,
+            2 => EndReason::Standstill,
+            3 => EndReason::Cap,
+            4 => EndReason::Aborted,
+            _ => return None,
+        };
+        let btn = BrakeThreatMaximum::from_quotient(
+            self.btn_numerator,
+            self.btn_denominator,
+            Flag::of(verdicts.failed(crate::model::criterion::Criterion::Btn)),
+        );
+        Some(Outcome {
+            verdicts,
+            contact,
+            contact_with: ((self.word >> 6) & 1) as u8,
+            end,
+            reaction_step: self.reaction_step,
+            contact_step: if contact == Contact::None { NO_STEP } else { self.end_step },
+            end_step: self.end_step,
+            impact_speed: self.impact_speed,
+            impact_closing_speed: self.impact_closing_speed,
+            min_ttc: f32::from_bits(self.min_ttc_bits),
+            max_btn: criteria.btn.value(&btn) as f32,
+            min_gap: f32::from_bits(self.min_gap_bits),
+        })
+    }
+}
+
+/// Words per cell of the counts.
+pub const CELL_WORDS: usize = 8;
+
+/// An empty cell: nothing counted, no smallest value yet.
+pub const EMPTY_CELL: [u32; CELL_WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0];
+
+/// The number behind an integer that is ordered as the number is.
+pub fn from_ordered(key: u32) -> f32 {
+    f32::from_bits(if key & 0x8000_0000 != 0 { key & 0x7fff_ffff } else { !key })
+}

@@ -1,0 +1,339 @@
+//! The ring of buffers: while the host reads the results of one job, the device computes the next.
+
+use std::sync::mpsc;
+use std::time::Instant;
+
+use bytemuck::Zeroable;
+
+use super::device::{Device, PipelineSpec};
+use super::generator::GeneratorInputs;
+use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
+use crate::engine::Wanted;
+use crate::{Error, Result};
+
+/// Jobs under way at most.
+pub(super) const RING: usize = 3;
+
+/// The lanes of consecutive units of one block, all models.
+#[derive(Debug, Clone)]
+pub(super) struct Job {
+    /// One per model of the plan.
+    pub pipelines: Vec<PipelineSpec>,
+    /// First case in the buffer of cases.
+    pub first_case: u32,
+    pub units: u32,
+    pub variants: u32,
+    pub headways: u32,
+    pub wanted: Wanted,
+}
+
+impl Job {
+    /// Lanes per model.
+    pub fn lanes(&self) -> u32 {
+        self.units * self.variants * self.headways
+    }
+
+    fn words(&self) -> usize {
+        if self.wanted == Wanted::Counts { 0 } else { self.lanes().div_ceil(8) as usize }
+    }
+
+    fn records(&self) -> usize {
+        if self.wanted == Wanted::Outcomes { self.lanes() as usize } else { 0 }
+    }
+
+    fn cells(&self) -> usize {
+        if self.wanted == Wanted::Counts { self.variants as usize } else { 0 }
+    }
+}
+
+/// What a job gave, model by model.
+#[derive(Debug)]
+pub(super) struct Answer {
+    /// Verdict words of each model.
+    pub words: Vec<Vec<u32>>,
+    /// Outcomes of each model, where wanted.
+    pub outcomes: Vec<Vec<OutcomeRecord>>,
+    /// Cells of each model, one per variant, where wanted.
+    pub cells: Vec<Vec<[u32; CELL_WORDS]>>,
+    /// Time of the slowest dispatch, s.
+    pub slowest_s: f64,
+    /// Time of all dispatches, s.
+    pub device_s: f64,
+}
+
+/// The tables of a session.
+pub(super) struct Inputs {
+    pub starts: wgpu::Buffer,
+    pub speed: wgpu::Buffer,
+    pub lateral: wgpu::Buffer,
+    pub cases: wgpu::Buffer,
+    /// Makes cases and tables, where the host does not.
+    pub generator: Option<GeneratorInputs>,
+}
+
+/// The buffers of one job; they grow and stay.
+#[derive(Default)]
+pub(super) struct Slot {
+    buffers: Option<Buffers>,
+}
+
+struct Buffers {
+    launches: wgpu::Buffer,
+    verdicts: wgpu::Buffer,
+    outcomes: wgpu::Buffer,
+    counts: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
+    models: usize,
+}
+
+/// Where each part of the results lies in the read-back buffer, bytes.
+#[derive(Clone, Copy)]
+struct Parts {
+    verdicts: u64,
+    outcomes: u64,
+    counts: u64,
+    times: u64,
+}
+
+impl Parts {
+    fn of(job: &Job, models: usize) -> Parts {
+        Parts {
+            verdicts: (models * job.words() * 4) as u64,
+            outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
+            counts: ((models + models * job.cells() * CELL_WORDS) * 4) as u64,
+            times: (models * 16) as u64,
+        }
+    }
+
+    fn total(&self) -> u64 {
+        // Times are resolved to multiples of 8 bytes.
+        (self.verdicts + self.outcomes + self.counts).next_multiple_of(8) + self.times
+    }
+}
+
+/// A job on its way.
+pub(super) struct Flight {
+    job: Job,
+    parts: Parts,
+    submission: wgpu::SubmissionIndex,
+    mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+    since: Instant,
+}
+
+impl Slot {
+    /// Gives a job to the device.
+    pub fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
+        let models = job.pipelines.len();
+        let parts = Parts::of(&job, models);
+        self.grow(device, &parts, models);
+        let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
+        let stride = launch_stride(device);
+        let mut launches = vec![0_u8; stride as usize * models];
+        let mut counts = vec![0_u32; models];
+        for model in 0..models {
+            let launch = Launch {
+                lanes: job.lanes(),
+                headways: job.headways,
+                variants: job.variants,
+                first_case: job.first_case,
+                first_word: (model * job.words()) as u32,
+                first_outcome: (model * job.records()) as u32,
+                first_cell_word: (models + model * job.cells() * CELL_WORDS) as u32,
+                done_word: model as u32,
+                wanted: job.wanted as u32,
+            };
+            let at = stride as usize * model;
+            launches[at..at + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
+            counts.extend(EMPTY_CELL.repeat(job.cells()));
+        }
+        device.queue.write_buffer(&buffers.launches, 0, &launches);
+        device.queue.write_buffer(&buffers.counts, 0, bytemuck::cast_slice(&counts));
+        let binding = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let launch = wgpu::BufferBinding {
+            buffer: &buffers.launches,
+            offset: 0,
+            size: wgpu::BufferSize::new(size_of::<Launch>() as u64),
+        };
+        let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("lane"),
+            layout: &device.layout,
+            entries: &[
+                binding(0, wgpu::BindingResource::Buffer(launch)),
+                binding(1, inputs.cases.as_entire_binding()),
+                binding(2, inputs.starts.as_entire_binding()),
+                binding(3, inputs.speed.as_entire_binding()),
+                binding(4, inputs.lateral.as_entire_binding()),
+                binding(5, buffers.verdicts.as_entire_binding()),
+                binding(6, buffers.outcomes.as_entire_binding()),
+                binding(7, buffers.counts.as_entire_binding()),
+            ],
+        });
+        let (x, y) = device.workgroups(job.lanes());
+        let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
+        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
+        // What no lane writes must read as nothing.
+        if parts.verdicts > 0 {
+            encoder.clear_buffer(&buffers.verdicts, 0, Some(parts.verdicts));
+        }
+        if parts.outcomes > 0 {
+            encoder.clear_buffer(&buffers.outcomes, 0, Some(parts.outcomes));
+        }
+        for (model, pipeline) in pipelines.iter().enumerate() {
+            let timestamp_writes = buffers.timing.as_ref().map(|(set, _)| wgpu::ComputePassTimestampWrites {
+                query_set: set,
+                beginning_of_pass_write_index: Some(2 * model as u32),
+                end_of_pass_write_index: Some(2 * model as u32 + 1),
+            });
+            let label = Some(job.pipelines[model].model.name());
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[model as u32 * stride]);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        let mut at = 0;
+        for (buffer, bytes) in
+            [(&buffers.verdicts, parts.verdicts), (&buffers.outcomes, parts.outcomes), (&buffers.counts, parts.counts)]
+        {
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(buffer, 0, &buffers.readback, at, bytes);
+            }
+            at += bytes;
+        }
+        if let Some((set, resolved)) = &buffers.timing {
+            encoder.resolve_query_set(set, 0..2 * models as u32, resolved, 0);
+            encoder.copy_buffer_to_buffer(resolved, 0, &buffers.readback, at.next_multiple_of(8), parts.times);
+        }
+        let (sender, mapped) = mpsc::channel();
+        encoder.map_buffer_on_submit(&buffers.readback, wgpu::MapMode::Read, 0..parts.total(), move |result| {
+            // Nobody listens any more where the job was given up.
+            let _ = sender.send(result);
+        });
+        let since = Instant::now();
+        let submission = device.queue.submit([encoder.finish()]);
+        device.untroubled()?;
+        Ok(Flight { job, parts, submission, mapped, since })
+    }
+
+    /// Waits for a job and reads its results. `previous` is when the job before it was done.
+    ///
+    /// The outer error says that the device's state is unknown; the inner one that it did its job badly.
+    pub fn finish(&mut self, device: &Device, flight: Flight, previous: Option<Instant>) -> Result<Result<Answer>> {
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(flight.submission.clone()),
+            timeout: Some(device.options.timeout),
+        };
+        device.device.poll(wait).map_err(|error| match error {
+            wgpu::PollError::Timeout => device.failed(format!("it gave no answer for {:?}", device.options.timeout)),
+            error => device.failed(error.to_string()),
+        })?;
+        device.untroubled()?;
+        // Not the time it waited behind the job before it.
+        let began = previous.map_or(flight.since, |done| done.max(flight.since));
+        let wall_s = began.elapsed().as_secs_f64();
+        let mapped = flight.mapped.recv_timeout(device.options.timeout);
+        mapped
+            .map_err(|_| device.failed("its results did not come back"))?
+            .map_err(|e| device.failed(e.to_string()))?;
+        let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
+        let answer = {
+            let view =
+                buffers.readback.get_mapped_range(0..flight.parts.total()).map_err(|e| device.failed(e.to_string()))?;
+            read(device, &flight, &view, wall_s)
+        };
+        buffers.readback.unmap();
+        Ok(answer)
+    }
+
+    fn grow(&mut self, device: &Device, parts: &Parts, models: usize) {
+        use wgpu::BufferUsages as Use;
+        let enough = self.buffers.as_ref().is_some_and(|b| {
+            b.models == models
+                && b.verdicts.size() >= parts.verdicts
+                && b.outcomes.size() >= parts.outcomes
+                && b.counts.size() >= parts.counts
+                && b.readback.size() >= parts.total()
+        });
+        if enough {
+            return;
+        }
+        let limits = device.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        // Doubling, so that growing jobs seldom come here, but never beyond what the device takes.
+        let room = |bytes: u64, most: u64| bytes.next_power_of_two().min(most).max(bytes);
+        let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
+        let stride = u64::from(launch_stride(device));
+        self.buffers = Some(Buffers {
+            launches: device.buffer("launches", stride * models as u64, Use::UNIFORM | Use::COPY_DST),
+            verdicts: device.buffer("verdicts", room(parts.verdicts, most), results),
+            outcomes: device.buffer("outcomes", room(parts.outcomes, most), results),
+            counts: device.buffer("counts", room(parts.counts, most), results),
+            readback: device.buffer(
+                "results",
+                room(parts.total(), limits.max_buffer_size),
+                Use::MAP_READ | Use::COPY_DST,
+            ),
+            timing: device.timestamps.then(|| {
+                let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
+                    label: Some("times"),
+                    ty: wgpu::QueryType::Timestamp,
+                    count: 2 * models as u32,
+                });
+                let resolved = device.buffer("times", 16 * models as u64, Use::QUERY_RESOLVE | Use::COPY_SRC);
+                (set, resolved)
+            }),
+            models,
+        });
+    }
+}
+
+fn launch_stride(device: &Device) -> u32 {
+    (size_of::<Launch>() as u32).next_multiple_of(device.device.limits().min_uniform_buffer_offset_alignment)
+}
+
+/// Bytes into results; every lane must have been computed.
+fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<Answer> {
+    let Flight { job, parts, .. } = flight;
+    let models = job.pipelines.len();
+    let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
+    let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
+    let (counts, _) = rest.split_at(parts.counts as usize);
+    let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
+    let counts: Vec<u32> = bytemuck::pod_collect_to_vec(counts);
+    let (done, cells) = counts.split_at(models);
+    if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
+        let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
+        let problem = format!("it computed {} of {lanes} lanes of {name} to their end", done[model]);
+        let help = "use --backend cpu; where lanes have very many steps, a larger time step (--dt) may do as well";
+        return Err(Error::device(&device.name, problem, help));
+    }
+    let per_model = |part: &[u8], model: usize| {
+        let length = part.len() / models;
+        part[model * length..(model + 1) * length].to_vec()
+    };
+    let times: Vec<u64> = bytemuck::pod_collect_to_vec(times);
+    let period_s = f64::from(device.queue.get_timestamp_period()) * 1e-9;
+    let dispatches = times.chunks_exact(2).map(|t| t[1].saturating_sub(t[0]) as f64 * period_s);
+    let measured: Vec<f64> = if device.timestamps { dispatches.collect() } else { Vec::new() };
+    let device_s: f64 = measured.iter().sum();
+    let slowest_s = measured.iter().fold(0.0, |a: f64, b| a.max(*b));
+    // Without timestamps, or where they stand still, the wall clock bounds it.
+    let timed = slowest_s > 0.0;
+    Ok(Answer {
+        words: (0..models).map(|m| bytemuck::pod_collect_to_vec(&per_model(verdicts, m))).collect(),
+        outcomes: (0..models)
+            .map(|m| {
+                let part = per_model(outcomes, m);
+                let mut records = vec![OutcomeRecord::zeroed(); part.len() / size_of::<OutcomeRecord>()];
+                bytemuck::cast_slice_mut(&mut records).copy_from_slice(&part);
+                records
+            })
+            .collect(),
+        cells: cells
+            .chunks(job.cells().max(1) * CELL_WORDS)
+            .map(|model| model.chunks_exact(CELL_WORDS).map(|c| std::array::from_fn(|at| c[at])).collect())
+            .collect(),
+        slowest_s: if timed { slowest_s } else { wall_s },
+        device_s: if timed { device_s } else { wall_s },
+    })
+}

@@ -1,0 +1,259 @@
+//! A plan on the device: cuts units into jobs, keeps the ring filled, puts results back into the plan's order.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::mpsc::{self, Receiver, Sender};
+
+use rayon::prelude::*;
+
+use super::generator::GeneratorSetup;
+use super::owner::{self, Cases, Command, Prepared, Request, Setup};
+use super::pacing::Pacer;
+use super::records::{CELL_WORDS, StartRecord, from_ordered};
+use super::ring::{Answer, Job, RING};
+use super::{device::PipelineSpec, shader};
+use crate::engine::{CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use crate::scenario::{Category, Tables};
+use crate::{Error, Result};
+
+/// A chunk is several jobs long, so that the ring stays full: about three seconds with four models. Until a job has been
+/// timed it is one job.
+const JOBS_PER_CHUNK: u64 = 8;
+
+/// Steps per model of the first job, should each lane make every step.
+const FIRST_STEPS: u64 = 1 << 26;
+
+pub(super) struct GpuSession<'p> {
+    plan: &'p LanePlan,
+    device: String,
+    commands: Sender<Command>,
+    prepared: Prepared,
+    /// One per block.
+    constants: Vec<Constants<f32>>,
+    pacer: Pacer,
+    /// The cases that the device holds: block, units of it, some of them with a second vehicle.
+    window: Option<(usize, Range<u64>, bool)>,
+    /// Time of all dispatches so far, s.
+    device_s: f64,
+}
+
+/// Part of a run that is under way.
+struct Piece {
+    block: usize,
+    /// Units within the block.
+    units: Range<u64>,
+    answer: Receiver<Result<Answer>>,
+}
+
+impl<'p> GpuSession<'p> {
+    pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, first_lanes: u64) -> Result<Self> {
+        let constants: Vec<Constants<f32>> =
+            plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
+        let tables: Tables<f32> = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
+        let mut pipelines = Vec::new();
+        for (block, resolved) in plan.blocks.iter().zip(&constants) {
+            pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));
+        }
+        if pipelines.is_empty() {
+            return Err(Error::Internal("a plan without lanes has nothing to do on a device".to_owned()));
+        }
+        let setup = Box::new(Setup {
+            starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
+            speed: tables.speed,
+            lateral: tables.lateral,
+            generator: plan.generator().map(GeneratorSetup::new),
+            models: plan.models.len() as u64,
+            pipelines,
+        });
+        let (reply, answer) = mpsc::channel();
+        commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
+        let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
+        let pacer = Pacer::new(first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
+        Ok(GpuSession { plan, device, commands, prepared, constants, pacer, window: None, device_s: 0.0 })
+    }
+
+    fn most_lanes(&self, wanted: Wanted) -> u64 {
+        self.prepared.most_lanes[wanted as usize]
+    }
+
+    /// Sends one job of units from `units` on; says how far it reaches.
+    fn send(&mut self, block: usize, units: Range<u64>, wanted: Wanted) -> Result<Piece> {
+        let plan = self.plan;
+        let variants = plan.blocks[block].variants.len() as u64;
+        let per_unit = variants * plan.headways.len() as u64;
+        let most = self.most_lanes(wanted);
+        if per_unit > most || variants > self.prepared.most_cases {
+            let problem = format!("one scenario has {per_unit} lanes per model, and it can hold {most} at once");
+            return Err(Error::device(&self.device, problem, "use --backend cpu, or fewer headways"));
+        }
+        let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
+        let mut cases = None;
+        if !inside {
+            let room = self.prepared.most_cases / variants;
+            let end = (units.start + room).min(plan.blocks[block].units.held().end);
+            // Not beyond what is asked for: a generator's samples have no natural end.
+            let end = if plan.generator().is_some() { end.min(units.end) } else { end };
+            let is_cut_out = plan.blocks[block].category == Category::CutOut;
+            let paired = if plan.generator().is_some() {
+                cases = Some(Cases::Made(units.start, (end - units.start) as u32));
+                is_cut_out
+            } else {
+                let upload = cases_of(plan, block, units.start..end);
+                let paired = is_cut_out || upload.iter().any(|c| c.pair != 0);
+                cases = Some(Cases::Given(upload));
+                paired
+            };
+            self.window = Some((block, units.start..end, paired));
+        }
+        let Some((_, held, paired)) = &self.window else {
+            return Err(Error::Internal("no cases are on the device".to_owned()));
+        };
+        let count = self.pacer.units(per_unit, most);
+        let end = units.end.min(units.start + count).min(held.end);
+        let job = Job {
+            pipelines: specs(plan, &self.constants[block], *paired),
+            first_case: ((units.start - held.start) * variants) as u32,
+            units: (end - units.start) as u32,
+            variants: variants as u32,
+            headways: plan.headways.len() as u32,
+            wanted,
+        };
+        let (reply, answer) = mpsc::channel();
+        let request = Box::new(Request { session: self.prepared.session, cases, job, reply });
+        self.commands.send(Command::Run(request)).map_err(|_| owner::gone(&self.device))?;
+        Ok(Piece { block, units: units.start..end, answer })
+    }
+
+    /// Waits for a piece and puts it where it belongs.
+    fn collect(&mut self, piece: Piece, chunk: &mut Chunk, wanted: Wanted) -> Result<()> {
+        let answer = piece.answer.recv().map_err(|_| owner::gone(&self.device))??;
+        let plan = self.plan;
+        let block = &plan.blocks[piece.block];
+        let models = plan.models.len();
+        let per_unit = plan.lanes_per_unit(block);
+        let lanes = ((piece.units.end - piece.units.start) * per_unit) as usize;
+        self.pacer.observe(lanes as u64 / models as u64, answer.slowest_s);
+        self.device_s += answer.device_s;
+        let from = (block.first_lane + piece.units.start * per_unit - chunk.first_lane) as usize;
+        match wanted {
+            Wanted::Counts => {
+                let first = plan.cell(piece.block, 0, 0);
+                for (model, cells) in answer.cells.iter().enumerate() {
+                    for (variant, cell) in cells.iter().enumerate() {
+                        chunk.counts[first + variant * models + model].add(&counts(cell));
+                    }
+                }
+            }
+            Wanted::Verdicts => spread(&answer.words, &mut chunk.verdicts[from..from + lanes]),
+            Wanted::Outcomes => {
+                spread(&answer.words, &mut chunk.verdicts[from..from + lanes]);
+                let criteria = &self.constants[piece.block].criteria;
+                let outcomes: Option<Vec<Outcome<f64>>> = (0..lanes)
+                    .into_par_iter()
+                    .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
+                    .collect();
+                let outcomes = outcomes
+                    .ok_or_else(|| Error::device(&self.device, "it left a lane unwritten", "use --backend cpu"))?;
+                // Pieces come in the plan's order.
+                chunk.outcomes.extend(outcomes);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends the jobs of an interval of units and collects what they give.
+    fn run_jobs(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        let plan = self.plan;
+        let first_lane = plan.first_lane_of(units.start);
+        let lanes = (plan.first_lane_of(units.end) - first_lane) as usize;
+        let mut chunk =
+            Chunk { units: units.clone(), first_lane, verdicts: Vec::new(), outcomes: Vec::new(), counts: Vec::new() };
+        match wanted {
+            Wanted::Counts => chunk.counts = vec![CellCounts::EMPTY; plan.cell_count()],
+            Wanted::Verdicts | Wanted::Outcomes => chunk.verdicts = vec![Verdicts::default(); lanes],
+        }
+        let mut pending: VecDeque<Piece> = VecDeque::new();
+        for (block, inside) in plan.segments(units) {
+            let mut from = inside.start;
+            while from < inside.end {
+                let piece = self.send(block, from..inside.end, wanted)?;
+                from = piece.units.end;
+                pending.push_back(piece);
+                if pending.len() == RING
+                    && let Some(oldest) = pending.pop_front()
+                {
+                    self.collect(oldest, &mut chunk, wanted)?;
+                }
+            }
+        }
+        for piece in pending {
+            self.collect(piece, &mut chunk, wanted)?;
+        }
+        Ok(chunk)
+    }
+}
+
+impl Session for GpuSession<'_> {
+    fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        let chunk = self.run_jobs(units, wanted);
+        if chunk.is_err() {
+            // Whether the job that failed has brought its cases to the device is not known.
+            self.window = None;
+        }
+        chunk
+    }
+
+    fn chunk_lanes(&self, wanted: Wanted) -> u64 {
+        let most = if wanted == Wanted::Outcomes { 1 << 20 } else { 1 << 27 };
+        let jobs = if self.device_s > 0.0 { JOBS_PER_CHUNK } else { 1 };
+        (self.pacer.lanes() * self.plan.models.len() as u64 * jobs).clamp(1, most)
+    }
+
+    fn device_seconds(&self) -> Option<f64> {
+        Some(self.device_s)
+    }
+}
+
+impl Drop for GpuSession<'_> {
+    fn drop(&mut self) {
+        // Where the thread has ended, so has its session.
+        let _ = self.commands.send(Command::Close { session: self.prepared.session });
+    }
+}
+
+/// The pipelines of a block, one per model of the plan.
+fn specs(plan: &LanePlan, resolved: &Constants<f32>, paired: bool) -> Vec<PipelineSpec> {
+    let spec = |&model| PipelineSpec { model, constants: shader::constants(resolved, model, paired) };
+    plan.models.iter().map(spec).collect()
+}
+
+/// Cases in the order of the lanes: unit, variant.
+fn cases_of(plan: &LanePlan, block: usize, units: Range<u64>) -> Vec<LaneCase<f32>> {
+    let variants = plan.blocks[block].variants.len();
+    units
+        .into_par_iter()
+        .flat_map_iter(|unit| (0..variants).map(move |variant| plan.case(block, unit, variant).cast()))
+        .collect()
+}
+
+/// Verdict words of each model into the plan's order, the model innermost.
+fn spread(words: &[Vec<u32>], lanes: &mut [Verdicts]) {
+    let models = words.len();
+    lanes.par_chunks_mut(8 * models).enumerate().for_each(|(word, lanes)| {
+        for (at, lane) in lanes.iter_mut().enumerate() {
+            *lane = Verdicts((words[at % models][word] >> (4 * (at / models)) & 0xf) as u8);
+        }
+    });
+}
+
+/// A cell as the device counted it.
+fn counts(cell: &[u32; CELL_WORDS]) -> CellCounts {
+    let smallest = |key: u32| if cell[0] == 0 { f64::INFINITY } else { f64::from(from_ordered(key)) };
+    CellCounts {
+        lanes: cell[0].into(),
+        failed: [cell[1].into(), cell[2].into(), cell[3].into()],
+        capped: cell[4].into(),
+        min_ttc_s: smallest(cell[5]),
+        min_gap_m: smallest(cell[6]),
+    }
+}

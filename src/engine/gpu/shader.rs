@@ -1,0 +1,98 @@
+//! From the files in `shaders/` to the source of one model's pipeline, and its constants from the profile.
+
+use crate::engine::Constants;
+use crate::model::driver::{MODELS, ModelId};
+
+/// Entry point of every pipeline.
+pub const ENTRY: &str = "lanes";
+/// Lanes per workgroup.
+pub const WORKGROUP: u32 = 64;
+
+/// Fragments that every model shares, in the order in which they are joined.
+pub const SHARED: [(&str, &str); 11] = [
+    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
+    ("lane.wgsl", include_str!("../../../shaders/lane.wgsl")),
+    ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
+    ("shared/motion.wgsl", include_str!("../../../shaders/shared/motion.wgsl")),
+    ("shared/driver.wgsl", include_str!("../../../shaders/shared/driver.wgsl")),
+    ("shared/collision.wgsl", include_str!("../../../shaders/shared/collision.wgsl")),
+    ("shared/ttc.wgsl", include_str!("../../../shaders/shared/ttc.wgsl")),
+    ("shared/btn.wgsl", include_str!("../../../shaders/shared/btn.wgsl")),
+    ("shared/criteria.wgsl", include_str!("../../../shaders/shared/criteria.wgsl")),
+    ("shared/frame.wgsl", include_str!("../../../shaders/shared/frame.wgsl")),
+    ("shared/reduction.wgsl", include_str!("../../../shaders/shared/reduction.wgsl")),
+];
+
+/// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares what they read:
+/// `normal_table: array<vec4<f32>>` ([`normal_table`](crate::stats::random::normal_table)),
+/// `sobol_table: array<u32>` ([`Sobol::table`](crate::stats::random::Sobol::table)) and
+/// `alias_table: array<vec2<u32>>` ([`AliasTable::table`](crate::stats::random::AliasTable::table)).
+pub const RANDOM: [(&str, &str); 4] = [
+    ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
+    ("shared/uniform.wgsl", include_str!("../../../shaders/shared/uniform.wgsl")),
+    ("shared/normal.wgsl", include_str!("../../../shaders/shared/normal.wgsl")),
+    ("shared/sobol.wgsl", include_str!("../../../shaders/shared/sobol.wgsl")),
+];
+
+/// Entry point of the generator's pipeline.
+pub const GENERATE: &str = "generate";
+
+/// Fragments of the generator beside [`RANDOM`], in the order in which they are joined.
+pub const GENERATOR: [(&str, &str); 8] = [
+    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
+    ("generate.wgsl", include_str!("../../../shaders/generate.wgsl")),
+    ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
+    ("shared/motion.wgsl", include_str!("../../../shaders/shared/motion.wgsl")),
+    ("shared/attention.wgsl", include_str!("../../../shaders/shared/attention.wgsl")),
+    ("shared/recipe.wgsl", include_str!("../../../shaders/shared/recipe.wgsl")),
+    ("shared/points.wgsl", include_str!("../../../shaders/shared/points.wgsl")),
+    ("shared/decode.wgsl", include_str!("../../../shaders/shared/decode.wgsl")),
+];
+
+/// Makes the list of the models' files from the registry.
+macro_rules! declare_shaders {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// File name and text of a model's shader.
+        pub fn driver_shader(model: ModelId) -> (&'static str, &'static str) {
+            match model {
+                $(ModelId::$model => (
+                    concat!(stringify!($file), ".wgsl"),
+                    include_str!(concat!("../../../shaders/", stringify!($file), ".wgsl")),
+                ),)+
+            }
+        }
+    };
+}
+for_every_driver_model!(declare_shaders);
+
+/// The source of a model's pipeline: what the registry says, the shared fragments, the model.
+pub fn assemble(model: ModelId) -> String {
+    let (_, driver) = driver_shader(model);
+    let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
+    for text in SHARED.iter().map(|(_, text)| *text).chain([driver]) {
+        source.push_str(text);
+        source.push('\n');
+    }
+    source
+}
+
+/// The source of the generator's pipeline.
+pub fn assemble_generator() -> String {
+    let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
+    for (_, text) in GENERATOR.into_iter().chain(RANDOM) {
+        source.push_str(text);
+        source.push('\n');
+    }
+    source
+}
+
+/// Values of the `override` constants of a model's pipeline, by name. `paired` says that some case has a
+/// second vehicle; without, the pipeline spares its half of the work.
+pub fn constants(resolved: &Constants<f32>, model: ModelId, paired: bool) -> Vec<(&'static str, f64)> {
+    let mut all = resolved.frames[model.index()].shader_constants();
+    all.push(("frame_model", model.index() as f64));
+    all.push(("frame_paired", f64::from(u8::from(paired))));
+    all.extend(resolved.criteria.shader_constants());
+    all.extend(resolved.driver_shader_constants(model));
+    all
+}

@@ -1,0 +1,71 @@
+//! One lane from start to end, step by step, with an observer.
+
+use crate::model::driver::{DriverModel, Hazard};
+use crate::model::scalar::Real;
+use crate::scenario::Tables;
+
+use super::cpu::lane_result::conclude;
+use super::frame::{Simulation, Start};
+use super::lane_case::LaneCase;
+use super::lane_step::{LaneConstants, LaneState, Seen, Whereabouts, advance};
+use super::outcome::Outcome;
+
+/// One step of a lane, for traces.
+#[derive(Debug, Clone, Copy)]
+pub struct Step<R> {
+    /// Index i.
+    pub index: u32,
+    /// Speed of the ego, m/s.
+    pub v_ego: R,
+    /// The other vehicles; the second only where the case has one.
+    pub seen: [Seen<R>; 2],
+    /// The result of the check that counts.
+    pub hazard: Hazard<R>,
+}
+
+/// Listens to the steps of a lane. Sweeps listen to nothing and pay nothing.
+pub trait Observer<R> {
+    /// Called once per evaluated step.
+    fn step(&mut self, step: &Step<R>);
+}
+
+/// Listens to nothing.
+pub struct Silent;
+
+impl<R> Observer<R> for Silent {
+    #[inline(always)]
+    fn step(&mut self, _: &Step<R>) {}
+}
+
+impl<R, F: FnMut(&Step<R>)> Observer<R> for F {
+    fn step(&mut self, step: &Step<R>) {
+        self(step);
+    }
+}
+
+/// Runs one lane.
+#[inline(always)]
+pub fn run_lane<R: Real, M: DriverModel<R>>(
+    simulation: &Simulation<R, M>,
+    case: &LaneCase<R>,
+    tables: &Tables<R>,
+    start: Start<R>,
+    observer: &mut impl Observer<R>,
+) -> Outcome<R> {
+    let lane = LaneConstants::new(simulation, case);
+    let is_pair = simulation.scene.is_pair;
+    let mut state = LaneState::new(simulation, case, start);
+    loop {
+        let first = Whereabouts::of(&case.others[0].motion, tables, state.index);
+        let second = if is_pair { Whereabouts::of(&case.others[1].motion, tables, state.index) } else { first };
+        let places = [first, second];
+        let index = state.index;
+        let v_ego = state.v_ego;
+        let moved = advance(simulation, &lane, &state, &places);
+        observer.step(&Step { index, v_ego, seen: moved.seen, hazard: moved.hazard });
+        state = moved.state;
+        if state.over.holds() || state.index >= simulation.frame.step_cap {
+            return conclude(simulation, &lane, &state, &places);
+        }
+    }
+}

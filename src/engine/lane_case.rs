@@ -1,0 +1,224 @@
+//! From a [`Case`] to the record that lanes read: motions encoded, sizes summed, everything that depends
+//! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
+
+pub use crate::model::driver::NEVER;
+use crate::model::driver::{AttentionRule, DriverProfile, MODELS};
+use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use crate::model::scalar::Real;
+use crate::scenario::{Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables};
+
+/// One other vehicle of a lane.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaneOther<R> {
+    /// Its motion.
+    pub motion: Motion<R>,
+    /// (L_e + L_o)/2, m.
+    pub half_lengths: R,
+    /// (W_e + W_o)/2, m.
+    pub half_widths: R,
+    /// Added to the lane's initial gap, m: 0 for the principal vehicle, L_c + D for the one ahead of it.
+    pub gap_offset: R,
+    /// First step at which it exists for the ego.
+    pub present_from: u32,
+    /// First step at which it does no longer.
+    pub present_until: u32,
+    /// First step at which each driver model may react to it, in the order of
+    /// [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+    pub attend_from: [u32; MODELS],
+    /// 1 where the slot is used.
+    pub used: u32,
+    /// 1 where the criteria judge it.
+    pub judged: u32,
+}
+
+/// What all lanes of one case share.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaneCase<R> {
+    /// Principal vehicle, then the one ahead of it.
+    pub others: [LaneOther<R>; 2],
+    /// Initial and planned speed of the ego, m/s.
+    pub ego_speed: R,
+    /// Width of the ego, m.
+    pub ego_width: R,
+    /// Steps to the later of T and the last parameter event: the run goes on at least so long.
+    pub horizon: u32,
+    /// 1 where a second vehicle is used.
+    pub pair: u32,
+}
+
+impl LaneCase<f64> {
+    /// Encodes a case under a profile; series go to the end of `tables`.
+    pub fn encode(case: &Case, profile: &Profile, tables: &mut Tables<f64>) -> Self {
+        let dt_s = profile.frame.dt_s;
+        let exposed = case.category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed;
+        let principal = encode_other(case, &case.principal, 0.0, dt_s, tables);
+        let mut others = [principal, LaneOther { used: 0, present_until: 0, ..principal }];
+        if let Some(ahead) = &case.ahead {
+            let offset = case.principal.length_m + ahead.gap_m;
+            others[1] = encode_other(case, &ahead.vehicle, offset, dt_s, tables);
+        }
+        if case.category == Category::CutOut && profile.frame.cut_out_judged == CutOutJudged::Ahead {
+            others[0].judged = 0;
+        }
+        let series = Series::of(&others[0].motion, tables, profile.step_cap());
+        if exposed {
+            expose(case, profile, &series, &mut others, tables);
+        } else {
+            attend(case, profile, &series, &mut others);
+        }
+        LaneCase {
+            others,
+            ego_speed: case.ego_speed_mps,
+            ego_width: case.ego_width_m,
+            horizon: (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32,
+            pair: u32::from(case.ahead.is_some()),
+        }
+    }
+
+    /// The host's one rounding.
+    pub fn cast<R: Real>(&self) -> LaneCase<R> {
+        LaneCase {
+            others: self.others.map(|o| LaneOther {
+                motion: o.motion.cast(),
+                half_lengths: R::from_f64(o.half_lengths),
+                half_widths: R::from_f64(o.half_widths),
+                gap_offset: R::from_f64(o.gap_offset),
+                present_from: o.present_from,
+                present_until: o.present_until,
+                attend_from: o.attend_from,
+                used: o.used,
+                judged: o.judged,
+            }),
+            ego_speed: R::from_f64(self.ego_speed),
+            ego_width: R::from_f64(self.ego_width),
+            horizon: self.horizon,
+            pair: self.pair,
+        }
+    }
+
+    /// The same; the series that it takes from `all` go to the end of `tables`.
+    pub(super) fn cast_with_series<R: Real>(&self, all: &Tables<f64>, tables: &mut Tables<R>) -> LaneCase<R> {
+        let mut case: LaneCase<R> = self.cast();
+        for LaneOther { motion, .. } in &mut case.others {
+            if motion.kind & SPEED_SAMPLED != 0 {
+                let series = &all.speed[motion.speed_offset as usize..][..motion.speed_len as usize];
+                motion.speed_offset = tables.speed.len() as u32;
+                tables.speed.extend(series.iter().map(|&v| R::from_f64(v)));
+            }
+            if motion.kind & LATERAL_SAMPLED != 0 {
+                let series = &all.lateral[motion.lateral_offset as usize..][..motion.lateral_len as usize];
+                motion.lateral_offset = tables.lateral.len() as u32;
+                tables.lateral.extend(series.iter().map(|state| state.map(R::from_f64)));
+            }
+        }
+        case
+    }
+}
+
+fn encode_other(
+    case: &Case,
+    other: &Participant,
+    gap_offset: f64,
+    dt_s: f64,
+    tables: &mut Tables<f64>,
+) -> LaneOther<f64> {
+    LaneOther {
+        motion: Motion::encode(&other.speed, &other.lateral, dt_s, tables),
+        half_lengths: (case.ego_length_m + other.length_m) / 2.0,
+        half_widths: (case.ego_width_m + other.width_m) / 2.0,
+        gap_offset,
+        present_from: 0,
+        present_until: NEVER,
+        attend_from: [0; MODELS],
+        used: 1,
+        judged: 1,
+    }
+}
+
+/// The principal vehicle's motion as series, for the rules that look at it.
+struct Series {
+    lateral_m: Vec<f64>,
+    speed_mps: Vec<f64>,
+}
+
+impl Series {
+    /// Long enough to see every event: motions are constant after their last event.
+    fn of(motion: &Motion<f64>, tables: &Tables<f64>, step_cap: u32) -> Series {
+        let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
+        let steps = step_cap.min(events.into_iter().max().unwrap_or(0).saturating_add(2));
+        Series {
+            lateral_m: (0..steps).map(|i| motion.lateral(tables, i).position).collect(),
+            speed_mps: (0..steps).map(|i| motion.speed(tables, i)).collect(),
+        }
+    }
+}
+
+/// Perception rules: when each model may react.
+fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
+    let half_widths = others[0].half_widths;
+    let steps = series.lateral_m.len() as u32;
+    let lateral = |step: u32| series.lateral_m[step as usize];
+    let speed = |step: u32| series.speed_mps[step as usize];
+    for (model, rule) in attention_rules(profile, case.category).into_iter().enumerate() {
+        let [principal, ahead] = rule.attend_from(steps, half_widths, lateral, speed);
+        others[0].attend_from[model] = principal;
+        others[1].attend_from[model] = ahead;
+    }
+}
+
+/// Makes [`attention_rules`] from the registry of driver models.
+macro_rules! declare_attention {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+        pub(crate) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
+            [$(profile.$file.attention(profile.frame.dt_s, category)),+]
+        }
+    };
+}
+for_every_driver_model!(declare_attention);
+
+/// The JRC's cut-out: nothing before the exposure, then the vehicle ahead; a cutting-out vehicle that hits
+/// it freezes there and takes its place.
+fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2], tables: &mut Tables<f64>) {
+    let Some(ahead) = &case.ahead else { return };
+    let dt = profile.frame.dt_s;
+    let cap = profile.step_cap();
+    let exposure = series.lateral_m.iter().position(|y| y.abs() > profile.frame.exposure_m);
+    let exposure = exposure.map_or(NEVER, |k| k as u32);
+
+    let overlap_lengths = (case.principal.length_m + ahead.vehicle.length_m) / 2.0;
+    let overlap_widths = (case.principal.width_m + ahead.vehicle.width_m) / 2.0;
+    let (cutter, front) = (others[0].motion, others[1].motion);
+    let shift = if profile.frame.start_shift { front.speed(tables, 0) - cutter.speed(tables, 0) } else { 0.0 };
+    let mut distance = ahead.gap_m + overlap_lengths + shift * dt;
+    let mut freeze = NEVER;
+    // How far it drives beyond the middle of the other one within the step, m.
+    let mut beyond = 0.0;
+    for i in 0..cap {
+        let before = distance;
+        if i > 0 {
+            distance += (front.speed(tables, i) - cutter.speed(tables, i)) * dt;
+        }
+        let passes = before >= overlap_lengths && distance < 0.0;
+        let along = distance.abs() < overlap_lengths || passes;
+        if along && cutter.lateral(tables, i).position.abs() < overlap_widths {
+            freeze = i;
+            beyond = if passes { -distance } else { 0.0 };
+            break;
+        }
+    }
+    others[1].present_from = exposure.min(freeze);
+    others[1].present_until = freeze;
+    others[0].present_from = freeze;
+    if freeze != NEVER {
+        // Its position at the freeze holds the step it moved; its speed from there on is 0.
+        let speed: Vec<f64> = (0..freeze).map(|i| cutter.speed(tables, i)).chain([0.0]).collect();
+        let lateral = cutter.lateral(tables, freeze).position;
+        let moved = cutter.speed(tables, freeze) * dt - beyond;
+        let frozen = Lateral::Sampled { position_m: vec![lateral], towards_mps: vec![0.0] };
+        others[0].motion = Motion::encode(&Speed::Sampled(speed), &frozen, dt, tables);
+        others[0].gap_offset += moved;
+    }
+}

@@ -1,0 +1,363 @@
+//! One step of a lane as a pure function, written once for the scalar lane and for batches of lanes. The latched
+//! step stands here, once for all models.
+//!
+//! Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the contact, then the check,
+//! then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32 keeps millimetres.
+//!
+//! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
+//! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
+
+use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, held_in_contact, overlaps_along};
+use crate::model::driver::{DriverModel, DriverState, Hazard, View};
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+use crate::scenario::{Motion, Tables};
+
+use super::frame::{Frame, Simulation, Start};
+use super::lane_case::{LaneCase, LaneOther};
+use super::outcome::NO_STEP;
+use super::scene::Scene;
+
+/// What a lane's steps need to know of another vehicle, constant within the lane.
+#[derive(Debug, Clone, Copy)]
+pub struct OtherConstants<R> {
+    /// (L_e + L_o)/2, m.
+    pub half_lengths: R,
+    /// (W_e + W_o)/2, m.
+    pub half_widths: R,
+    /// First step at which it exists for the ego.
+    pub present_from: u32,
+    /// First step at which it does no longer.
+    pub present_until: u32,
+    /// First step at which the lane's driver may react to it.
+    pub attend_from: u32,
+    /// The criteria judge it.
+    pub judged: Flag,
+}
+
+/// What a lane's steps need to know, constant within the lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneConstants<R> {
+    /// Principal vehicle, then the one ahead of it.
+    pub others: [OtherConstants<R>; 2],
+    /// Width of the ego, m.
+    pub ego_width: R,
+    /// First step that may end a lane in which nothing happens any more.
+    pub horizon: u32,
+}
+
+impl<R: Real> LaneConstants<R> {
+    /// Of a case under a model.
+    #[inline(always)]
+    pub fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
+        let known = |step: u32| step.min(Flag::LATEST_STEP);
+        let of = |other: &LaneOther<R>| OtherConstants {
+            half_lengths: other.half_lengths,
+            half_widths: other.half_widths,
+            present_from: known(other.present_from),
+            present_until: if other.used != 0 { known(other.present_until) } else { 0 },
+            attend_from: known(other.attend_from[simulation.model_index]),
+            judged: Flag::of(other.judged != 0),
+        };
+        LaneConstants {
+            others: [of(&case.others[0]), of(&case.others[1])],
+            ego_width: case.ego_width,
+            // No step has this index: the step cap is below it.
+            horizon: known(if simulation.frame.end_when_settled { case.horizon } else { Flag::LATEST_STEP }),
+        }
+    }
+}
+
+/// Where another vehicle is at one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Whereabouts<R> {
+    /// Speed, m/s.
+    pub speed: R,
+    /// Lateral position, m.
+    pub position: R,
+    /// Lateral speed towards the ego, m/s.
+    pub towards: R,
+}
+
+impl<R: Real> Whereabouts<R> {
+    /// Decodes a motion at a step.
+    #[inline(always)]
+    pub fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
+        let lateral = motion.lateral(tables, step);
+        Whereabouts { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
+    }
+}
+
+/// One other vehicle at one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<R> {
+    /// What the driver sees.
+    pub view: View<R>,
+    /// Lateral position, m.
+    pub lateral: R,
+    /// Present for the ego at this step.
+    pub present: Flag,
+    /// TTC and BTN look at it.
+    pub judged: Flag,
+}
+
+/// What the steps of a lane have gathered so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Record<R> {
+    /// Smallest time to collision.
+    pub ttc: TtcMinimum<R>,
+    /// Largest Brake Threat Number.
+    pub btn: BrakeThreatMaximum<R>,
+    /// Smallest gap to a vehicle that TTC and BTN look at, m.
+    pub min_gap: R,
+}
+
+/// A lane between two steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaneState<R> {
+    /// The step to come.
+    pub index: u32,
+    /// Speed of the ego at the step to come, m/s.
+    pub v_ego: R,
+    /// Speed of the ego one step before, m/s.
+    pub v_before: R,
+    /// Gaps at the last step, m; the step to come moves them first.
+    pub gaps: [R; 2],
+    /// The driver's latched state.
+    pub driver: DriverState<R>,
+    /// First unsafe step, or [`NO_STEP`].
+    pub reaction_step: u32,
+    /// What the steps have gathered.
+    pub record: Record<R>,
+    /// The last step has been made, even if the time cap is far: its [ending](crate::engine::cpu::lane_result) says why. Later steps
+    /// change nothing; where only verdicts are wanted, nothing that verdicts look at.
+    pub over: Flag,
+}
+
+impl<R: Real> LaneState<R> {
+    /// Before the first step.
+    #[inline(always)]
+    pub fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
+        let gap_start = match start {
+            Start::Headway(thw) => thw * case.ego_speed,
+            Start::Gap(gap) => gap,
+        };
+        LaneState {
+            index: 0,
+            v_ego: case.ego_speed,
+            v_before: case.ego_speed,
+            gaps: [gap_start + case.others[0].gap_offset, gap_start + case.others[1].gap_offset],
+            driver: simulation.model.initial(),
+            reaction_step: NO_STEP,
+            record: Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: R::INFINITY },
+            over: Flag::FALSE,
+        }
+    }
+}
+
+/// What one step did.
+#[derive(Debug, Clone, Copy)]
+pub struct Moved<R> {
+    /// The lane after it.
+    pub state: LaneState<R>,
+    /// The other vehicles as the ego saw them; the second is the first where there is none.
+    pub seen: [Seen<R>; 2],
+    /// The result of the check that counts.
+    pub hazard: Hazard<R>,
+}
+
+/// One step; `places` are the other vehicles at `state.index`. The lane is over where its state says so, or where the
+/// next index reaches the step cap; one that is over stays as it is (see [`LaneState::over`]).
+#[inline(always)]
+pub fn advance<R: Real, M: DriverModel<R>>(
+    simulation: &Simulation<R, M>,
+    lane: &LaneConstants<R>,
+    state: &LaneState<R>,
+    places: &[Whereabouts<R>; 2],
+) -> Moved<R> {
+    let &Simulation { frame, criteria, model, scene, .. } = simulation;
+    let &LaneState { index, v_ego, .. } = state;
+    let runs = !state.over;
+    let keeps_values = criteria.keeps_values;
+    let a_is_seen = keeps_values || M::SEES_OWN_ACCELERATION;
+    let a = if a_is_seen { (v_ego - state.v_before) * frame.inverse_dt } else { R::ZERO };
+    let ego = Ego { v: v_ego, a, width: lane.ego_width };
+    // Step 0 is the start itself, unless index 0 is one step after it.
+    let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
+    let mut gaps = state.gaps;
+    gaps[0] = moves.choose(moved_gap(simulation, &ego, &lane.others[0], &places[0], gaps[0], index), gaps[0]);
+    let first = see(simulation, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
+    let mut record = judge(criteria, &state.record, &first);
+    let mut hazard = check(simulation, &first, &lane.others[0], index);
+    let mut touched = is_touched(scene, &first, &lane.others[0]);
+    let mut settled = is_settled(scene, &first);
+    let mut aborted = aborts(frame, &first);
+    let mut second = first;
+    if scene.is_pair {
+        gaps[1] = moves.choose(moved_gap(simulation, &ego, &lane.others[1], &places[1], gaps[1], index), gaps[1]);
+        second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
+        record = judge(criteria, &record, &second);
+        let other_hazard = check(simulation, &second, &lane.others[1], index);
+        // The nearest unsafe vehicle drives the reaction.
+        let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
+        hazard = Hazard {
+            is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
+            demand: nearer.choose(other_hazard.demand, hazard.demand),
+        };
+        touched = touched | is_touched(scene, &second, &lane.others[1]);
+        settled = settled & is_settled(scene, &second);
+        aborted = aborted | aborts(frame, &second);
+    }
+    let at_rest = !v_ego.is_positive();
+    let past_horizon = Flag::reached(index, lane.horizon);
+    let over = state.over | touched | aborted | (past_horizon & (at_rest | settled));
+
+    // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
+    let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
+    let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
+    let state = LaneState {
+        index: index + runs.one(),
+        v_ego: hazard.is_unsafe.choose(v_reacting, v_ego),
+        v_before: if keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
+        gaps,
+        driver: DriverState {
+            deceleration: hazard.is_unsafe.choose(reacting.deceleration, state.driver.deceleration),
+            delay_steps: hazard.is_unsafe.choose(reacting.delay_steps, state.driver.delay_steps),
+        },
+        reaction_step: is_first.choose(index, state.reaction_step),
+        record,
+        over,
+    };
+    Moved { state, seen: [first, second], hazard }
+}
+
+/// The ego at one step.
+pub(super) struct Ego<R> {
+    pub v: R,
+    pub a: R,
+    pub width: R,
+}
+
+/// The gap a step later; a contact between the two steps holds it.
+#[inline(always)]
+fn moved_gap<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    ego: &Ego<R>,
+    other: &OtherConstants<R>,
+    place: &Whereabouts<R>,
+    gap: R,
+    index: u32,
+) -> R {
+    let moved = gap + (place.speed - ego.v) * simulation.frame.dt;
+    if !simulation.scene.may_cross {
+        return moved;
+    }
+    let across = (place.position.abs() - other.half_widths).is_negative();
+    let stops = is_present(other, index) & other.judged & across;
+    stops.choose(held_in_contact(gap, moved, other.half_lengths), moved)
+}
+
+/// It exists for the ego.
+#[inline(always)]
+fn is_present<R>(other: &OtherConstants<R>, index: u32) -> Flag {
+    Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until)
+}
+
+/// `runs`: the lane is not over; else nothing is there to be seen.
+#[inline(always)]
+pub(super) fn see<R: Real, M>(
+    simulation: &Simulation<R, M>,
+    ego: &Ego<R>,
+    other: &OtherConstants<R>,
+    place: &Whereabouts<R>,
+    gap: R,
+    index: u32,
+    runs: Flag,
+) -> Seen<R> {
+    let view = View {
+        v_ego: ego.v,
+        a_ego: ego.a,
+        v_other: place.speed,
+        gap,
+        lateral_gap: place.position.abs() - other.half_widths,
+        lateral_towards: place.towards,
+        half_lengths: other.half_lengths,
+    };
+    let &Simulation { criteria, scene, .. } = simulation;
+    let lateral = place.position;
+    if scene.in_lane {
+        return Seen { view, lateral, present: runs, judged: runs & !view.is_behind() };
+    }
+    let is_seen = criteria.sees(gap, other.half_lengths, view.lateral_gap, lateral, ego.width);
+    if scene.always_there {
+        return Seen { view, lateral, present: runs, judged: runs & is_seen };
+    }
+    let present = runs & is_present(other, index);
+    Seen { view, lateral, present, judged: present & other.judged & is_seen }
+}
+
+#[inline(always)]
+pub(super) fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
+    let (gap, closing) = (seen.view.gap, seen.view.closing());
+    let keeps_values = criteria.keeps_values;
+    let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing, keeps_values);
+    let btn = criteria.btn.update(record.btn, seen.judged, gap, closing, keeps_values);
+    let smaller = if keeps_values { gap.smaller(record.min_gap) } else { record.min_gap };
+    Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
+}
+
+/// The gap, m ≥ 0, beyond which no criterion that a record keeps begins to fail at this closing speed, m/s, or a smaller
+/// one, but for rounding.
+#[inline(always)]
+pub(super) fn criteria_safe_gap<R: Real>(criteria: &Criteria<R>, record: &Record<R>, closing: R) -> R {
+    let Record { ttc, btn, min_gap: _ } = record;
+    let mut safe = R::ZERO;
+    if closing > R::ZERO && !ttc.failed.holds() {
+        safe = safe.larger(criteria.ttc.safe_gap(closing));
+    }
+    if closing > R::ZERO && !btn.failed.holds() {
+        safe = safe.larger(criteria.btn.safe_gap(closing));
+    }
+    safe
+}
+
+#[inline(always)]
+pub(super) fn check<R: Real, M: DriverModel<R>>(
+    simulation: &Simulation<R, M>,
+    seen: &Seen<R>,
+    other: &OtherConstants<R>,
+    index: u32,
+) -> Hazard<R> {
+    let model = simulation.model;
+    let hazard = if simulation.scene.at_ease { model.check_at_ease(&seen.view) } else { model.check(&seen.view) };
+    let attends = if simulation.scene.in_lane { Flag::TRUE } else { Flag::reached(index, other.attend_from) };
+    let attentive = seen.present & attends;
+    Hazard { is_unsafe: hazard.is_unsafe & attentive, demand: hazard.demand }
+}
+
+#[inline(always)]
+pub(super) fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
+    let along = overlaps_along(seen.view.gap, other.half_lengths);
+    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
+    let judged = if scene.always_there { Flag::TRUE } else { other.judged };
+    seen.present & judged & across & along
+}
+
+/// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
+#[inline(always)]
+pub(super) fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
+    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
+    let in_lane = seen.judged | (seen.present & across);
+    seen.view.is_behind() | !in_lane | !seen.view.closing().is_positive()
+}
+
+#[inline(always)]
+pub(super) fn aborts<R: Real>(frame: &Frame<R>, seen: &Seen<R>) -> Flag {
+    if frame.abort_above_ttc > R::ZERO {
+        let overlap = seen.present & seen.view.lateral_gap.is_negative() & !seen.view.is_behind();
+        let limit = frame.abort_above_ttc * seen.view.closing().abs();
+        overlap & seen.view.gap.abs().is_above(limit)
+    } else {
+        Flag::FALSE
+    }
+}

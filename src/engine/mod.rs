@@ -1,0 +1,53 @@
+//! The engine: cases become lanes, lanes become outcomes.
+//!
+//! Here live the lane's record and step, the lane plan, the backends ([`cpu`], [`gpu`]), the checks of one against the
+//! other ([`verify`], rechecks during a sweep), outcomes and partial counts. Cases come from [`model`](crate::model) and
+//! [`scenario`](crate::scenario::parameterization); partials go to [`run`](crate::run). A driver or a criterion lives in
+//! [`model`](crate::model).
+
+mod backend;
+pub(crate) mod cpu;
+mod drivers;
+mod forecast;
+mod frame;
+pub mod generated;
+pub mod gpu;
+mod lane;
+pub(crate) mod lane_case;
+mod lane_step;
+mod outcome;
+mod packed_counts;
+mod partial;
+pub(crate) mod plan;
+mod recheck;
+mod scene;
+mod sweep;
+pub(crate) mod time_step;
+mod trace;
+pub(crate) mod units;
+pub mod verify;
+pub(crate) mod version;
+
+pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+pub use cpu::backend::CpuBackend;
+pub(crate) use cpu::backend::lanes_within_seconds;
+pub use cpu::instructions::Instructions;
+pub use cpu::lane_result::Ending;
+pub use cpu::runner::LaneRunner;
+pub use drivers::Constants;
+pub use forecast::{Forecast, forecast};
+pub use frame::{Frame, Simulation, Start};
+pub use lane::{Observer, Silent, Step, run_lane};
+pub(crate) use lane_case::attention_rules;
+pub use lane_case::{LaneCase, LaneOther};
+pub use lane_step::Seen;
+pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
+pub use partial::{Confusion, Partial, UnitCounts, WORST_LANES, WorstLane};
+pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
+pub use recheck::{ONE_IN, Recheck, same_words, words};
+pub use scene::Scene;
+pub use sweep::{SweepOptions, SweepSummary, chunks, sweep};
+pub use time_step::check_time_step;
+pub use trace::{Mark, Trace, TracedStep, TracedVehicle};
+pub use units::Units;
+pub use version::ENGINE_VERSION;

@@ -1,0 +1,110 @@
+//! What a lane says when it is over.
+
+use crate::model::criterion::{Contact, Criterion};
+use crate::model::scalar::Real;
+
+/// "Did not happen" as a step index.
+pub const NO_STEP: u32 = u32::MAX;
+
+/// Verdict bits of a lane: bit [`Criterion::index`] is set where the criterion failed, [`Verdicts::CAPPED`]
+/// where the lane ran into the time cap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[repr(transparent)]
+pub struct Verdicts(pub u8);
+
+impl Verdicts {
+    /// The lane ended at the time cap.
+    pub const CAPPED: u8 = 1 << 3;
+
+    /// Did this criterion fail?
+    pub fn failed(self, criterion: Criterion) -> bool {
+        self.0 & (1 << criterion.index()) != 0
+    }
+
+    /// Did the lane end at the time cap?
+    pub fn capped(self) -> bool {
+        self.0 & Verdicts::CAPPED != 0
+    }
+}
+
+/// Why a lane ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EndReason {
+    /// The vehicles touched.
+    Contact,
+    /// The ego is not faster than anything ahead in its lane, or everything is behind.
+    Settled,
+    /// The ego stands.
+    Standstill,
+    /// The time cap.
+    Cap,
+    /// The JRC's rule for CCHDM: lateral overlap at a large TTC.
+    Aborted,
+}
+
+/// Outcome of one lane, in the lane's own numbers; times are integer steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome<R> {
+    /// Verdicts.
+    pub verdicts: Verdicts,
+    /// Kind of contact.
+    pub contact: Contact,
+    /// Vehicle of the contact: 0 principal, 1 the one ahead.
+    pub contact_with: u8,
+    /// Why it ended.
+    pub end: EndReason,
+    /// First unsafe step, or [`NO_STEP`].
+    pub reaction_step: u32,
+    /// Step of the contact, or [`NO_STEP`].
+    pub contact_step: u32,
+    /// Last evaluated step.
+    pub end_step: u32,
+    /// Speed of the ego at the contact, m/s; 0 without one.
+    pub impact_speed: R,
+    /// Closing speed at the contact, m/s; 0 without one.
+    pub impact_closing_speed: R,
+    /// Smallest TTC, s, ≥ 0; infinite where the ego never closed in.
+    pub min_ttc: R,
+    /// Largest BTN, ≥ 0; infinite where no braking helped.
+    pub max_btn: R,
+    /// Smallest gap to a vehicle that TTC and BTN look at, m; infinite where there was none.
+    pub min_gap: R,
+}
+
+impl Outcome<f64> {
+    /// Fills the place of a lane that is to come.
+    pub(super) const NONE: Self = Outcome {
+        verdicts: Verdicts(0),
+        contact: Contact::None,
+        contact_with: 0,
+        end: EndReason::Cap,
+        reaction_step: NO_STEP,
+        contact_step: NO_STEP,
+        end_step: 0,
+        impact_speed: 0.0,
+        impact_closing_speed: 0.0,
+        min_ttc: 0.0,
+        max_btn: 0.0,
+        min_gap: 0.0,
+    };
+}
+
+impl<R: Real> Outcome<R> {
+    /// The same in f64, exactly.
+    pub fn widen(&self) -> Outcome<f64> {
+        Outcome {
+            verdicts: self.verdicts,
+            contact: self.contact,
+            contact_with: self.contact_with,
+            end: self.end,
+            reaction_step: self.reaction_step,
+            contact_step: self.contact_step,
+            end_step: self.end_step,
+            impact_speed: self.impact_speed.to_f64(),
+            impact_closing_speed: self.impact_closing_speed.to_f64(),
+            min_ttc: self.min_ttc.to_f64(),
+            max_btn: self.max_btn.to_f64(),
+            min_gap: self.min_gap.to_f64(),
+        }
+    }
+}

@@ -1,0 +1,333 @@
+//! The lane plan: what is swept, in which order, with everything f64 that the host computes before the lanes, or what
+//! that follows from; and the hash of it.
+//!
+//! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by
+//! mixed radix from the plan's own counts. Ranges are intervals of units, so S and its S' never part.
+
+use std::ops::Range;
+
+
+use super::frame::Start;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::{Category, Tables};
+use crate::{Error, Place, Result};
+
+use super::generated::Generator;
+use super::lane_case::LaneCase;
+use super::time_step::check_cases;
+use super::units::Units;
+use super::version::Canonical;
+
+/// Headway of a lane.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Headway {
+    /// Time headway, s: the initial gap is this times the ego's initial speed, bumper to bumper.
+    ThwS(f64),
+    /// Initial gap, m, bumper to bumper.
+    GapM(f64),
+}
+
+impl Headway {
+    /// The paper's ten: 2.0, 1.8, … 0.2 s.
+    pub fn paper() -> Vec<Headway> {
+        (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
+    }
+
+    /// From its text, `1.2s` or `30m`; `2.0s`, as tables have it, is `2s`.
+    pub fn parse(text: &str) -> Option<Headway> {
+        let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+        match text.strip_suffix('s') {
+            Some(seconds) => number(seconds).map(Headway::ThwS),
+            None => number(text.strip_suffix('m')?).map(Headway::GapM),
+        }
+    }
+
+    /// As a lane starts, rounded once.
+    pub fn start<R: crate::model::scalar::Real>(self) -> Start<R> {
+        match self {
+            Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
+            Headway::GapM(m) => Start::Gap(R::from_f64(m)),
+        }
+    }
+}
+
+impl std::fmt::Display for Headway {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Headway::ThwS(s) => write!(f, "{s}s"),
+            Headway::GapM(m) => write!(f, "{m}m"),
+        }
+    }
+}
+
+/// Gives the case of (unit, variant) as a pure function: a table for the study; generators and grids for
+/// sampling and maps.
+pub trait CaseSource: Send + Sync {
+    /// The case; `block` and `unit` count from 0 (unit within its block), variant 0 is S.
+    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64>;
+    /// The series that motions point into.
+    fn tables(&self) -> &Tables<f64>;
+    /// Makes the cases where the lanes run, where that is so: then unit `i` is sample `i` of the first variant, and
+    /// [`CaseSource::case`] and [`CaseSource::tables`] are not asked.
+    fn generator(&self) -> Option<&Generator> {
+        None
+    }
+}
+
+/// One category's part of the plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Kind of scenario.
+    pub category: Category,
+    /// The units (scenarios or samples), in order.
+    pub units: Units,
+    /// Names of the variants; the first is `S`.
+    pub variants: Vec<String>,
+    /// Number of units before this block.
+    pub first_unit: u64,
+    /// Number of lanes before this block.
+    pub first_lane: u64,
+}
+
+/// What is swept.
+pub struct LanePlan {
+    /// Profile, with the time step.
+    pub profile: Profile,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// Headways, in order.
+    pub headways: Vec<Headway>,
+    /// Categories, in order.
+    pub blocks: Vec<Block>,
+    source: Box<dyn CaseSource>,
+    hash: String,
+}
+
+/// Where a lane stands in its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct LaneKey {
+    /// Index into [`LanePlan::blocks`].
+    pub block: usize,
+    /// Unit within the block.
+    pub unit: u64,
+    /// Variant within the block; 0 is S.
+    pub variant: usize,
+    /// Index into [`LanePlan::headways`].
+    pub headway: usize,
+    /// Index into [`LanePlan::models`].
+    pub model: usize,
+}
+
+impl LanePlan {
+    /// Makes and hashes a plan. `blocks` need categories, units and variants only; their firsts are set here.
+    pub fn new(
+        profile: Profile,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
+        blocks: Vec<Block>,
+        source: Box<dyn CaseSource>,
+    ) -> Result<LanePlan> {
+        let mut plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks, source)?;
+        check_cases(&plan.profile, &plan.blocks, plan.source.as_ref(), plan.segments(0..plan.unit_count()))?;
+        plan.hash = plan.content_hash()?;
+        Ok(plan)
+    }
+
+    /// A plan whose hash is that of what its cases follow from.
+    pub(crate) fn with_hash(
+        hash: String,
+        profile: Profile,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
+        mut blocks: Vec<Block>,
+        source: Box<dyn CaseSource>,
+    ) -> Result<LanePlan> {
+        let empty = [("driver models", models.is_empty()), ("headways", headways.is_empty())];
+        if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
+            return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
+        }
+        profile.check_time_step(&models)?;
+        let (mut unit, mut lane) = (0_u64, 0_u64);
+        for block in &mut blocks {
+            block.first_unit = unit;
+            block.first_lane = lane;
+            unit = unit.saturating_add(block.units.len());
+            let per_unit = (block.variants.len() * headways.len() * models.len()) as u64;
+            let lanes = block.units.len().checked_mul(per_unit).and_then(|lanes| lane.checked_add(lanes));
+            lane = lanes.filter(|&lanes| lanes < 1 << 63).ok_or_else(|| {
+                let problem = format!("{} units of {per_unit} lanes are more than can be counted", block.units.len());
+                Error::usage(Place::default(), problem, "sweep fewer at once: 2^63 lanes at most")
+            })?;
+        }
+        let points = source.generator().and_then(|generator| generator.points.count());
+        if let Some(points) = points.filter(|points| unit > *points) {
+            let problem = format!("{unit} samples are asked for, {points} points there are");
+            return Err(Error::usage(Place::default(), problem, "ask for fewer, or use independent random points"));
+        }
+        Ok(LanePlan { profile, models, headways, blocks, source, hash })
+    }
+
+    /// The same plan with the cases of some units only: those held of each block, and their cases.
+    pub(crate) fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
+        let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
+        LanePlan {
+            profile: self.profile.clone(),
+            models: self.models.clone(),
+            headways: self.headways.clone(),
+            blocks: blocks.collect(),
+            source,
+            hash: self.hash.clone(),
+        }
+    }
+
+    /// The case of a unit's variant.
+    pub fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        self.source.case(block, unit, variant)
+    }
+
+    /// The series that motions point into.
+    pub fn tables(&self) -> &Tables<f64> {
+        self.source.tables()
+    }
+
+    /// What makes the cases where the lanes run, in place of [`LanePlan::case`] and [`LanePlan::tables`].
+    pub fn generator(&self) -> Option<&Generator> {
+        self.source.generator()
+    }
+
+    /// SHA-256 over everything that decides the outcomes, in hexadecimal.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Number of units of all blocks.
+    pub fn unit_count(&self) -> u64 {
+        self.blocks.last().map_or(0, |b| b.first_unit + b.units.len())
+    }
+
+    /// Number of lanes of all blocks.
+    pub fn lane_count(&self) -> u64 {
+        self.blocks.last().map_or(0, |b| b.first_lane + b.units.len() * self.lanes_per_unit(b))
+    }
+
+    /// Lanes of one unit of a block.
+    pub fn lanes_per_unit(&self, block: &Block) -> u64 {
+        (block.variants.len() * self.headways.len() * self.models.len()) as u64
+    }
+
+    /// Number of a block's counts by headway: variants × headways × models × criteria.
+    pub(crate) fn headway_cells(&self, block: &Block) -> usize {
+        self.lanes_per_unit(block) as usize * Criterion::ALL.len()
+    }
+
+    /// Number of cells: blocks × their variants × models.
+    pub fn cell_count(&self) -> usize {
+        self.blocks.iter().map(|b| b.variants.len()).sum::<usize>() * self.models.len()
+    }
+
+    /// Index of a cell.
+    pub fn cell(&self, block: usize, variant: usize, model: usize) -> usize {
+        let before: usize = self.blocks[..block].iter().map(|b| b.variants.len()).sum();
+        (before + variant) * self.models.len() + model
+    }
+
+    /// Index of the first lane of a unit (counted over all blocks), or the number of lanes at the end.
+    pub fn first_lane_of(&self, unit: u64) -> u64 {
+        let found = self.blocks.iter().rev().find(|b| b.first_unit <= unit && !b.units.is_empty());
+        found.map_or(0, |b| b.first_lane + (unit - b.first_unit).min(b.units.len()) * self.lanes_per_unit(b))
+    }
+
+    /// Splits an interval of units (over all blocks) at the blocks' borders: (block, units within it).
+    pub fn segments(&self, units: Range<u64>) -> Vec<(usize, Range<u64>)> {
+        let mut segments = Vec::new();
+        for (index, block) in self.blocks.iter().enumerate() {
+            let end = block.first_unit + block.units.len();
+            let (from, to) = (units.start.max(block.first_unit), units.end.min(end));
+            if from < to {
+                segments.push((index, from - block.first_unit..to - block.first_unit));
+            }
+        }
+        segments
+    }
+
+    /// Lane index of a key.
+    pub fn lane(&self, key: &LaneKey) -> u64 {
+        let block = &self.blocks[key.block];
+        let inner = (key.variant * self.headways.len() + key.headway) * self.models.len() + key.model;
+        block.first_lane + key.unit * self.lanes_per_unit(block) + inner as u64
+    }
+
+    /// Key of a lane index; `None` beyond the plan.
+    pub fn key(&self, lane: u64) -> Option<LaneKey> {
+        if lane >= self.lane_count() {
+            return None;
+        }
+        let block = self.blocks.iter().rposition(|b| b.first_lane <= lane && !b.units.is_empty())?;
+        let inside = lane - self.blocks[block].first_lane;
+        let per_unit = self.lanes_per_unit(&self.blocks[block]);
+        let rest = (inside % per_unit) as usize;
+        let (models, headways) = (self.models.len(), self.headways.len());
+        Some(LaneKey {
+            block,
+            unit: inside / per_unit,
+            variant: rest / (models * headways),
+            headway: rest / models % headways,
+            model: rest % models,
+        })
+    }
+
+    /// A lane's key as text: `01_cut_in_81_74_836/2/1.8s/FSM`. Errors and tables print it.
+    pub fn key_text(&self, key: &LaneKey) -> String {
+        let block = &self.blocks[key.block];
+        format!(
+            "{}/{}/{}/{}",
+            block.units.name(key.unit),
+            block.variants[key.variant],
+            self.headways[key.headway],
+            self.models[key.model].name()
+        )
+    }
+
+    /// The key that a text stands for.
+    pub fn parse_key(&self, text: &str) -> Option<LaneKey> {
+        let parts: Vec<&str> = text.rsplitn(4, '/').collect();
+        let [model, headway, variant, unit] = parts[..] else { return None };
+        let model = ModelId::parse(model)?;
+        let model = self.models.iter().position(|m| *m == model)?;
+        // As it is written first: a random plan's gap may be negative, which nobody may ask for.
+        let written = self.headways.iter().position(|h| h.to_string() == headway);
+        let meant = || Headway::parse(headway).and_then(|meant| self.headways.iter().position(|h| *h == meant));
+        let headway = written.or_else(meant)?;
+        self.blocks.iter().enumerate().find_map(|(at, block)| {
+            let unit = block.units.find(unit)?;
+            let variant = block.variants.iter().position(|v| v == variant)?;
+            Some(LaneKey { block: at, unit, variant, headway, model })
+        })
+    }
+
+    fn content_hash(&self) -> Result<String> {
+        let mut canonical = Canonical::new("plan");
+        canonical.value(&(&self.profile, &self.models, &self.headways))?;
+        for block in &self.blocks {
+            canonical.value(&(block.category, &block.variants))?;
+            canonical.word(block.units.len());
+            if !matches!(block.units, Units::Numbered(_)) {
+                (0..block.units.len()).for_each(|unit| canonical.text(&block.units.name(unit)));
+            }
+        }
+        if let Some(generator) = self.generator() {
+            canonical.generator(generator);
+            return Ok(canonical.finish());
+        }
+        canonical.tables(self.tables());
+        for (at, block) in self.blocks.iter().enumerate() {
+            for unit in 0..block.units.len() {
+                (0..block.variants.len()).for_each(|variant| canonical.case(&self.case(at, unit, variant)));
+            }
+        }
+        Ok(canonical.finish())
+    }
+}

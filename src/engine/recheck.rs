@@ -1,0 +1,413 @@
+//! What is faster than a single lane of the CPU is believed only where it was seen to be right: one in a thousand of a
+//! device's lanes, and of those of batches that leave steps out, is computed again with every step made.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::backend::{Chunk, RecheckBy};
+use super::cpu::instructions::Instructions;
+use super::cpu::runner::LaneRunner;
+use super::outcome::{Outcome, Verdicts};
+use super::plan::{LaneKey, LanePlan};
+use crate::{Error, Result};
+
+/// One lane in so many is checked unless told otherwise.
+pub const ONE_IN: u64 = 1000;
+
+/// One in so many of the lanes that are checked in batches is checked as a single lane besides. A single lane costs about
+/// forty times a lane of batches that leave steps out, one of a batch that makes every step four to ten times.
+const SINGLE_ONE_IN: u64 = 4;
+
+/// Lanes of one task.
+const TASK: usize = 1024;
+
+/// A seeded sample of a plan's lanes: one of each `one_in` consecutive ones. Which depends on the seed and the
+/// lane alone, not on chunks.
+pub struct Recheck<'p> {
+    plan: &'p LanePlan,
+    again: Box<dyn Again + 'p>,
+    seed: u64,
+    one_in: u64,
+}
+
+/// Makes every step of a lane again.
+trait Again: Sync {
+    /// Of a single lane.
+    fn single(&self, key: &LaneKey) -> Outcome<f32>;
+    /// Of lanes of one block and model in batches: position in `keys`, verdicts.
+    fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts));
+}
+
+impl Again for LaneRunner<'_, f32> {
+    fn single(&self, key: &LaneKey) -> Outcome<f32> {
+        self.run(key)
+    }
+
+    fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts)) {
+        self.run_keys(Instructions::best(), keys, each);
+    }
+}
+
+impl<'p> Recheck<'p> {
+    /// Checks one lane in `one_in` (at least 1).
+    pub fn new(plan: &'p LanePlan, seed: u64, one_in: u64) -> Self {
+        Recheck { plan, again: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
+    }
+
+    /// Computes the chosen lanes of a chunk again and compares every word that it has. Gives their number. `backend`
+    /// describes what computed it.
+    ///
+    /// # Errors
+    /// [`Error::Verification`] with the first lane that differs.
+    pub fn check(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
+        self.check_some(chunk, backend, by, self.one_in)
+    }
+
+    fn check_some(&self, chunk: &Chunk, backend: &str, by: RecheckBy, one_in: u64) -> Result<u64> {
+        if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
+            return Ok(0);
+        }
+        let end = chunk.first_lane + chunk.verdicts.len() as u64;
+        let mut keys: Vec<LaneKey> =
+            self.chosen(chunk.first_lane..end, one_in).filter_map(|lane| self.plan.key(lane)).collect();
+        keys.sort_by_key(|key| (key.block, key.model));
+        let groups = keys.chunk_by(|a, b| (a.block, a.model) == (b.block, b.model));
+        let tasks: Vec<&[LaneKey]> = groups.flat_map(|group| group.chunks(TASK)).collect();
+        let differing = tasks.into_par_iter().filter_map(|keys| self.first_differing(chunk, by, keys));
+        match differing.min() {
+            Some(lane) => Err(self.mismatch(chunk, lane, backend, by)),
+            None => Ok(keys.len() as u64),
+        }
+    }
+
+    /// The first lane of one block and model that differs.
+    fn first_differing(&self, chunk: &Chunk, by: RecheckBy, keys: &[LaneKey]) -> Option<u64> {
+        let mut first: Option<u64> = None;
+        let mut compare = |key: &LaneKey, is_same: &dyn Fn(usize) -> bool| {
+            let lane = self.plan.lane(key);
+            if !is_same((lane - chunk.first_lane) as usize) {
+                first = Some(first.map_or(lane, |first| first.min(lane)));
+            }
+        };
+        let is_batched = by == RecheckBy::Batches;
+        for key in keys.iter().filter(|key| !is_batched || self.is_single(key)) {
+            let ours = self.again.single(key);
+            compare(key, &|at| match chunk.outcomes.get(at) {
+                Some(theirs) => same_words(&ours.widen(), theirs),
+                None => chunk.verdicts[at] == ours.verdicts,
+            });
+        }
+        if is_batched {
+            self.again.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts[at] == ours));
+        }
+        first
+    }
+
+    /// Is a lane that is checked in a batch also checked as a single lane?
+    fn is_single(&self, key: &LaneKey) -> bool {
+        mixed(!self.seed, self.plan.lane(key)).is_multiple_of(SINGLE_ONE_IN)
+    }
+
+    /// The chosen units of an interval, for a sweep that gives no lanes back.
+    pub fn units(&self, units: Range<u64>) -> impl Iterator<Item = u64> {
+        self.chosen(units, self.one_in)
+    }
+
+    /// Computes every lane of a chunk again; see [`Recheck::check`].
+    ///
+    /// # Errors
+    /// [`Error::Verification`] with the first lane that differs.
+    pub fn check_all(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
+        self.check_some(chunk, backend, by, 1)
+    }
+
+    /// The chosen lanes of an interval, ascending.
+    fn chosen(&self, lanes: Range<u64>, one_in: u64) -> impl Iterator<Item = u64> {
+        let seed = self.seed;
+        (lanes.start / one_in..lanes.end.div_ceil(one_in))
+            .map(move |stratum| stratum * one_in + mixed(seed, stratum) % one_in)
+            .filter(move |lane| lanes.contains(lane))
+    }
+
+    fn mismatch(&self, chunk: &Chunk, lane: u64, backend: &str, by: RecheckBy) -> Error {
+        let Some(key) = self.plan.key(lane) else {
+            return Error::Internal(format!("lane {lane} was checked and is beyond the plan"));
+        };
+        let (at, ours) = ((lane - chunk.first_lane) as usize, self.again.single(&key));
+        let verdict_bits = |verdicts: Verdicts| format!("verdict bits {:#06b}", verdicts.0);
+        let (found, expected) = match chunk.outcomes.get(at) {
+            Some(theirs) => (format!("{theirs:?}"), format!("{:?}", ours.widen())),
+            None => (verdict_bits(chunk.verdicts[at]), verdict_bits(ours.verdicts)),
+        };
+        let lane = self.plan.key_text(&key);
+        let model = self.plan.models[key.model].name();
+        Error::Verification(match by {
+            RecheckBy::Batches => format!(
+                "lane {lane}: {backend} says {found} where steps are left out, a single lane with every step made \
+                 {expected}. Nothing that was computed here can be trusted: a promise by which {model} lets steps be \
+                 left out (`safe_gap`, `ignores`, `ease_gap`, `check_at_ease`, `SEES_…`, `KEEPS_…`) does not hold. \
+                 Correct it, or take it out of the model"
+            ),
+            RecheckBy::Nothing | RecheckBy::Lanes => format!(
+                "lane {lane}: {backend} says {found}, the CPU {expected}. Nothing that this device computed can be \
+                 trusted; `lanesweep verify` tells how often it errs, --backend cpu computes without it"
+            ),
+        })
+    }
+}
+
+/// Every word equal, bit for bit: NaN equals itself, 0 does not equal −0.
+pub fn same_words(a: &Outcome<f64>, b: &Outcome<f64>) -> bool {
+    words(a) == words(b)
+}
+
+/// An outcome as words, in the order of its fields; values as the bits of their exact widening.
+pub fn words(outcome: &Outcome<f64>) -> [u64; 12] {
+    [
+        outcome.verdicts.0.into(),
+        outcome.contact.code().into(),
+        outcome.contact_with.into(),
+        outcome.end as u64,
+        outcome.reaction_step.into(),
+        outcome.contact_step.into(),
+        outcome.end_step.into(),
+        outcome.impact_speed.to_bits(),
+        outcome.impact_closing_speed.to_bits(),
+        outcome.min_ttc.to_bits(),
+        outcome.max_btn.to_bits(),
+        outcome.min_gap.to_bits(),
+    ]
+}
+
+/// A well-mixed number per seed and index (SplitMix64).
+fn mixed(seed: u64, index: u64) -> u64 {
+    let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::cpu::pending::Lanes;
+    use crate::engine::cpu::series::Series;
+    use crate::engine::cpu::stream::run_stream;
+    use crate::engine::drivers::Constants;
+    use crate::engine::frame::Simulation;
+    use crate::engine::lane::{Silent, run_lane};
+    use crate::engine::scene::{Scene, may_cross};
+    use crate::engine::verify::{RandomOptions, random_plan};
+    use crate::engine::{Backend, CpuBackend, LaneCase, Session, SweepOptions, SweepSummary, Wanted, sweep};
+    use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
+    use crate::model::flag::Flag;
+    use crate::model::profile::Profile;
+    use crate::model::scalar::Real;
+    use crate::scenario::{Category, Tables};
+
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum FalsePromise {
+        /// A safe distance of 0, where the driver brakes from 40 m down to 20 m.
+        SafeGap,
+        /// Every vehicle beside the lane is ignored.
+        Ignores,
+        /// The driver is at ease at every gap, and asks for nothing there.
+        Ease,
+    }
+
+    /// A driver model that makes a false promise.
+    #[derive(Debug, Clone, Copy)]
+    struct Promising<M>(M, FalsePromise);
+
+    impl<M: DriverModel<f32>> DriverModel<f32> for Promising<M> {
+        const SEES_LATERAL_SPEED: bool = M::SEES_LATERAL_SPEED;
+        const SEES_OWN_ACCELERATION: bool = M::SEES_OWN_ACCELERATION;
+        const KEEPS_DECELERATION: bool = M::KEEPS_DECELERATION;
+        const KNOWS_EASE: bool = M::KNOWS_EASE;
+
+        fn safe_gap(&self, v_ego: f32, v_other: f32) -> f32 {
+            if self.1 == FalsePromise::SafeGap { 0.0 } else { self.0.safe_gap(v_ego, v_other) }
+        }
+
+        fn ignores(&self, lateral_gap: f32, lateral_towards: f32) -> Flag {
+            Flag::of(self.1 == FalsePromise::Ignores) | self.0.ignores(lateral_gap, lateral_towards)
+        }
+
+        fn ease_gap(&self, v_ego: f32, v_other: f32) -> f32 {
+            if self.1 == FalsePromise::Ease { 0.0 } else { self.0.ease_gap(v_ego, v_other) }
+        }
+
+        fn check_at_ease(&self, view: &View<f32>) -> Hazard<f32> {
+            let hazard = self.0.check_at_ease(view);
+            Hazard { is_unsafe: hazard.is_unsafe & !Flag::of(self.1 == FalsePromise::Ease), ..hazard }
+        }
+
+        fn initial(&self) -> DriverState<f32> {
+            self.0.initial()
+        }
+
+        fn check(&self, view: &View<f32>) -> Hazard<f32> {
+            let hazard = self.0.check(view);
+            if self.1 != FalsePromise::SafeGap {
+                return hazard;
+            }
+            let brakes = Flag::of(view.gap > 20.0 && view.gap < 40.0) & view.lateral_gap.is_negative();
+            Hazard { is_unsafe: brakes, ..hazard }
+        }
+
+        fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+            self.0.shader_constants()
+        }
+
+        fn react(&self, state: DriverState<f32>, hazard: &Hazard<f32>, v_ego: f32) -> (DriverState<f32>, f32) {
+            self.0.react(state, hazard, v_ego)
+        }
+    }
+
+    /// The lanes of a plan of one block and model, with this model instead.
+    #[derive(Clone, Copy)]
+    struct Instead<'p, M> {
+        plan: &'p LanePlan,
+        id: ModelId,
+        model: M,
+        every_step: bool,
+    }
+
+    impl<M: DriverModel<f32>> Instead<'_, M> {
+        /// The lanes of a case at a time: what is known of one is not lost among others.
+        fn run(&self, keys: &[LaneKey], every_step: bool, mut each: impl FnMut(usize, Verdicts)) {
+            let mut from = 0;
+            for lanes in keys.chunk_by(|a, b| (a.unit, a.variant) == (b.unit, b.variant)) {
+                self.run_case(lanes, every_step, |at, of| each(from + at, of));
+                from += lanes.len();
+            }
+        }
+
+        fn run_case(&self, keys: &[LaneKey], every_step: bool, each: impl FnMut(usize, Verdicts)) {
+            let plan = self.plan;
+            let constants = Constants::<f32>::resolve(&plan.profile, plan.blocks[0].category);
+            let tables: Tables<f32> = plan.tables().cast();
+            let case = |key: &LaneKey| plan.case(0, key.unit, key.variant).cast();
+            let cases: Vec<LaneCase<f32>> = keys.iter().map(case).collect();
+            let starts: Vec<_> = keys.iter().map(|key| plan.headways[key.headway].start()).collect();
+            let (mut series, cap) = (Series::default(), plan.profile.step_cap());
+            let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, cap)).collect();
+            let may_cross = cases.iter().any(|case| may_cross(case, &tables, plan.profile.frame.dt_s as f32));
+            let scene = Scene::of(&cases, self.id.index(), may_cross);
+            let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
+            let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step, may_cross };
+            let (frame, criteria) = (&constants.frames[self.id.index()], &constants.criteria);
+            let model_index = self.id.index();
+            let simulation = Simulation { frame, criteria, model: &self.model, model_index, scene };
+            run_stream(&simulation, Instructions::best(), &stream, series.entries(), each);
+        }
+    }
+
+    impl<M: DriverModel<f32>> Again for Instead<'_, M> {
+        fn single(&self, key: &LaneKey) -> Outcome<f32> {
+            let constants = Constants::<f32>::resolve(&self.plan.profile, self.plan.blocks[0].category);
+            let (frame, criteria) = (&constants.frames[self.id.index()], &constants.criteria);
+            let case = self.plan.case(0, key.unit, key.variant).cast();
+            let (model_index, scene) = (self.id.index(), Scene::unknown(case.pair != 0));
+            let simulation = Simulation { frame, criteria, model: &self.model, model_index, scene };
+            let start = self.plan.headways[key.headway].start();
+            run_lane(&simulation, &case, &self.plan.tables().cast(), start, &mut Silent)
+        }
+
+        fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts)) {
+            self.run(keys, true, each);
+        }
+    }
+
+    impl<M: DriverModel<f32> + 'static> Backend for Instead<'_, M> {
+        fn rechecked_by(&self, _: Wanted) -> RecheckBy {
+            RecheckBy::Batches
+        }
+
+        fn describe(&self) -> String {
+            "CPU, a user's own model".to_owned()
+        }
+
+        fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+            Ok(Box::new(Instead { plan, ..*self }))
+        }
+    }
+
+    impl<M: DriverModel<f32>> Session for Instead<'_, M> {
+        fn chunk_lanes(&self, _: Wanted) -> u64 {
+            1 << 12
+        }
+
+        fn run(&mut self, units: Range<u64>, _: Wanted) -> Result<Chunk> {
+            let lanes = self.plan.first_lane_of(units.start)..self.plan.first_lane_of(units.end);
+            let first_lane = lanes.start;
+            let keys: Vec<LaneKey> = lanes.map(|lane| self.plan.key(lane).unwrap()).collect();
+            let mut verdicts = vec![Verdicts::default(); keys.len()];
+            Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
+            Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), counts: Vec::new() })
+        }
+    }
+
+    /// Sweeps random lanes of a category whose steps are left out by a false promise; the same with every step made.
+    fn swept<M: DriverModel<f32> + 'static>(category: Category, id: ModelId, model: M) -> (Error, SweepSummary) {
+        let options = RandomOptions {
+            lanes_per_model_and_category: 20_000,
+            categories: vec![category],
+            models: vec![id],
+            ..Default::default()
+        };
+        let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+        let left_out = Instead { plan: &plan, id, model, every_step: false };
+        let recheck = Recheck { plan: &plan, again: Box::new(left_out), seed: 157, one_in: 20 };
+        let run = |every_step| {
+            let how = SweepOptions { wanted: Wanted::Verdicts, fallback: None, recheck: Some(&recheck) };
+            sweep(&plan, 0..plan.unit_count(), &Instead { every_step, ..left_out }, &how, |_| Ok(()))
+        };
+        (run(false).expect_err(&format!("{category:?} {}", id.name())), run(true).unwrap())
+    }
+
+    /// One for each way to leave steps out: calm steps, lanes that go on with the second vehicle alone, and steps at ease.
+    #[test]
+    fn a_false_promise_of_every_kind_stops_the_run_and_names_the_lane() {
+        if Instructions::best() == Instructions::Scalar {
+            return;
+        }
+        let of = |category| Constants::<f32>::resolve(&Profile::load("paper").unwrap(), category);
+        let (leads, cuts_out) = (of(Category::Lvd), of(Category::CutOut));
+        let found = [
+            swept(Category::Lvd, ModelId::Rss, Promising(leads.rss, FalsePromise::SafeGap)),
+            swept(Category::CutOut, ModelId::Rss, Promising(cuts_out.rss, FalsePromise::Ignores)),
+            swept(Category::Lvd, ModelId::Fsm, Promising(leads.fsm, FalsePromise::Ease)),
+        ];
+        for ((error, with_every_step), names) in found.into_iter().zip(["lvd", "cut-out", "lvd"]) {
+            let text = error.to_string();
+            assert!(matches!(error, Error::Verification(_)), "{text}");
+            assert!(text.contains(&format!("lane random-{names}-seed157-")) && text.contains("left out"), "{text}");
+            let SweepSummary { lanes, rechecked_lanes, .. } = with_every_step;
+            assert_eq!(rechecked_lanes, lanes.div_ceil(20), "without steps left out nothing is wrong");
+        }
+    }
+
+    /// The same lanes are chosen however they are cut into chunks; the CPU's own batches pass.
+    #[test]
+    fn seed_and_lane_alone_choose_what_is_checked() {
+        let options = RandomOptions { lanes_per_model_and_category: 3000, ..Default::default() };
+        let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+        let recheck = Recheck::new(&plan, 7, 100);
+        let all: Vec<u64> = recheck.chosen(0..plan.lane_count(), 100).collect();
+        for cut in [1, 99, 100, 12_345] {
+            let ends = (0..).map(|k| k * cut).take_while(|from| *from < plan.lane_count());
+            let parts = ends.flat_map(|from| recheck.chosen(from..(from + cut).min(plan.lane_count()), 100));
+            assert_eq!(parts.collect::<Vec<_>>(), all, "{cut}");
+        }
+        assert_eq!(all.len() as u64, plan.lane_count().div_ceil(100));
+        let cpu = CpuBackend::lane_arithmetic();
+        for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
+            let how = SweepOptions { wanted, fallback: None, recheck: Some(&recheck) };
+            let summary = sweep(&plan, 0..plan.unit_count(), &cpu, &how, |_| Ok(())).unwrap();
+            let is_checked = cpu.rechecked_by(wanted) != RecheckBy::Nothing;
+            assert_eq!(summary.rechecked_lanes, if is_checked { all.len() as u64 } else { 0 }, "{wanted:?}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! What is known of the vehicles around the ego before a lane runs, so that its steps need not ask.
+
+use crate::model::scalar::Real;
+use crate::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED, Tables};
+
+use super::lane_case::{LaneCase, LaneOther, NEVER};
+
+/// What all lanes of a stream have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scene {
+    /// Two other vehicles are looked at.
+    pub is_pair: bool,
+    /// The principal vehicle is there from the first step to the last, and judged.
+    pub always_there: bool,
+    /// It also stays in the middle of the ego's lane, and the driver attends to it from the first step on.
+    pub in_lane: bool,
+    /// Neither contact nor a criterion comes near, and the driver is at ease with it.
+    pub at_ease: bool,
+    /// A step may lead a vehicle's centre past the ego's: contacts between two steps are looked for.
+    pub may_cross: bool,
+}
+
+impl Scene {
+    /// One or two other vehicles of which nothing is known.
+    pub fn unknown(is_pair: bool) -> Scene {
+        Scene { is_pair, always_there: false, in_lane: false, at_ease: false, may_cross: true }
+    }
+
+    /// One other vehicle, in the ego's lane from the first step to the last.
+    pub(super) const fn in_lane() -> Scene {
+        Scene { is_pair: false, always_there: true, in_lane: true, at_ease: false, may_cross: false }
+    }
+
+    /// What holds for all of these cases under a model. Where one vehicle comes or goes, there is a second one as
+    /// well, if one that is never there. Of lanes that may cross nothing else is known: such time steps
+    /// are rare.
+    pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
+        if may_cross {
+            return Scene::unknown(true);
+        }
+        let always_there = cases.iter().all(is_always_there);
+        let in_lane = always_there && cases.iter().all(|case| is_in_lane(case, model_index));
+        Scene { is_pair: !always_there, always_there, in_lane, at_ease: false, may_cross: false }
+    }
+
+    /// What holds for lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only): they are there,
+    /// judged and attended to.
+    pub(super) fn of_second_alone<R: Real>(cases: &[LaneCase<R>]) -> Scene {
+        let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
+        Scene { is_pair: false, always_there: true, in_lane, at_ease: false, may_cross: false }
+    }
+}
+
+/// Can one step of a lane of this case lead a vehicle's centre past the ego's from wholly ahead or behind? No driver
+/// accelerates and no speed is negative, so the faster of the two vehicles bounds how far the gap moves.
+pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) -> bool {
+    // Less by a thousandth, for rounding.
+    let reach = R::from_f64(0.999);
+    case.others.iter().filter(|other| other.used != 0).any(|other| {
+        let motion = &other.motion;
+        let fastest = if motion.kind & SPEED_SAMPLED != 0 {
+            let from = motion.speed_offset as usize;
+            let series = &tables.speed[from..from + motion.speed_len as usize];
+            series.iter().fold(R::ZERO, |most, &speed| speed.larger(most))
+        } else {
+            motion.speed_initial.larger(motion.speed_end)
+        };
+        let stays = fastest.larger(case.ego_speed) * dt <= reach * other.half_lengths;
+        !stays
+    })
+}
+
+/// One other vehicle, and it neither comes nor goes.
+fn is_always_there<R: Real>(case: &LaneCase<R>) -> bool {
+    let other = &case.others[0];
+    case.pair == 0 && other.used != 0 && other.judged != 0 && other.present_from == 0 && other.present_until == NEVER
+}
+
+/// The same, in the middle of the ego's lane from the first step to the last.
+fn is_in_lane<R: Real>(case: &LaneCase<R>, model_index: usize) -> bool {
+    is_centred(&case.others[0], case.ego_width) && case.others[0].attend_from[model_index] == 0
+}
+
+/// It keeps to the middle of the ego's lane.
+fn is_centred<R: Real>(other: &LaneOther<R>, ego_width: R) -> bool {
+    let motion = &other.motion;
+    let positions = [motion.lateral_initial, motion.lateral_per_step, motion.lateral_end, motion.lateral_towards];
+    let stays = motion.kind & LATERAL_SAMPLED == 0 && positions.iter().all(|&number| number == R::ZERO);
+    stays && other.half_widths > R::ZERO && ego_width > R::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::profile::Profile;
+    use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+
+    fn case(category: Category, lateral: Lateral, has_second: bool) -> LaneCase<f64> {
+        let vehicle = |lateral| Participant { length_m: 4.5, width_m: 1.8, speed: Speed::constant(20.0), lateral };
+        let case = Case {
+            category,
+            ego_speed_mps: 30.0,
+            ego_length_m: 4.5,
+            ego_width_m: 1.8,
+            principal: vehicle(lateral),
+            ahead: has_second.then(|| Ahead { gap_m: 30.0, vehicle: vehicle(Lateral::Centred) }),
+            horizon_s: 5.0,
+        };
+        LaneCase::encode(&case, &Profile::load("paper").unwrap(), &mut Tables::default())
+    }
+
+    /// A leader is in the lane, one that cuts in is there, and one that cuts out has another one ahead of it. One
+    /// case of another kind takes what is known from all.
+    #[test]
+    fn only_what_holds_for_all_cases_is_known() {
+        let leader = case(Category::Lvd, Lateral::Centred, false);
+        let change = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
+        let cut_in = case(Category::CutIn, change, false);
+        let cut_out = case(Category::CutOut, Lateral::Centred, true);
+        let known =
+            |always_there: bool, in_lane| Scene { is_pair: !always_there, always_there, in_lane, ..Scene::in_lane() };
+        assert_eq!(Scene::of(&[leader, leader], 0, false), known(true, true));
+        assert_eq!(Scene::of(&[leader, cut_in], 0, false), known(true, false));
+        assert_eq!(Scene::of(&[cut_in], 0, false), known(true, false));
+        assert_eq!(Scene::of(&[leader, cut_out], 0, false), known(false, false));
+    }
+
+    /// One that comes, goes, is not judged or is not attended to from the start has to be asked for.
+    #[test]
+    fn what_changes_within_a_lane_is_not_known() {
+        let leader = case(Category::Lvd, Lateral::Centred, false);
+        let with = |change: fn(&mut LaneCase<f64>)| {
+            let mut case = leader;
+            change(&mut case);
+            Scene::of(&[case], 1, false)
+        };
+        assert!(!with(|case| case.others[0].present_from = 3).always_there);
+        assert!(!with(|case| case.others[0].present_until = 3).always_there);
+        assert!(!with(|case| case.others[0].judged = 0).always_there);
+        let attends_late = with(|case| case.others[0].attend_from[1] = 1);
+        assert!(attends_late.always_there && !attends_late.in_lane);
+        assert!(with(|case| case.others[0].attend_from[0] = 1).in_lane);
+        assert!(!with(|case| case.others[0].motion.lateral_end = 0.5).in_lane);
+    }
+
+    /// Where a step is shorter than the vehicles' half lengths, no centre passes another from wholly ahead or behind.
+    #[test]
+    fn a_vehicle_crosses_only_where_a_step_is_as_long_as_the_half_lengths() {
+        let case = |speed: Speed, tables: &mut Tables<f64>| {
+            let vehicle = Participant { length_m: 4.5, width_m: 1.8, speed, lateral: Lateral::Centred };
+            let case = Case {
+                category: Category::Lvd,
+                ego_speed_mps: 30.0,
+                ego_length_m: 4.5,
+                ego_width_m: 1.8,
+                principal: vehicle,
+                ahead: None,
+                horizon_s: 0.0,
+            };
+            LaneCase::encode(&case, &Profile::load("paper").unwrap(), tables)
+        };
+        let gains = Speed::Kinematic { initial_mps: 10.0, acceleration_mps2: 2.0, until_s: 20.0 };
+        let series = [Speed::constant(20.0), gains, Speed::Sampled(vec![20.0, 45.0, 20.0])];
+        for (speed, fastest) in series.into_iter().zip([30.0, 50.0, 45.0]) {
+            let tables = &mut Tables::default();
+            let case = case(speed, tables);
+            let limit_s = 4.5 / fastest;
+            assert!(!may_cross(&case, tables, 0.99 * limit_s), "{fastest}");
+            assert!(may_cross(&case, tables, limit_s), "{fastest}");
+            assert_eq!(Scene::of(&[case], 0, true), Scene::unknown(true));
+        }
+    }
+}

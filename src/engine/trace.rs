@@ -1,0 +1,231 @@
+//! A lane step by step, as data: what an engineer checks by hand, and what tables and figures of one case are made of.
+
+use super::cpu::runner::LaneRunner;
+use super::drivers::Constants;
+use super::frame::Start;
+use super::lane::Step;
+use super::lane_case::LaneCase;
+use super::lane_step::Seen;
+use super::outcome::{NO_STEP, Outcome};
+use super::plan::{Headway, LaneKey};
+use crate::model::driver::{ModelId, View};
+use crate::model::profile::Profile;
+use crate::model::scalar::Real;
+use crate::scenario::{Category, Tables};
+
+/// Another vehicle at one step. The measures are worked out in f64 from what the lane saw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TracedVehicle {
+    /// Position along the road of its centre, m; the ego's starts at 0.
+    pub x_m: f64,
+    /// Position across the road of its centre, m; 0 is the middle of the ego's lane.
+    pub y_m: f64,
+    /// Speed, m/s.
+    pub v_mps: f64,
+    /// Gap, bumper to bumper, m; negative where the vehicles overlap along the road.
+    pub gap_m: f64,
+    /// Gap across the road, m; negative where they overlap across it.
+    pub lateral_gap_m: f64,
+    /// Time to collision, s, ≥ 0; infinite where the ego does not close in.
+    pub ttc_s: f64,
+    /// Brake Threat Number, ≥ 0; infinite where no braking helps.
+    pub btn: f64,
+    /// Proactive fuzzy surrogate of the FSM, 0…1.
+    pub pfs: f64,
+    /// Critical fuzzy surrogate of the FSM, 0…1.
+    pub cfs: f64,
+    /// It is there for the ego.
+    pub is_present: bool,
+    /// TTC and BTN look at it: only such steps count for the smallest TTC and the largest BTN.
+    pub is_judged: bool,
+}
+
+/// One step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TracedStep {
+    /// Index.
+    pub step: u32,
+    /// Time, s.
+    pub time_s: f64,
+    /// Position of the ego's centre, m.
+    pub x_ego_m: f64,
+    /// Speed of the ego, m/s.
+    pub v_ego_mps: f64,
+    /// Acceleration of the ego over the step before, m/s².
+    pub a_ego_mps2: f64,
+    /// The driver finds the situation unsafe.
+    pub is_unsafe: bool,
+    /// Deceleration that the driver asks for, m/s², where it is unsafe.
+    pub demand_mps2: Option<f64>,
+    /// Principal vehicle, then the one ahead of it; see [`Trace::vehicles`].
+    pub others: [TracedVehicle; 2],
+}
+
+/// What a trace marks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// First step that the driver finds unsafe: the reaction time begins.
+    Reaction,
+    /// First step before which the ego braked.
+    Braking,
+    /// The vehicles touch.
+    Contact,
+}
+
+impl Mark {
+    /// All, in the order in which they happen.
+    pub const ALL: [Mark; 3] = [Mark::Reaction, Mark::Braking, Mark::Contact];
+
+    /// Name in tables and figures.
+    pub fn label(self) -> &'static str {
+        match self {
+            Mark::Reaction => "reaction",
+            Mark::Braking => "braking",
+            Mark::Contact => "contact",
+        }
+    }
+}
+
+/// One lane from its first step to its last.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Driver model.
+    pub model: ModelId,
+    /// Time step, s.
+    pub dt_s: f64,
+    /// Gap at the first step, m, bumper to bumper. Where the profile's runs start one step later (`start_shift`), that of
+    /// the case differs by what the vehicles drive until then.
+    pub initial_gap_m: f64,
+    /// Width of the ego, m.
+    pub ego_width_m: f64,
+    /// Widths of the other vehicles, m.
+    pub widths_m: [f64; 2],
+    /// A TTC below this fails, s.
+    pub ttc_threshold_s: f64,
+    /// A BTN above this fails.
+    pub btn_threshold: f64,
+    /// How many other vehicles there are: 1 or 2.
+    pub vehicles: usize,
+    /// The steps; at least one.
+    pub steps: Vec<TracedStep>,
+    /// How it ended.
+    pub outcome: Outcome<f64>,
+}
+
+impl Trace {
+    /// Runs a case in the arithmetic `R` and keeps every step.
+    pub fn record<R: Real>(
+        profile: &Profile,
+        category: Category,
+        case: &LaneCase<R>,
+        tables: &Tables<R>,
+        headway: Headway,
+        model: ModelId,
+    ) -> Trace {
+        let measures = Constants::<f64>::resolve(profile, category);
+        let lane = Constants::<R>::resolve(profile, category);
+        let dt_s = profile.frame.dt_s;
+        let (mut steps, mut x_ego_m) = (Vec::new(), 0.0);
+        let mut each = |step: &Step<R>| {
+            let v_ego_mps = step.v_ego.to_f64();
+            if step.index > 0 {
+                x_ego_m += v_ego_mps * dt_s;
+            }
+            let hazard = step.hazard;
+            steps.push(TracedStep {
+                step: step.index,
+                time_s: time_s(step.index, dt_s),
+                x_ego_m,
+                v_ego_mps,
+                a_ego_mps2: step.seen[0].view.a_ego.to_f64(),
+                is_unsafe: hazard.is_unsafe.holds(),
+                demand_mps2: hazard.is_unsafe.holds().then(|| hazard.demand.to_f64()),
+                others: step.seen.map(|seen| vehicle(&measures, &seen, x_ego_m)),
+            });
+        };
+        let start = headway.start::<R>();
+        let outcome = lane.run(model, case, tables, start, &mut each).widen();
+        let gap = match headway.start::<f64>() {
+            Start::Headway(thw) => thw * case.ego_speed.to_f64(),
+            Start::Gap(gap) => gap,
+        };
+        let nominal_gap_m = gap + case.others[0].gap_offset.to_f64();
+        let shifted_gap_m = steps.first().filter(|_| profile.frame.start_shift).map(|first| first.others[0].gap_m);
+        let ego_width_m = case.ego_width.to_f64();
+        Trace {
+            category,
+            model,
+            dt_s,
+            initial_gap_m: shifted_gap_m.unwrap_or(nominal_gap_m),
+            ego_width_m,
+            widths_m: case.others.map(|other| 2.0 * other.half_widths.to_f64() - ego_width_m),
+            ttc_threshold_s: profile.criteria.ttc_threshold_s,
+            btn_threshold: profile.criteria.btn_threshold,
+            vehicles: if case.pair != 0 { 2 } else { 1 },
+            steps,
+            outcome,
+        }
+    }
+
+    /// The step of a mark; `None` where it did not happen.
+    pub fn step_of(&self, mark: Mark) -> Option<u32> {
+        let happened = |step: u32| (step != NO_STEP).then_some(step);
+        match mark {
+            Mark::Reaction => happened(self.outcome.reaction_step),
+            Mark::Braking => self.steps.iter().find(|s| s.a_ego_mps2 < 0.0).map(|s| s.step),
+            Mark::Contact => happened(self.outcome.contact_step),
+        }
+    }
+
+    /// Time of a step, s, without the rounding error of the product.
+    pub fn time_s(&self, step: u32) -> f64 {
+        time_s(step, self.dt_s)
+    }
+}
+
+impl<R: Real> LaneRunner<'_, R> {
+    /// One lane with every step: its outcome is that of [`LaneRunner::run`], word for word.
+    pub fn trace(&self, key: &LaneKey) -> Trace {
+        let plan = self.plan();
+        let (case, tables) = self.case(key.block, key.unit, key.variant);
+        let (category, headway) = (plan.blocks[key.block].category, plan.headways[key.headway]);
+        Trace::record(&plan.profile, category, &case, &tables, headway, plan.models[key.model])
+    }
+}
+
+fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> TracedVehicle {
+    let view = widened(&seen.view);
+    let (gap_m, closing) = (view.gap, view.closing());
+    TracedVehicle {
+        x_m: x_ego_m + gap_m + view.half_lengths,
+        y_m: seen.lateral.to_f64(),
+        v_mps: view.v_other,
+        gap_m,
+        lateral_gap_m: view.lateral_gap,
+        ttc_s: if closing > 0.0 { gap_m.max(0.0) / closing } else { f64::INFINITY },
+        btn: measures.criteria.btn.at(gap_m, closing),
+        pfs: measures.fsm.pfs(view.v_ego, view.v_other, gap_m),
+        cfs: measures.fsm.cfs(view.v_ego, view.v_other, gap_m, view.a_ego),
+        is_present: seen.present.holds(),
+        is_judged: seen.judged.holds(),
+    }
+}
+
+/// What the driver sees, exactly, for what is worked out beside the lane.
+fn widened<R: Real>(view: &View<R>) -> View<f64> {
+    View {
+        v_ego: view.v_ego.to_f64(),
+        a_ego: view.a_ego.to_f64(),
+        v_other: view.v_other.to_f64(),
+        gap: view.gap.to_f64(),
+        lateral_gap: view.lateral_gap.to_f64(),
+        lateral_towards: view.lateral_towards.to_f64(),
+        half_lengths: view.half_lengths.to_f64(),
+    }
+}
+
+fn time_s(step: u32, dt_s: f64) -> f64 {
+    (f64::from(step) * dt_s * 1e9).round() / 1e9
+}

@@ -1,0 +1,250 @@
+//! The same lanes on three backends: the f64 reference, the CPU in the lane arithmetic, and the one under
+//! test, which must equal the CPU in every output word.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::engine::{Backend, CellCounts, Chunk, CpuBackend, LanePlan, Outcome, Session, Wanted, chunks, words};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::scenario::Category;
+use crate::{Error, Result};
+
+/// Names of the output words, in the order of [`words`].
+pub const WORDS: [&str; 12] = [
+    "verdicts",
+    "contact",
+    "contact_with",
+    "end",
+    "reaction_step",
+    "contact_step",
+    "end_step",
+    "impact_speed",
+    "impact_closing_speed",
+    "min_ttc",
+    "max_btn",
+    "min_gap",
+];
+
+/// Differing lanes that a comparison keeps.
+const KEPT: usize = 10;
+
+/// What the lanes of one category and model showed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tally {
+    /// Kind of scenario.
+    pub category: Category,
+    /// The ego's driver.
+    pub model: ModelId,
+    /// Lanes that the backend under test computed itself.
+    pub lanes: u64,
+    /// Of these, on the CPU, failed: in the order of [`Criterion::ALL`].
+    pub failed: [u64; Criterion::ALL.len()],
+    /// Evaluated steps of all lanes.
+    pub steps: u64,
+    /// Lanes with a word that differs from the CPU's.
+    pub lanes_differing: u64,
+    /// Words that differ.
+    pub words_differing: u64,
+    /// Verdict bits (criteria and cap) that differ.
+    pub verdicts_differing: u64,
+    /// Verdicts in which the CPU differs from the f64 reference: rounding, no error.
+    pub reference_differing: u64,
+}
+
+impl Tally {
+    /// Share of the lanes that fail a criterion.
+    pub fn share(&self, criterion: Criterion) -> f64 {
+        self.failed[criterion.index()] as f64 / self.lanes.max(1) as f64
+    }
+
+    /// A criterion that nearly always or nearly never fails is hardly tested.
+    pub fn tests(&self, criterion: Criterion) -> bool {
+        (0.05..=0.95).contains(&self.share(criterion))
+    }
+}
+
+/// A lane whose words differ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DifferingLane {
+    /// Key: `lanesweep verify --lane KEY` runs it again.
+    pub key: String,
+    /// On the backend under test.
+    pub tested: Outcome<f64>,
+    /// On the CPU.
+    pub cpu: Outcome<f64>,
+}
+
+impl DifferingLane {
+    /// Names of the words that differ.
+    pub fn names(&self) -> Vec<&'static str> {
+        let (a, b) = (words(&self.tested), words(&self.cpu));
+        WORDS.into_iter().enumerate().filter(|(at, _)| a[*at] != b[*at]).map(|(_, name)| name).collect()
+    }
+
+    /// Verdicts first, then steps, then the most words.
+    fn severity(&self) -> (bool, bool, usize) {
+        let (a, b) = (words(&self.tested), words(&self.cpu));
+        (a[0] != b[0], a[4..7] != b[4..7], self.names().len())
+    }
+}
+
+/// What a set of lanes showed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Name of the set.
+    pub set: String,
+    /// Hash of its plan.
+    pub plan_sha256: String,
+    /// Per category and model.
+    pub tallies: Vec<Tally>,
+    /// The worst lanes that differ, worst first.
+    pub worst: Vec<DifferingLane>,
+    /// Verdicts or counts that come out differently where nothing else is asked for.
+    pub modes_differing: u64,
+}
+
+impl Comparison {
+    /// Is every word of every lane equal, and are there lanes at all?
+    pub fn is_equal(&self) -> bool {
+        self.modes_differing == 0 && self.lanes() > 0 && self.tallies.iter().all(|t| t.words_differing == 0)
+    }
+
+    /// Lanes with a word that differs, and values that differ where less is asked for.
+    pub fn differing(&self) -> u64 {
+        self.modes_differing + self.tallies.iter().map(|t| t.lanes_differing).sum::<u64>()
+    }
+
+    /// Lanes that the backend under test computed itself.
+    pub fn lanes(&self) -> u64 {
+        self.tallies.iter().map(|t| t.lanes).sum()
+    }
+}
+
+/// Runs every lane of a plan on the three backends. `done` hears of the lanes of each part that is done.
+///
+/// The backend under test is asked three times: for outcomes, for verdicts alone, for counts alone; all must
+/// agree. It has no stand-in: what it cannot compute is an error.
+///
+/// # Errors
+/// Of the backend under test.
+pub fn compare(set: &str, plan: &LanePlan, tested: &dyn Backend, done: impl Fn(u64)) -> Result<Comparison> {
+    let (cpu, reference) = (CpuBackend::scalar(), CpuBackend::reference());
+    let mut sessions = [tested.prepare(plan)?, cpu.prepare(plan)?, reference.prepare(plan)?];
+    let mut comparison = Comparison {
+        set: set.to_owned(),
+        plan_sha256: plan.hash().to_owned(),
+        tallies: tallies(plan),
+        worst: Vec::new(),
+        modes_differing: 0,
+    };
+    for units in chunks(plan, 0..plan.unit_count()) {
+        let [tested, cpu, reference] = &mut sessions;
+        let device = tested.run(units.clone(), Wanted::Outcomes)?;
+        device.check(plan)?;
+        let cpu = cpu.run(units.clone(), Wanted::Outcomes)?;
+        let reference = reference.run(units.clone(), Wanted::Verdicts)?;
+        comparison.modes_differing += modes(plan, tested.as_mut(), units, &device)?;
+        add(&mut comparison, plan, [&device, &cpu, &reference]);
+        done(device.lanes());
+    }
+    Ok(comparison)
+}
+
+/// What a small check of a device found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SelfCheck {
+    /// Lanes compared.
+    pub lanes: u64,
+    /// Lanes with a word that differs.
+    pub differing: u64,
+}
+
+/// Some thousand random lanes and lanes on thresholds: the quick answer to whether a backend computes as the
+/// CPU does.
+///
+/// # Errors
+/// Of the backend.
+pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
+    let profile = crate::model::profile::Profile::load("paper")?;
+    let random = super::RandomOptions { lanes_per_model_and_category: 400, ..Default::default() };
+    let thresholds = super::ThresholdOptions { units_per_threshold: 2, ..Default::default() };
+    let plans = [super::random_plan(&profile, &random)?, super::threshold_plan(&profile, &thresholds)?];
+    let mut check = SelfCheck { lanes: 0, differing: 0 };
+    for plan in &plans {
+        let comparison = compare("self-check", plan, tested, |_| ())?;
+        check.lanes += comparison.lanes();
+        check.differing += comparison.differing();
+    }
+    Ok(check)
+}
+
+/// One empty tally per category and model.
+fn tallies(plan: &LanePlan) -> Vec<Tally> {
+    let models = |category| {
+        plan.models.iter().map(move |&model| Tally {
+            category,
+            model,
+            lanes: 0,
+            failed: [0; Criterion::ALL.len()],
+            steps: 0,
+            lanes_differing: 0,
+            words_differing: 0,
+            verdicts_differing: 0,
+            reference_differing: 0,
+        })
+    };
+    plan.blocks.iter().flat_map(|block| models(block.category)).collect()
+}
+
+/// Values that differ where the backend gives verdicts alone, or counts alone, instead of outcomes.
+fn modes(plan: &LanePlan, tested: &mut dyn Session, units: Range<u64>, outcomes: &Chunk) -> Result<u64> {
+    let verdicts = tested.run(units.clone(), Wanted::Verdicts)?;
+    verdicts.check(plan)?;
+    let counts = tested.run(units, Wanted::Counts)?;
+    counts.check(plan)?;
+    let mut expected = vec![CellCounts::EMPTY; plan.cell_count()];
+    for (at, outcome) in outcomes.outcomes.iter().enumerate() {
+        let key = plan.key(outcomes.first_lane + at as u64);
+        let key = key.ok_or_else(|| Error::Internal("a chunk reaches beyond its plan".to_owned()))?;
+        expected[plan.cell(key.block, key.variant, key.model)].count(outcome);
+    }
+    let wrong = |a: &CellCounts, b: &CellCounts| a != b;
+    let cells = expected.iter().zip(&counts.counts).filter(|(a, b)| wrong(a, b)).count();
+    let lanes = outcomes.outcomes.iter().zip(&verdicts.verdicts).filter(|(o, v)| o.verdicts != **v).count();
+    Ok((cells + lanes) as u64)
+}
+
+/// Takes a chunk of the three backends into account.
+fn add(comparison: &mut Comparison, plan: &LanePlan, [tested, cpu, reference]: [&Chunk; 3]) {
+    let models = plan.models.len();
+    for (at, (a, b)) in tested.outcomes.iter().zip(&cpu.outcomes).enumerate() {
+        let Some(key) = plan.key(tested.first_lane + at as u64) else { continue };
+        let tally = &mut comparison.tallies[key.block * models + key.model];
+        tally.lanes += 1;
+        tally.steps += u64::from(b.end_step) + 1;
+        for criterion in Criterion::ALL {
+            let failed = b.verdicts.failed(criterion);
+            tally.failed[criterion.index()] += u64::from(failed);
+            tally.reference_differing += u64::from(failed != reference.verdicts[at].failed(criterion));
+        }
+        let differing = words(a).iter().zip(words(b)).filter(|(a, b)| **a != *b).count() as u64;
+        tally.words_differing += differing;
+        tally.lanes_differing += u64::from(differing > 0);
+        tally.verdicts_differing += u64::from((a.verdicts.0 ^ b.verdicts.0).count_ones());
+    }
+    let keyed = |at: usize| plan.key(tested.first_lane + at as u64).map(|k| plan.key_text(&k)).unwrap_or_default();
+    let differing: Vec<DifferingLane> = tested
+        .outcomes
+        .par_iter()
+        .zip(&cpu.outcomes)
+        .enumerate()
+        .filter(|(_, (a, b))| words(a) != words(b))
+        .map(|(at, (a, b))| DifferingLane { key: keyed(at), tested: *a, cpu: *b })
+        .collect();
+    comparison.worst.extend(differing);
+    // Stable: among equally bad ones the first in the plan's order stays.
+    comparison.worst.sort_by_key(|lane| std::cmp::Reverse(lane.severity()));
+    comparison.worst.truncate(KEPT);
+}

@@ -1,0 +1,35 @@
+//! Verification: lanes that a backend must compute word for word like the CPU, and the comparison.
+//!
+//! Here live the comparison of a backend with the CPU and the f64 reference ([`compare`]), the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers) and the
+//! set on the decision thresholds ([`threshold_plan`]: lanes where one unit in the last place decides). Here
+//! lives no physics. Cases are pure functions of (seed, category, unit,
+//! variant), so the key of a lane alone says how to make it again. Plans go to [`crate::engine`].
+
+mod comparison;
+mod decision;
+mod draw;
+mod pool;
+mod random;
+mod scene;
+mod series;
+mod solve;
+mod thresholds;
+
+pub use comparison::{Comparison, DifferingLane, SelfCheck, Tally, WORDS, compare, self_check};
+pub use decision::Threshold;
+pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
+pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
+
+use crate::scenario::Category;
+use crate::{Error, Place, Result};
+
+/// Refuses an empty list of categories and one that names a category twice: keys would stand for two lanes.
+fn check_categories(categories: &[Category]) -> Result<()> {
+    let twice = categories.iter().enumerate().find(|(k, c)| categories[..*k].contains(c));
+    let problem = match (categories.is_empty(), twice) {
+        (true, _) => "the set has no category".to_owned(),
+        (false, Some((_, category))) => format!("{} is named twice", category.label()),
+        (false, None) => return Ok(()),
+    };
+    Err(Error::usage(Place::item("categories"), problem, "name each of cut_in, cut_out, lvd at most once"))
+}

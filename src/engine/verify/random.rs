@@ -1,0 +1,389 @@
+//! The random set: cases of every kind that the lanes know, in plausible numbers, at headways from far apart
+//! to behind. Shares of failing lanes are kept away from 0 and 1, so that a wrong verdict shows.
+
+use super::check_categories;
+use super::draw::{Draw, Purpose};
+use super::pool::{Across, Pool, Slice};
+use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
+use crate::model::driver::{MODELS, ModelId};
+use crate::model::profile::{CutOutTarget, Profile};
+use crate::scenario::{Ahead, Case, Category, LATERAL_SAMPLED, Lateral, Participant, SPEED_SAMPLED, Speed, Tables};
+use crate::{Error, Place, Result};
+
+/// Variants of every unit: all motions sampled (`S`), all kinematic, one of each, and corner cases.
+pub const VARIANTS: [&str; 4] = ["S", "kinematic", "mixed", "degenerate"];
+
+/// What a random set holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RandomOptions {
+    /// Seed; another one gives other lanes throughout.
+    pub seed: u64,
+    /// Lanes of each model in each category, rounded up to whole units of 40.
+    pub lanes_per_model_and_category: u64,
+    /// Categories, in order, each at most once.
+    pub categories: Vec<Category>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+}
+
+impl Default for RandomOptions {
+    fn default() -> Self {
+        RandomOptions {
+            seed: 157,
+            lanes_per_model_and_category: 1_000_000,
+            categories: Category::ALL.to_vec(),
+            models: ModelId::ALL.to_vec(),
+        }
+    }
+}
+
+/// What a unit's key says: all that is needed to make its cases again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RandomUnit {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Seed of the set.
+    pub seed: u64,
+    /// Unit within its category.
+    pub unit: u64,
+}
+
+impl RandomUnit {
+    /// From the text that [`RandomUnit`] shows: `random-cut-in-seed157-0000123`.
+    pub fn parse(key: &str) -> Option<RandomUnit> {
+        let (rest, unit) = key.strip_prefix("random-")?.rsplit_once('-')?;
+        let (category, seed) = rest.rsplit_once("-seed")?;
+        let category = Category::parse(category)?;
+        Some(RandomUnit { category, seed: seed.parse().ok()?, unit: unit.parse().ok()? })
+    }
+}
+
+impl std::fmt::Display for RandomUnit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "random-{}-seed{}-{:07}", self.category.key().replace('_', "-"), self.seed, self.unit)
+    }
+}
+
+/// Ten starts: by time and by distance, far, near, touching, overlapping along the road, and behind.
+fn headways() -> Vec<Headway> {
+    let by_time = [2.0, 1.2, 0.7, 0.3].map(Headway::ThwS);
+    let by_distance = [45.0, 12.0, 3.0, 0.0, -2.0, -14.0].map(Headway::GapM);
+    by_time.into_iter().chain(by_distance).collect()
+}
+
+/// Plans the random set of a seed.
+///
+/// # Errors
+/// [`Error::Usage`] where there is no lane, category or model to plan, or a category is named twice.
+pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePlan> {
+    check_categories(&options.categories)?;
+    if options.lanes_per_model_and_category == 0 {
+        let place = Place::item("lanes_per_model_and_category");
+        return Err(Error::usage(place, "the set has no lanes", "ask for at least one lane"));
+    }
+    let headways = headways();
+    let units = options.lanes_per_model_and_category.div_ceil((headways.len() * VARIANTS.len()) as u64);
+    let block = |&category: &Category| Block {
+        category,
+        units: (0..units).map(|unit| RandomUnit { category, seed: options.seed, unit }.to_string()).collect(),
+        variants: VARIANTS.map(str::to_owned).to_vec(),
+        first_unit: 0,
+        first_lane: 0,
+    };
+    let blocks = options.categories.iter().map(block).collect();
+    let source = RandomCases::new(profile, options);
+    LanePlan::new(profile.clone(), options.models.clone(), headways, blocks, Box::new(source))
+}
+
+struct RandomCases {
+    seed: u64,
+    profile: Profile,
+    categories: Vec<Category>,
+    pool: Pool,
+    frozen: Vec<Frozen>,
+}
+
+/// A cut-out whose cutting-out vehicle hits the one ahead (only in profiles that look for it). It freezes in
+/// a series of its own, so such pairs are drawn once, with their series, and shared.
+struct Frozen {
+    lane: LaneCase<f64>,
+    case: Case,
+}
+
+/// A case with the places of its series in the pool.
+struct Drawn {
+    case: Case,
+    slices: [Slices; 2],
+}
+
+/// Where a vehicle's series stand in the pool; not looked at where it has none.
+#[derive(Clone, Copy)]
+struct Slices {
+    speed: Slice,
+    lateral: Slice,
+}
+
+const NO_SLICES: Slices = Slices { speed: Slice { offset: 0, len: 0 }, lateral: Slice { offset: 0, len: 0 } };
+/// Frozen pairs that are shared, and how many cut-outs are tried for them.
+const FROZEN: usize = 32;
+const FROZEN_TRIES: u64 = 2048;
+
+impl RandomCases {
+    fn new(profile: &Profile, options: &RandomOptions) -> RandomCases {
+        let mut cases = RandomCases {
+            seed: options.seed,
+            profile: profile.clone(),
+            categories: options.categories.clone(),
+            pool: Pool::new(options.seed, profile.frame.dt_s),
+            frozen: Vec::new(),
+        };
+        if profile.frame.cut_out_target == CutOutTarget::Exposed && options.categories.contains(&Category::CutOut) {
+            cases.freeze_some();
+        }
+        cases
+    }
+
+    fn freeze_some(&mut self) {
+        for unit in 0..FROZEN_TRIES {
+            let mut draw = Draw::new(Purpose::Freeze, self.seed, Category::CutOut, unit, 0);
+            let case = self.draw(&mut draw, Category::CutOut, unit as usize % 3).case;
+            let mut own = Tables::default();
+            let mut lane = LaneCase::encode(&case, &self.profile, &mut own);
+            if !froze(&lane) {
+                continue;
+            }
+            let tables = &mut self.pool.tables;
+            for other in &mut lane.others {
+                other.motion.speed_offset += tables.speed.len() as u32;
+                other.motion.lateral_offset += tables.lateral.len() as u32;
+            }
+            tables.speed.extend(own.speed);
+            tables.lateral.extend(own.lateral);
+            self.frozen.push(Frozen { lane, case });
+            if self.frozen.len() == FROZEN {
+                break;
+            }
+        }
+    }
+
+    fn encode(&self, draw: &mut Draw, mut drawn: Drawn) -> LaneCase<f64> {
+        let exposed = !self.frozen.is_empty() && drawn.case.category == Category::CutOut;
+        let mut scratch = Tables::default();
+        let mut lane = LaneCase::encode(&drawn.case, &self.profile, &mut scratch);
+        if exposed && froze(&lane) {
+            let frozen = &self.frozen[draw.below(self.frozen.len())];
+            return frozen.before(&drawn.case);
+        }
+        if drawn.case.ahead.is_none() {
+            // The unused slot repeats the principal's motion.
+            drawn.slices[1] = drawn.slices[0];
+        }
+        for (other, slices) in lane.others.iter_mut().zip(&drawn.slices) {
+            if other.motion.kind & SPEED_SAMPLED != 0 {
+                other.motion.speed_offset = slices.speed.offset;
+            }
+            if other.motion.kind & LATERAL_SAMPLED != 0 {
+                other.motion.lateral_offset = slices.lateral.offset;
+            }
+        }
+        lane
+    }
+
+    fn draw(&self, draw: &mut Draw, category: Category, variant: usize) -> Drawn {
+        let across = match category {
+            Category::CutIn => Across::In,
+            Category::CutOut => Across::Out,
+            Category::Lvd => Across::Within,
+        };
+        let (principal, slices) = self.vehicle(draw, across, variant, category == Category::Lvd);
+        let v = initial_speed(&principal.speed);
+        let closing = match category {
+            _ if draw.chance(0.06) => 0.0,
+            Category::CutIn => draw.between(-3.0, 13.0),
+            Category::CutOut => draw.between(-2.0, 6.0),
+            Category::Lvd => draw.between(-2.0, 7.0),
+        };
+        let mut case = Case {
+            category,
+            ego_length_m: draw.between(3.6, 5.2),
+            ego_width_m: draw.between(1.6, 2.1),
+            ego_speed_mps: (v + closing).max(0.0),
+            principal,
+            ahead: None,
+            horizon_s: horizon_steps(draw) * self.profile.frame.dt_s,
+        };
+        let mut all = [slices, NO_SLICES];
+        let paired = if category == Category::CutOut { 0.9 } else { 0.15 };
+        if draw.chance(paired) {
+            let across = if draw.chance(0.85) { Across::Within } else { Across::Out };
+            let (mut vehicle, slices) = self.vehicle(draw, across, variant, true);
+            if variant > 0 && draw.chance(0.35) {
+                vehicle.speed = Speed::constant(if draw.chance(0.5) { 0.0 } else { v * draw.uniform() });
+            }
+            if category == Category::CutOut && draw.chance(0.5) {
+                vehicle.lateral = Lateral::Centred;
+            }
+            all[1] = slices;
+            case.ahead = Some(Ahead { vehicle, gap_m: draw.between(1.0, 70.0) });
+        }
+        Drawn { case, slices: all }
+    }
+
+    /// A vehicle whose motions are sampled (variant 0), kinematic (1) or one of each (others).
+    fn vehicle(&self, draw: &mut Draw, across: Across, variant: usize, brakes: bool) -> (Participant, Slices) {
+        let (length_m, width_m) = match draw.uniform() {
+            x if x < 0.75 => (draw.between(3.6, 5.2), draw.between(1.6, 2.0)),
+            x if x < 0.95 => (draw.between(8.0, 18.75), draw.between(2.3, 2.6)),
+            _ => (draw.between(2.0, 2.4), draw.between(0.7, 0.9)),
+        };
+        let sampled_speed = variant == 0 || (variant > 1 && draw.chance(0.5));
+        let sampled_lateral = variant == 0 || (variant > 1 && !sampled_speed);
+        let braked = draw.chance(if brakes { 0.7 } else { 0.25 });
+        let mut slices = NO_SLICES;
+        let speed = if sampled_speed {
+            let (speed, slice) = self.pool.speed(draw, braked);
+            slices.speed = slice;
+            speed
+        } else {
+            kinematic_speed(draw, braked)
+        };
+        let lateral = if sampled_lateral {
+            let (lateral, slice) = self.pool.lateral(draw, across);
+            slices.lateral = slice;
+            lateral
+        } else {
+            kinematic_lateral(draw, across)
+        };
+        (Participant { length_m, width_m, speed, lateral }, slices)
+    }
+}
+
+impl CaseSource for RandomCases {
+    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        let category = self.categories[block];
+        let mut draw = Draw::new(Purpose::Random, self.seed, category, unit, variant);
+        let mut drawn = self.draw(&mut draw, category, variant);
+        if variant < 3 {
+            return self.encode(&mut draw, drawn);
+        }
+        let corner = draw.below(8);
+        degenerate(&mut draw, corner, &mut drawn.case);
+        let mut lane = self.encode(&mut draw, drawn);
+        if corner == 7 {
+            late(&mut draw, &mut lane);
+        }
+        lane
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.pool.tables
+    }
+}
+
+impl Frozen {
+    /// The frozen pair before the ego of another case: nothing in the freezing depends on the ego.
+    fn before(&self, ego: &Case) -> LaneCase<f64> {
+        let mut lane = self.lane;
+        let closing = ego.ego_speed_mps - initial_speed(&ego.principal.speed);
+        lane.ego_speed = (initial_speed(&self.case.principal.speed) + closing).max(0.0);
+        lane.ego_width = ego.ego_width_m;
+        let ahead = self.case.ahead.as_ref().map_or(&self.case.principal, |a| &a.vehicle);
+        for (other, vehicle) in lane.others.iter_mut().zip([&self.case.principal, ahead]) {
+            other.half_lengths = (ego.ego_length_m + vehicle.length_m) / 2.0;
+            other.half_widths = (ego.ego_width_m + vehicle.width_m) / 2.0;
+        }
+        lane
+    }
+}
+
+/// The vehicle ahead is there until the freezing.
+fn froze(lane: &LaneCase<f64>) -> bool {
+    lane.pair != 0 && lane.others[1].present_until != NO_STEP
+}
+
+fn initial_speed(speed: &Speed) -> f64 {
+    match speed {
+        Speed::Kinematic { initial_mps, .. } => initial_mps.max(0.0),
+        Speed::Sampled(series) => series.first().copied().unwrap_or(0.0),
+    }
+}
+
+fn kinematic_speed(draw: &mut Draw, braked: bool) -> Speed {
+    let initial_mps = if draw.chance(0.06) { 0.0 } else { draw.between(2.0, 34.0) };
+    let acceleration_mps2 = match draw.uniform() {
+        _ if braked => draw.between(-9.0, -1.0),
+        x if x < 0.4 => 0.0,
+        _ => draw.between(-3.0, 2.0),
+    };
+    Speed::Kinematic { initial_mps, acceleration_mps2, until_s: draw.between(0.0, 6.0) }
+}
+
+fn kinematic_lateral(draw: &mut Draw, across: Across) -> Lateral {
+    let side = draw.sign();
+    let (start, end) = match across {
+        Across::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
+        Across::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
+        Across::Within if draw.chance(0.6) => return Lateral::Centred,
+        Across::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
+    };
+    let rate = draw.between(0.3, 2.5) * if end > start { 1.0 } else { -1.0 };
+    Lateral::Kinematic { start_m: side * start, rate_mps: side * rate, end_m: side * end }
+}
+
+/// None, short, long; a run goes on at least so long.
+fn horizon_steps(draw: &mut Draw) -> f64 {
+    let most = match draw.uniform() {
+        x if x < 0.15 => 0,
+        x if x < 0.80 => 150,
+        x if x < 0.98 => 400,
+        _ => 1500,
+    };
+    draw.below(most + 1) as f64
+}
+
+/// Numbers at the ends of their ranges.
+fn degenerate(draw: &mut Draw, corner: usize, case: &mut Case) {
+    let v = initial_speed(&case.principal.speed);
+    match corner {
+        0 => case.ego_speed_mps = 0.0,
+        1 => case.ego_speed_mps = draw.between(0.0, 0.5),
+        2 => case.ego_speed_mps = v,
+        // The whole run at the same distance, or everything stands.
+        3 => {
+            let speed = if draw.chance(0.3) { 0.0 } else { v };
+            case.principal.speed = Speed::constant(speed);
+            case.ego_speed_mps = speed;
+        }
+        // Standing in the way of an ego that is not slow.
+        4 => {
+            case.principal.speed = Speed::constant(0.0);
+            case.ego_speed_mps = draw.between(3.0, 30.0);
+        }
+        5 => {
+            case.principal.lateral = Lateral::Centred;
+            case.horizon_s = 0.0;
+        }
+        // Beside the ego, or just inside its lane, all the time.
+        6 => {
+            let at = draw.sign() * draw.between(0.0, 4.0);
+            case.principal.lateral = Lateral::Kinematic { start_m: at, rate_mps: 0.0, end_m: at };
+        }
+        _ => {}
+    }
+}
+
+/// Vehicles that appear late, leave early, or are noticed late.
+fn late(draw: &mut Draw, lane: &mut LaneCase<f64>) {
+    let appear = |draw: &mut Draw, other: &mut LaneOther<f64>| {
+        other.present_from = draw.below(60) as u32;
+        if draw.chance(0.5) {
+            other.present_until = other.present_from + draw.below(150) as u32;
+        }
+        other.attend_from = [0; MODELS].map(|_: u32| draw.below(80) as u32);
+        other.judged = u32::from(draw.chance(0.8));
+    };
+    let used = 1 + lane.pair as usize;
+    for other in &mut lane.others[..used] {
+        appear(draw, other);
+    }
+}

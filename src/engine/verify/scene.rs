@@ -1,0 +1,411 @@
+//! Scenes on a threshold: the numbers of a first step, solved in f32 so that both sides of one comparison are
+//! equal, and the lane records that begin with exactly these numbers.
+
+use super::decision::{HEADWAYS, Threshold};
+use super::draw::{Draw, Purpose};
+use super::series::{Across, Series, TINY, rounded};
+use super::solve::{hit, next_other, turn};
+use crate::engine::{Constants, LaneCase, LaneOther, NO_STEP, Start};
+use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
+use crate::model::driver::{DriverModel, MODELS, View};
+use crate::model::flag::Flag;
+use crate::model::profile::Profile;
+use crate::scenario::{Category, Lateral, Motion, Tables};
+
+/// Neighbours of gap 0 where 2⁻³² cannot be had (behind a start of 10 m): one ULP of 10 m.
+const SMALL: f32 = 1.0 / (1 << 20) as f32;
+/// Tries per unit: not every speed has a gap that f32 hits exactly.
+const TRIES: usize = 64;
+/// Farther than any threshold, m.
+const FAR: f32 = 600.0;
+
+/// Scenes of all units.
+pub(super) struct Scenes {
+    seed: u64,
+    profile: Profile,
+    categories: Vec<Category>,
+    /// One per category.
+    constants: Vec<Constants<f32>>,
+    series: Series,
+}
+
+/// The first step of a lane, with what decides later ones.
+#[derive(Debug, Clone, Copy)]
+struct Scene {
+    v_ego: f32,
+    v_other: f32,
+    gap: f32,
+    half_lengths: f32,
+    half_widths: f32,
+    ego_width: f32,
+    motion: Motion<f64>,
+    attend_from: u32,
+    present_from: u32,
+    present_until: u32,
+    horizon: u32,
+    /// Index of the headway that the gap is solved for.
+    start: usize,
+    /// 0 alone, 1 before a second vehicle that does not matter, 2 behind one.
+    pairing: u64,
+}
+
+impl Scenes {
+    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> Scenes {
+        Scenes {
+            seed,
+            profile: profile.clone(),
+            categories: categories.to_vec(),
+            constants: categories.iter().map(|&c| Constants::resolve(profile, c)).collect(),
+            series: Series::new(seed, profile.frame.dt_s),
+        }
+    }
+
+    pub fn tables(&self) -> &Tables<f64> {
+        &self.series.tables
+    }
+
+    /// A pure function of seed, category, unit and side.
+    pub fn case(&self, block: usize, unit: u64, side: usize) -> LaneCase<f64> {
+        let draw = |attempt| Draw::new(Purpose::Threshold, self.seed, self.categories[block], unit, attempt);
+        let exact = (0..TRIES).find_map(|attempt| {
+            let scenes = self.scenes(&mut draw(attempt), block, unit)?;
+            let offsets = scenes.map(|scene| self.gap_offset(&scene, block));
+            offsets.iter().all(Option::is_some).then_some(())?;
+            Some(self.record(&scenes[side], offsets[side]?))
+        });
+        // Without an exact scene the unit is still an ordinary lane.
+        exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, Across::Ahead), 10.0))
+    }
+
+    fn base(&self, draw: &mut Draw, unit: u64, across: Across) -> Scene {
+        let turn = unit / Threshold::ALL.len() as u64;
+        let motion = self.series.motion(draw, (turn % 4) as u32, across);
+        let v_other = motion.cast::<f32>().speed(&self.series.lane_tables, 0);
+        Scene {
+            v_ego: v_other + rounded(draw.between(0.5, 15.0)),
+            v_other,
+            gap: rounded(draw.between(2.0, 30.0)),
+            half_lengths: rounded(draw.between(3.6, 9.0)),
+            half_widths: rounded(draw.between(1.3, 2.3)),
+            ego_width: rounded(draw.between(1.6, 2.1)),
+            motion,
+            attend_from: 0,
+            present_from: 0,
+            // Half of the vehicles are there for one step only: then that step alone decides.
+            present_until: if draw.chance(0.5) { 1 } else { NO_STEP },
+            horizon: draw.below(60) as u32,
+            start: draw.below(HEADWAYS.len()),
+            pairing: turn / 4 % 3,
+        }
+    }
+
+    /// The scene on its threshold and its two neighbours; `None` where these numbers have none.
+    fn scenes(&self, draw: &mut Draw, block: usize, unit: u64) -> Option<[Scene; 3]> {
+        let threshold = Threshold::of_unit(unit);
+        let across = match threshold {
+            Threshold::Reg157Gate | Threshold::CchdmGate | Threshold::RssLateral => {
+                [Across::Coming, Across::Beside][draw.below(2)]
+            }
+            Threshold::LateralGap | Threshold::EgoWidth => [Across::Coming, Across::Beside][draw.below(2)],
+            Threshold::FsmGate | Threshold::LateralEvent => Across::Coming,
+            Threshold::LateralSpeed => Across::Beside,
+            Threshold::Centres => [Across::Ahead, Across::Beside][draw.below(2)],
+            _ => Across::Ahead,
+        };
+        let scene = self.base(draw, unit, across);
+        match threshold {
+            Threshold::Attention
+            | Threshold::Appearance
+            | Threshold::Disappearance
+            | Threshold::SpeedEvent
+            | Threshold::LateralEvent
+            | Threshold::Horizon
+            | Threshold::StepCap => self.in_time(draw, block, threshold, scene),
+            Threshold::Reg157Gate
+            | Threshold::CchdmGate
+            | Threshold::RssLateral
+            | Threshold::LateralSpeed
+            | Threshold::LateralGap
+            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, scene),
+            _ => self.along_the_road(draw, block, threshold, scene),
+        }
+    }
+
+    /// Thresholds that a gap or the ego's speed meets.
+    fn along_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+        let constants = &self.constants[block];
+        let criteria = &constants.criteria;
+        let dv = s.v_ego - s.v_other;
+        // The smallest gap that matters: centres side by side.
+        let nearest = -s.half_lengths;
+        let signed = |draw: &mut Draw, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
+        let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv, true);
+        let fsm = &constants.fsm;
+        s.gap = match on {
+            Threshold::Ttc => criteria.ttc.threshold * dv,
+            Threshold::Btn => turn(0.01, FAR, |gap| judged(gap).failed.holds())?.1,
+            Threshold::BtnRoom => turn(0.01, FAR, |gap| criteria.btn.value(&judged(gap)).is_infinite())?.0,
+            Threshold::Reg157Ttc | Threshold::CchdmTtc => {
+                if draw.chance(0.25) {
+                    s.v_ego = s.v_other - rounded(draw.between(0.5, 1.9));
+                }
+                let dv = s.v_ego - s.v_other;
+                let ttc =
+                    if on == Threshold::Reg157Ttc { constants.reg157.ttc_threshold(dv) } else { self.cchdm_ttc() };
+                signed(draw, dv.abs() * ttc)
+            }
+            Threshold::RssLongitudinal => constants.rss.longitudinal_distance(s.v_ego, s.v_other),
+            Threshold::PfsSafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.1,
+            Threshold::PfsUnsafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) >= 1.0)?.0,
+            Threshold::CfsSafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) > 0.0)?.1,
+            Threshold::CfsUnsafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) >= 1.0)?.0,
+            Threshold::FsmGate => {
+                // A gap well inside PFS, then the width that closes the gate about there.
+                let reach = turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.0;
+                let about = rounded(draw.between(0.1, 0.8)) * reach;
+                let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
+                let h = lateral.towards * (about + 2.0 * s.half_lengths + 0.1 * dv) / dv;
+                s.half_widths = lateral.position.abs() - h;
+                if s.half_widths < 0.3 {
+                    return None;
+                }
+                let open = |gap: f32| fsm.check(&self.view(&Scene { gap, ..s })).is_unsafe.holds();
+                turn(nearest, about + 0.5 * (reach - about), open)?.1
+            }
+            Threshold::Behind => -(s.half_lengths + s.half_lengths),
+            Threshold::Centres => {
+                let y = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0).position.abs();
+                if y > 1.0 {
+                    // Seen by TTC and BTN, but no contact.
+                    (s.ego_width, s.half_widths) = (y + 0.3, y - 0.2);
+                }
+                nearest
+            }
+            Threshold::Gap => {
+                let exact = s.start < 2 && !self.profile.frame.start_shift;
+                let near = if exact { TINY } else { SMALL };
+                return Some([0.0, -near, near].map(|gap| Scene { gap, ..s }));
+            }
+            Threshold::EqualSpeeds => {
+                s.v_ego = s.v_other;
+                // At gap 0 one ULP of closing speed is a danger; at larger gaps only the FSM looks.
+                s.gap = if draw.chance(0.5) { 0.0 } else { s.gap };
+                let at = |v_ego: f32| Scene { v_ego, ..s };
+                return Some([at(s.v_ego), at(s.v_ego.next_down()), at(s.v_ego.next_up())]);
+            }
+            Threshold::StandingEgo => {
+                s.gap = if draw.chance(0.5) { 0.0 } else { rounded(draw.between(0.1, 5.0)) };
+                let at = |v_ego: f32, v_other: f32| {
+                    let motion = self.series.with_speed(s.motion, v_other, 0.0, 0.0);
+                    Scene { v_ego, v_other, motion, ..s }
+                };
+                return Some([at(0.0, 0.0), at(0.0, TINY), at(TINY, 0.0)]);
+            }
+            _ => return None,
+        };
+        let kept = s.gap >= nearest || on == Threshold::Behind;
+        (kept && self.products_meet(on, &s))
+            .then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| Scene { gap, ..s }))
+    }
+
+    /// Where both sides are products, the turn may jump over equality: only scenes that meet it count.
+    fn products_meet(&self, on: Threshold, s: &Scene) -> bool {
+        let dv = s.v_ego - s.v_other;
+        let criteria = &self.profile.criteria;
+        match on {
+            Threshold::Btn if criteria.btn == BtnForm::EquivalentDelay => {
+                let limit = rounded(2.0 * criteria.btn_threshold * criteria.max_deceleration_mps2);
+                let delay = rounded(criteria.max_deceleration_mps2 / (2.0 * criteria.jerk_mps3));
+                dv * dv == limit * (s.gap - dv * delay)
+            }
+            Threshold::FsmGate => {
+                let view = self.view(s);
+                let passing = s.gap + s.half_lengths + s.half_lengths;
+                let margin = rounded(self.profile.fsm.lateral_gate_margin_s);
+                view.lateral_gap * dv == view.lateral_towards * (passing + margin * dv)
+            }
+            _ => true,
+        }
+    }
+
+    /// Thresholds that a width or a lateral speed meets.
+    fn across_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+        let constants = &self.constants[block];
+        let dv = s.v_ego - s.v_other;
+        let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
+        let y = lateral.position.abs();
+        let part = rounded(draw.between(0.2, 0.8));
+        let soon = part * dv * constants.criteria.ttc.threshold;
+        let lateral_gap = match on {
+            Threshold::Reg157Gate => {
+                s.gap = part * dv * constants.reg157.ttc_threshold(dv);
+                rounded(self.profile.reg157.lateral_gate_m)
+            }
+            Threshold::CchdmGate => {
+                s.gap = part * dv * self.cchdm_ttc();
+                rounded(self.profile.cchdm.lateral_gate_m)
+            }
+            Threshold::RssLateral => {
+                s.gap = part * constants.rss.longitudinal_distance(s.v_ego, s.v_other).max(1.0);
+                constants.rss.lateral_distance(lateral.towards)
+            }
+            Threshold::LateralGap => {
+                // Overlapping along the road, or soon to.
+                s.gap = if draw.chance(0.5) { -part * s.half_lengths } else { soon };
+                0.0
+            }
+            Threshold::EgoWidth => {
+                (s.gap, s.ego_width) = (soon, y);
+                s.half_widths = rounded(draw.between(0.3, 1.2)) * y;
+                return Some([y, y.next_down(), y.next_up()].map(|ego_width| Scene { ego_width, ..s }));
+            }
+            _ => {
+                // With dv = 0 the FSM's gate hangs on the lateral speed alone.
+                s.v_ego = if draw.chance(0.7) { s.v_other } else { s.v_ego };
+                s.gap = rounded(draw.between(0.5, 5.0));
+                s.half_widths = s.half_widths.min(y - 0.2);
+                return Some([0, 1, 2].map(|side| Scene { motion: self.series.still(s.motion, side), ..s }));
+            }
+        };
+        let minus_gap = |width: f32| -(y - width);
+        let width = hit(-lateral_gap, f64::from(y) - f64::from(lateral_gap), minus_gap)?;
+        // A smaller lateral gap is a larger width.
+        let widths = [width, next_other(width, true, minus_gap), next_other(width, false, minus_gap)];
+        (width >= 0.2).then(|| widths.map(|half_widths| Scene { half_widths, ..s }))
+    }
+
+    /// Thresholds that a step meets.
+    fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+        let (dt, dt_s) = (self.constants[block].frames[0].dt, self.profile.frame.dt_s);
+        let dv = s.v_ego - s.v_other;
+        let step = 1 + draw.below(5) as u32;
+        let around = |step: u32| [step, step.saturating_sub(1), step + 1];
+        s.present_until = NO_STEP;
+        match on {
+            Threshold::Attention | Threshold::Appearance => {
+                // Every model is afraid 0.4 s before the contact.
+                s.gap = dv * (0.4 + dt * step as f32);
+                Some(around(step).map(|step| match on {
+                    Threshold::Attention => Scene { attend_from: step, ..s },
+                    _ => Scene { present_from: step, ..s },
+                }))
+            }
+            Threshold::Disappearance => {
+                s.attend_from = NO_STEP;
+                s.gap = rounded(draw.between(0.5, 5.0));
+                let contact = self.contact_step(&s, dt)?;
+                Some(around(contact).map(|present_until| Scene { present_until, ..s }))
+            }
+            Threshold::SpeedEvent => {
+                let acceleration = draw.between(-9.0, 3.0);
+                Some([0.0, -1e-6, 1e-6].map(|early| {
+                    let until_s = (f64::from(step) + early) * dt_s;
+                    Scene { motion: self.series.with_speed(s.motion, s.v_other, acceleration, until_s), ..s }
+                }))
+            }
+            Threshold::LateralEvent => {
+                let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
+                let (start, rate) = (f64::from(lateral.position), f64::from(lateral.towards));
+                let travel = rate * dt_s * f64::from(step);
+                // The RSS looks first where the lateral speed just ends, and its safe distance with it.
+                let rss = &self.constants[block].rss;
+                let (still, moving) = (rss.lateral_distance(0.0), rss.lateral_distance(lateral.towards));
+                let h = still + rounded(draw.between(0.1, 0.9)) * (moving - still);
+                s.attend_from = step;
+                s.half_widths = rounded(start.abs() - travel) - h;
+                s.gap = rounded(draw.between(0.2, 0.8)) * rss.longitudinal_distance(s.v_ego, s.v_other).max(4.0);
+                (s.half_widths > 0.2).then(|| {
+                    [0.0, -1e-6, 1e-6].map(|early| {
+                        let end_m = start - start.signum() * (travel + early * rate * dt_s);
+                        let across = Lateral::Kinematic { start_m: start, rate_mps: -start.signum() * rate, end_m };
+                        Scene { motion: self.series.with_lateral(s.motion, &across), ..s }
+                    })
+                })
+            }
+            _ => {
+                s.v_ego = s.v_other;
+                s.gap = s.gap.max(20.0);
+                s.motion = self.series.with_speed(s.motion, s.v_other, 0.0, 0.0);
+                let last = self.profile.step_cap().max(2) - 1;
+                let horizon = if on == Threshold::StepCap { last } else { (1 + draw.below(200) as u32).min(last - 1) };
+                Some(around(horizon).map(|horizon| Scene { horizon, ..s }))
+            }
+        }
+    }
+
+    /// First step at which an ego that keeps its speed touches the vehicle; `None` where it does not soon.
+    fn contact_step(&self, s: &Scene, dt: f32) -> Option<u32> {
+        let motion = s.motion.cast::<f32>();
+        let mut gap = s.gap;
+        (1..400).find(|&index| {
+            gap += (motion.speed(&self.series.lane_tables, index) - s.v_ego) * dt;
+            gap < 0.0
+        })
+    }
+
+    fn cchdm_ttc(&self) -> f32 {
+        rounded(self.profile.cchdm.ttc_s)
+    }
+
+    fn view(&self, s: &Scene) -> View<f32> {
+        let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
+        View {
+            v_ego: s.v_ego,
+            a_ego: 0.0,
+            v_other: s.v_other,
+            gap: s.gap,
+            lateral_gap: lateral.position.abs() - s.half_widths,
+            lateral_towards: lateral.towards,
+            half_lengths: s.half_lengths,
+        }
+    }
+
+    /// What is added to the headway so that the lane's first gap is the scene's.
+    fn gap_offset(&self, s: &Scene, block: usize) -> Option<f32> {
+        let frame = &self.constants[block].frames[0];
+        let start = match HEADWAYS[s.start].start::<f32>() {
+            Start::Headway(time) => time * s.v_ego,
+            Start::Gap(gap) => gap,
+        };
+        let shift = (s.v_other - s.v_ego) * frame.dt;
+        let first = |offset: f32| if frame.start_shift { start + offset + shift } else { start + offset };
+        let guess = f64::from(s.gap) - f64::from(first(0.0));
+        hit(s.gap, guess, first)
+    }
+
+    fn record(&self, s: &Scene, offset: f32) -> LaneCase<f64> {
+        let deciding = LaneOther {
+            motion: s.motion,
+            half_lengths: f64::from(s.half_lengths),
+            half_widths: f64::from(s.half_widths),
+            gap_offset: f64::from(offset),
+            present_from: s.present_from,
+            present_until: s.present_until,
+            attend_from: [s.attend_from; MODELS],
+            used: 1,
+            judged: 1,
+        };
+        let aside = Lateral::Kinematic { start_m: 12.0, rate_mps: 0.0, end_m: 12.0 };
+        let far = LaneOther {
+            motion: self.series.with_lateral(self.series.with_speed(s.motion, s.v_other, 0.0, 0.0), &aside),
+            half_widths: 2.0,
+            gap_offset: 150.0,
+            present_from: 0,
+            present_until: NO_STEP,
+            attend_from: [NO_STEP; MODELS],
+            ..deciding
+        };
+        let others = match s.pairing {
+            0 => [deciding, LaneOther { used: 0, present_until: 0, ..deciding }],
+            1 => [deciding, far],
+            _ => [far, deciding],
+        };
+        LaneCase {
+            others,
+            ego_speed: f64::from(s.v_ego),
+            ego_width: f64::from(s.ego_width),
+            horizon: s.horizon,
+            pair: u32::from(s.pairing > 0),
+        }
+    }
+}

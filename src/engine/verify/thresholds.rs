@@ -1,0 +1,80 @@
+//! The threshold set: lanes whose first step sits exactly on a decision of a model, a gate, a criterion or an
+//! end rule, in the lane arithmetic, with their neighbours one unit in the last place to either side. A
+//! backend that contracts a product, reorders a sum or tests `<` for `≤` shows here first.
+
+use super::check_categories;
+use super::decision::{HEADWAYS, Threshold};
+use super::scene::Scenes;
+use crate::engine::{Block, CaseSource, LaneCase, LanePlan};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::{Category, Tables};
+use crate::{Error, Place, Result};
+
+/// Variants of every unit: on the threshold (`S`), and the quantity that decides one ULP smaller and larger.
+/// Around 0 the neighbours are ±2⁻³², which no device flushes; steps and times move by a step.
+pub const SIDES: [&str; 3] = ["S", "below", "above"];
+
+/// What a threshold set holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ThresholdOptions {
+    /// Seed of the situations around the thresholds.
+    pub seed: u64,
+    /// Units of each threshold in each category; a unit is 12 lanes of each model.
+    pub units_per_threshold: u64,
+    /// Categories, in order, each at most once.
+    pub categories: Vec<Category>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+}
+
+impl Default for ThresholdOptions {
+    fn default() -> Self {
+        ThresholdOptions {
+            seed: 157,
+            units_per_threshold: 64,
+            categories: Category::ALL.to_vec(),
+            models: ModelId::ALL.to_vec(),
+        }
+    }
+}
+
+/// Plans the threshold set of a seed. Keys are `threshold-rss-lateral-cut-in-seed157-000012`; the number is
+/// that of the unit in its category, whatever the size asked for.
+///
+/// # Errors
+/// [`Error::Usage`] where there is no unit, category or model to plan, or a category is named twice.
+pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<LanePlan> {
+    check_categories(&options.categories)?;
+    if options.units_per_threshold == 0 {
+        let place = Place::item("units_per_threshold");
+        return Err(Error::usage(place, "the set has no lanes", "ask for at least one unit"));
+    }
+    let units = options.units_per_threshold * Threshold::ALL.len() as u64;
+    let key = |category: Category, unit: u64| {
+        let (threshold, category) = (Threshold::of_unit(unit).name(), category.key().replace('_', "-"));
+        format!("threshold-{threshold}-{category}-seed{}-{unit:06}", options.seed)
+    };
+    let block = |&category: &Category| Block {
+        category,
+        units: (0..units).map(|unit| key(category, unit)).collect(),
+        variants: SIDES.map(str::to_owned).to_vec(),
+        first_unit: 0,
+        first_lane: 0,
+    };
+    let blocks = options.categories.iter().map(block).collect();
+    let source = ThresholdCases(Scenes::new(profile, options.seed, &options.categories));
+    LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Box::new(source))
+}
+
+struct ThresholdCases(Scenes);
+
+impl CaseSource for ThresholdCases {
+    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        self.0.case(block, unit, variant)
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        self.0.tables()
+    }
+}

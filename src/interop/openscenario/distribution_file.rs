@@ -1,0 +1,447 @@
+//! The reader of `ParameterValueDistribution` files, ASAM OpenSCENARIO XML 1.1 to 1.3.
+//!
+//! Every element and attribute is one that the standard has there, or the file is refused with its line: what is not
+//! understood must not be left out in silence. The scenario that the file names is not read.
+
+use std::path::{Path, PathBuf};
+
+use super::distribution::{Distribution, LARGEST_POISSON, Range};
+use super::xml_tree::{Node, parse_tree, read_tree};
+use crate::run::grid::{GridAxis, MOST_VALUES};
+use crate::support::near_name;
+use crate::{Error, Place, Result};
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DistributionFile {
+    /// The file, for messages.
+    pub path: PathBuf,
+    /// What it holds.
+    pub distributions: Distributions,
+}
+
+/// The two kinds of content.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Distributions {
+    /// Every combination of listed values.
+    Deterministic(Vec<Deterministic>),
+    /// Random values.
+    Stochastic(Stochastic),
+}
+
+/// One deterministic distribution.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Deterministic {
+    /// Values of one parameter: a set, or the steps of a range.
+    Values {
+        /// Parameter as the file names it.
+        name: String,
+        /// Line.
+        line: u64,
+        /// At least one.
+        values: Vec<f64>,
+    },
+    /// Values of several parameters that belong together.
+    Sets {
+        /// Parameters as the file names them.
+        names: Vec<String>,
+        /// Line.
+        line: u64,
+        /// Rows of as many values; at least one.
+        rows: Vec<Vec<f64>>,
+    },
+}
+
+/// Independent random parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stochastic {
+    /// `numberOfTestRuns`, ≥ 1.
+    pub runs: u64,
+    /// `randomSeed`, where the file has one.
+    pub seed: Option<u64>,
+    /// Name, line and distribution of each parameter, in order.
+    pub parameters: Vec<(String, u64, Distribution)>,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] with line and element for what is not such a file, is not known or contradicts itself.
+pub fn read_distribution(path: &Path) -> Result<DistributionFile> {
+    of_tree(read_tree(path)?, path)
+}
+
+/// The same of a text; `path` is for messages.
+///
+/// # Errors
+/// As [`read_distribution`].
+pub fn parse_distribution(text: &str, path: &Path) -> Result<DistributionFile> {
+    of_tree(parse_tree(text, path)?, path)
+}
+
+fn of_tree(root: Node, path: &Path) -> Result<DistributionFile> {
+    let at = At { node: &root, path };
+    if root.name != "OpenSCENARIO" {
+        return Err(at.wrong("the root element is not `OpenSCENARIO`", "give a file of ASAM OpenSCENARIO XML"));
+    }
+    let has = |name: &str| root.children.iter().any(|child| child.name == name);
+    if !has("ParameterValueDistribution") && (has("Storyboard") || has("Catalog")) {
+        let help = "give the file whose `ParameterValueDistribution` varies the scenario's parameters";
+        return Err(at.wrong("this is a scenario or a catalog, and no distribution of parameters", help));
+    }
+    at.children(&["FileHeader", "ParameterValueDistribution"])?;
+    let header = at.only("FileHeader")?;
+    let revision = (header.text("revMajor")?, header.text("revMinor")?);
+    if !matches!(revision, ("1", "1" | "2" | "3")) {
+        let problem = format!("it is of revision {}.{}", revision.0, revision.1);
+        return Err(header.wrong(problem, "distributions are read of revisions 1.1 to 1.3"));
+    }
+    let content = at.only("ParameterValueDistribution")?;
+    content.attributes(&[])?;
+    content.children(&["ScenarioFile", "Deterministic", "Stochastic"])?;
+    content.only("ScenarioFile")?.attributes(&["filepath"])?;
+    let kinds: Vec<At> = content.all().filter(|child| child.node.name != "ScenarioFile").collect();
+    let [kind] = kinds[..] else {
+        let help = "give one of `Deterministic` and `Stochastic`";
+        return Err(content.wrong(format!("it has {} kinds of distributions", kinds.len()), help));
+    };
+    let distributions = if kind.node.name == "Deterministic" {
+        Distributions::Deterministic(deterministic(kind)?)
+    } else {
+        Distributions::Stochastic(stochastic(kind)?)
+    };
+    let file = DistributionFile { path: path.to_path_buf(), distributions };
+    file.check_names()?;
+    Ok(file)
+}
+
+impl DistributionFile {
+    /// Names and lines of all parameters, in order.
+    pub fn names(&self) -> Vec<(&str, u64)> {
+        match &self.distributions {
+            Distributions::Deterministic(list) => list
+                .iter()
+                .flat_map(|one| match one {
+                    Deterministic::Values { name, line, .. } => vec![(name.as_str(), *line)],
+                    Deterministic::Sets { names, line, .. } => names.iter().map(|n| (n.as_str(), *line)).collect(),
+                })
+                .collect(),
+            Distributions::Stochastic(all) => all.parameters.iter().map(|(n, line, _)| (n.as_str(), *line)).collect(),
+        }
+    }
+
+    fn check_names(&self) -> Result<()> {
+        let names = self.names();
+        for (at, (name, line)) in names.iter().enumerate() {
+            if let Some((_, before)) = names[..at].iter().find(|(known, _)| known == name) {
+                let problem = format!("`{name}` has a distribution already, in line {before}");
+                return Err(Error::input(Place::file(&self.path).row(*line), problem, "keep one of the two"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn deterministic(at: At) -> Result<Vec<Deterministic>> {
+    const SINGLE: &str = "DeterministicSingleParameterDistribution";
+    const MULTI: &str = "DeterministicMultiParameterDistribution";
+    at.attributes(&[])?;
+    at.children(&[SINGLE, MULTI])?;
+    let mut list = Vec::new();
+    for one in at.all() {
+        list.push(if one.node.name == SINGLE { single(one)? } else { multi(one)? });
+    }
+    if list.is_empty() {
+        return Err(at.wrong("there is no distribution in it", format!("add a `{SINGLE}`")));
+    }
+    Ok(list)
+}
+
+fn single(at: At) -> Result<Deterministic> {
+    at.attributes(&["parameterName"])?;
+    let name = at.text("parameterName")?.to_owned();
+    let inner = at.choice(&["DistributionSet", "DistributionRange"])?;
+    let values = if inner.node.name == "DistributionSet" {
+        inner.attributes(&[])?;
+        let each = |element: At| {
+            element.attributes(&["value"])?;
+            element.children(&[])?;
+            element.number("value")
+        };
+        inner.some("Element")?.into_iter().map(each).collect::<Result<Vec<_>>>()?
+    } else {
+        inner.attributes(&["stepWidth"])?;
+        inner.children(&["Range"])?;
+        let range = inner.only("Range")?.range()?;
+        let step = inner.number("stepWidth")?;
+        GridAxis::steps((range.low, range.high), step, "DistributionRange").map_err(|e| inner.because(&e))?
+    };
+    if values.len() > MOST_VALUES {
+        return Err(inner.wrong(format!("{} values", values.len()), format!("give {MOST_VALUES} at most")));
+    }
+    Ok(Deterministic::Values { name, line: at.node.line, values })
+}
+
+fn multi(at: At) -> Result<Deterministic> {
+    at.attributes(&[])?;
+    let inner = at.choice(&["ValueSetDistribution"])?;
+    inner.attributes(&[])?;
+    let mut known: Option<Vec<String>> = None;
+    let mut rows = Vec::new();
+    for set in inner.some("ParameterValueSet")? {
+        set.attributes(&[])?;
+        let mut values: Vec<(String, f64)> = Vec::new();
+        for assignment in set.some("ParameterAssignment")? {
+            assignment.attributes(&["parameterRef", "value"])?;
+            assignment.children(&[])?;
+            let name = assignment.text("parameterRef")?;
+            if values.iter().any(|(before, _)| before == name) {
+                return Err(
+                    assignment.wrong(format!("`{name}` has a value in this set already"), "keep one of the two")
+                );
+            }
+            values.push((name.to_owned(), assignment.number("value")?));
+        }
+        let names = known.get_or_insert_with(|| values.iter().map(|(name, _)| name.clone()).collect());
+        let value = |name: &String| values.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
+        let row: Option<Vec<f64>> = names.iter().map(value).collect();
+        match row.filter(|row| row.len() == values.len()) {
+            Some(row) => rows.push(row),
+            None => {
+                let problem =
+                    format!("this set does not assign the same parameters as the first ({})", names.join(", "));
+                return Err(set.wrong(problem, "assign the same parameters in every set"));
+            }
+        }
+    }
+    Ok(Deterministic::Sets { names: known.unwrap_or_default(), line: at.node.line, rows })
+}
+
+fn stochastic(at: At) -> Result<Stochastic> {
+    at.attributes(&["numberOfTestRuns", "randomSeed"])?;
+    at.children(&["StochasticDistribution"])?;
+    // Seeds are doubles in the standard; below 2^53 every whole number is one.
+    let whole = |name: &str, least: f64| {
+        let value = at.number(name)?;
+        if value.fract() == 0.0 && (least..9_007_199_254_740_992.0).contains(&value) {
+            return Ok(value as u64);
+        }
+        let problem = format!("the attribute `{name}` is {value}");
+        Err(at.wrong(problem, format!("write a whole number of at least {least} and below 2^53")))
+    };
+    let seed = at.has("randomSeed").then(|| whole("randomSeed", 0.0)).transpose()?;
+    let mut parameters = Vec::new();
+    for one in at.some("StochasticDistribution")? {
+        one.attributes(&["parameterName"])?;
+        parameters.push((one.text("parameterName")?.to_owned(), one.node.line, distribution(one)?));
+    }
+    Ok(Stochastic { runs: whole("numberOfTestRuns", 1.0)?, seed, parameters })
+}
+
+fn distribution(at: At) -> Result<Distribution> {
+    let inner = at.choice(&[
+        "ProbabilityDistributionSet",
+        "NormalDistribution",
+        "UniformDistribution",
+        "PoissonDistribution",
+        "Histogram",
+    ])?;
+    let within = || match inner.all().next() {
+        Some(_) => {
+            inner.children(&["Range"])?;
+            inner.only("Range")?.range()
+        }
+        None => Ok(Range::ALL),
+    };
+    let at_least_zero = |one: At, name: &str| {
+        let value = one.number(name)?;
+        if value >= 0.0 {
+            return Ok(value);
+        }
+        Err(one.wrong(format!("the attribute `{name}` is {value}"), "write a number of at least 0"))
+    };
+    let found = match inner.node.name.as_str() {
+        "UniformDistribution" => {
+            inner.attributes(&[])?;
+            inner.children(&["Range"])?;
+            Distribution::Uniform(inner.only("Range")?.range()?)
+        }
+        "NormalDistribution" => {
+            inner.attributes(&["expectedValue", "variance"])?;
+            let deviation = at_least_zero(inner, "variance")?.sqrt();
+            Distribution::Normal { mean: inner.number("expectedValue")?, deviation, range: within()? }
+        }
+        "PoissonDistribution" => {
+            inner.attributes(&["expectedValue"])?;
+            let mean = at_least_zero(inner, "expectedValue")?;
+            if mean > LARGEST_POISSON {
+                let help = format!("write at most {LARGEST_POISSON}, or a normal distribution, which it nearly is");
+                return Err(inner.wrong(format!("the attribute `expectedValue` is {mean}"), help));
+            }
+            Distribution::Poisson { mean, range: within()? }
+        }
+        "Histogram" => {
+            inner.attributes(&[])?;
+            let mut bins: Vec<(Range, f64)> = Vec::new();
+            for bin in inner.some("Bin")? {
+                bin.attributes(&["weight"])?;
+                bin.children(&["Range"])?;
+                let range = bin.only("Range")?.range()?;
+                if bins.last().is_some_and(|(before, _)| range.low < before.high) {
+                    let help = "give bins in rising order, none over another";
+                    return Err(bin.wrong("this bin begins before the one above it ends", help));
+                }
+                bins.push((range, at_least_zero(bin, "weight")?));
+            }
+            Distribution::Histogram(bins)
+        }
+        _ => {
+            inner.attributes(&[])?;
+            let mut values = Vec::new();
+            for element in inner.some("Element")? {
+                element.attributes(&["value", "weight"])?;
+                element.children(&[])?;
+                values.push((element.number("value")?, at_least_zero(element, "weight")?));
+            }
+            Distribution::Set(values)
+        }
+    };
+    if found.within(Range::ALL).is_none() {
+        let help = "give a range that holds some of the distribution, and a weight above 0";
+        return Err(inner.wrong("no value of it is possible", help));
+    }
+    Ok(found)
+}
+
+/// An element and where it is.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    node: &'a Node,
+    path: &'a Path,
+}
+
+impl<'a> At<'a> {
+    fn wrong(&self, problem: impl Into<String>, help: impl Into<String>) -> Error {
+        let place = Place::file(self.path).row(self.node.line).of(format!("element `{}`", self.node.name));
+        Error::input(place, problem, help)
+    }
+
+    /// What another check found, here.
+    fn because(&self, error: &Error) -> Error {
+        self.wrong(error.to_string(), error.help().unwrap_or_default())
+    }
+
+    fn all(self) -> impl Iterator<Item = At<'a>> {
+        self.node.children.iter().map(move |node| At { node, path: self.path })
+    }
+
+    /// Only these attributes may be there, besides those of namespaces; and no text.
+    fn attributes(&self, known: &[&str]) -> Result<()> {
+        let is_foreign = |key: &str| key == "xmlns" || key.starts_with("xmlns:") || key.starts_with("xsi:");
+        for (key, _) in self.node.attributes.iter().filter(|(key, _)| !is_foreign(key)) {
+            if !known.contains(&key.as_str()) {
+                let help = match known {
+                    [] => "leave it out: the element has no attributes".to_owned(),
+                    list => format!("it has {}{}", list.join(", "), nearest(key, list)),
+                };
+                return Err(self.wrong(format!("there is no attribute `{key}`"), help));
+            }
+        }
+        if !self.node.text.is_empty() {
+            return Err(self.wrong("text stands in it", "leave the text out: values are attributes"));
+        }
+        Ok(())
+    }
+
+    /// Only these elements may be inside.
+    fn children(&self, known: &[&str]) -> Result<()> {
+        match self.node.children.iter().find(|child| !known.contains(&child.name.as_str())) {
+            None => Ok(()),
+            Some(child) => {
+                let inside = format!("inside `{}`", self.node.name);
+                let help = match known {
+                    [] => format!("leave it out: nothing stands {inside}"),
+                    list => format!("{inside} stand {}{}", list.join(", "), nearest(&child.name, list)),
+                };
+                Err(At { node: child, path: self.path }.wrong("this element is not known here", help))
+            }
+        }
+    }
+
+    /// The only element of this name.
+    fn only(self, name: &str) -> Result<At<'a>> {
+        let found: Vec<At> = self.all().filter(|child| child.node.name == name).collect();
+        match found[..] {
+            [one] => Ok(one),
+            _ => Err(self.wrong(format!("it has {} elements `{name}`", found.len()), format!("give one `{name}`"))),
+        }
+    }
+
+    /// The elements of this name, and no others; at least one.
+    fn some(self, name: &str) -> Result<Vec<At<'a>>> {
+        self.children(&[name])?;
+        let found: Vec<At> = self.all().collect();
+        if found.is_empty() {
+            return Err(self.wrong(format!("it has no `{name}`"), format!("give at least one `{name}`")));
+        }
+        Ok(found)
+    }
+
+    /// The only element, of one of these names.
+    fn choice(self, names: &[&str]) -> Result<At<'a>> {
+        if let Some(child) =
+            self.all().find(|c| matches!(c.node.name.as_str(), "UserDefinedDistribution" | "LogNormalDistribution"))
+        {
+            let help = format!("what it means is not told here: write one of {}", names.join(", "));
+            return Err(child.wrong("this kind of distribution is not read", help));
+        }
+        self.children(names)?;
+        let found: Vec<At> = self.all().collect();
+        match found[..] {
+            [one] => Ok(one),
+            _ => Err(self
+                .wrong(format!("it has {} distributions", found.len()), format!("give one of {}", names.join(", ")))),
+        }
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.node.attributes.iter().any(|(key, _)| key == name)
+    }
+
+    fn text(&self, name: &str) -> Result<&'a str> {
+        let found = self.node.attributes.iter().find(|(key, _)| key == name);
+        let (_, value) = found
+            .ok_or_else(|| self.wrong(format!("the attribute `{name}` is missing"), format!("write {name}=\"…\"")))?;
+        if value.starts_with('$') {
+            let problem = format!("the attribute `{name}` is `{value}`");
+            return Err(self.wrong(problem, "parameters and expressions are not evaluated: write the value itself"));
+        }
+        Ok(value)
+    }
+
+    fn number(&self, name: &str) -> Result<f64> {
+        let text = self.text(name)?;
+        text.trim().parse::<f64>().ok().filter(|value| value.abs() <= 1e15).ok_or_else(|| {
+            let problem = format!("the attribute `{name}` is `{text}`");
+            self.wrong(problem, "write a number: every parameter of lanesweep is one")
+        })
+    }
+
+    /// `lowerLimit` to `upperLimit`.
+    fn range(&self) -> Result<Range> {
+        self.attributes(&["lowerLimit", "upperLimit"])?;
+        self.children(&[])?;
+        let range = Range { low: self.number("lowerLimit")?, high: self.number("upperLimit")? };
+        if range.low <= range.high {
+            return Ok(range);
+        }
+        let problem = format!("the lower limit {} is above the upper limit {}", range.low, range.high);
+        Err(self.wrong(problem, "give the smaller one as lowerLimit"))
+    }
+}
+
+/// `; did you mean …?` where a name is near one of a list.
+fn nearest(name: &str, list: &[&str]) -> String {
+    near_name::nearest(name, list.iter().copied(), 0.8)
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"))
+}

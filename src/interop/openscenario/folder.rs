@@ -1,0 +1,72 @@
+//! A folder of exported scenarios: a scenario and its road per lane, and an index of them.
+
+use std::path::Path;
+
+use super::concrete::Concrete;
+use super::road::road_file;
+use super::scenario_file::scenario_file;
+use crate::Result;
+use crate::report::csv;
+use crate::support::run_dir::RunFolder;
+
+/// Name of the index.
+pub const INDEX: &str = "index.csv";
+
+/// One line of the index.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IndexRow {
+    /// File of the scenario.
+    pub file: String,
+    /// File of the road.
+    pub road: String,
+    /// Lane key.
+    pub lane: String,
+}
+
+/// Puts every scenario with its road and the index into a folder, in the place of an earlier export's.
+///
+/// # Errors
+/// As [`scenario_file`]; [`crate::Error::Io`].
+pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
+    // Everything is made before anything is written: a lane that cannot be leaves the folder as it was.
+    let mut made = Vec::new();
+    for (at, scenario) in scenarios.iter().enumerate() {
+        let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
+        let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
+        made.push((scenario_file(scenario, &row.road)?, road_file(&scenario.road())?, row));
+    }
+    let folder = RunFolder::open(dir, INDEX)?;
+    let mut results = folder.results()?;
+    // The lane has a column of its own already.
+    let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
+        s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
+    });
+    let header =
+        ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.iter().map(|n| plain(n)));
+    let mut table = vec![header.collect::<Vec<String>>()];
+    let mut rows = Vec::new();
+    for ((text, road, row), scenario) in made.into_iter().zip(scenarios) {
+        results.add(&row.road, &road)?;
+        results.add(&row.file, &text)?;
+        let value = |name: &String| {
+            scenario.properties.iter().find(|(n, _)| n == name).map_or(String::new(), |(_, value)| value.clone())
+        };
+        let first = [row.file.clone(), row.road.clone(), row.lane.clone(), scenario.category.key().to_owned()];
+        table.push(first.into_iter().chain(names.iter().map(value)).collect());
+        rows.push(row);
+    }
+    results.publish(&csv::text(table)?)?;
+    Ok(rows)
+}
+
+/// The name of a property as that of a column.
+fn plain(property: &str) -> String {
+    property.strip_prefix("lanesweep.").unwrap_or(property).to_owned()
+}
+
+/// A lane key as a part of a file name that every system takes.
+fn safe(key: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-') { c } else { '_' };
+    let name: String = key.chars().map(plain).take(100).collect();
+    name.trim_matches(['.', '_']).to_owned()
+}

@@ -1,0 +1,39 @@
+//! OpenSCENARIO: concrete scenarios out, distributions of parameters in.
+//!
+//! Here live what a played scenario holds ([`Concrete`]), its two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
+//! 1.7), and the reader of `ParameterValueDistribution` files. Here lives nothing about how lanes are chosen or run.
+//! Traces come from [`crate::engine`]; what is read goes to [`crate::run::grid`] and [`crate::engine`].
+
+mod concrete;
+mod distribution;
+mod distribution_file;
+mod elements;
+mod folder;
+mod parameters;
+mod path;
+mod road;
+mod samples;
+mod scenario_file;
+mod sizes;
+mod variations;
+mod xml_tree;
+
+pub use concrete::{Concrete, EgoMotion, PlayedVehicle};
+pub use distribution::{Distribution, Draw, LARGEST_POISSON, Range};
+pub use distribution_file::{
+    Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
+};
+pub use folder::{IndexRow, export_folder};
+pub use parameters::{Names, Rename};
+pub use path::{Vertex, paths};
+pub use road::{Road, road_file};
+pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MOST_SAMPLES, Sampled, SampledParameter};
+pub use scenario_file::scenario_file;
+pub use sizes::{KnownSizes, sizes_of_case};
+pub use variations::{Variations, variations};
+
+/// Author of every file.
+pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
+
+/// Date of every file: the same input gives the same bytes.
+pub(crate) const DATE: &str = "1970-01-01T00:00:00";

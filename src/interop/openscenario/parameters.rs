@@ -1,0 +1,98 @@
+//! From the names of a file to the parameters of a category: by the same name, or as a user says.
+
+use std::path::Path;
+
+use crate::run::grid::Parameter;
+use crate::scenario::Category;
+use crate::{Error, Place, Result};
+
+/// `THEIRS=OURS` or `THEIRS=OURS*FACTOR`: our value is theirs times the factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rename {
+    /// Name in the file.
+    pub theirs: String,
+    /// Name of one of our parameters.
+    pub ours: String,
+    /// So many of our units are one of theirs, > 0.
+    pub factor: f64,
+}
+
+impl std::str::FromStr for Rename {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Rename, String> {
+        const FORM: &str = "write THEIRS=OURS or THEIRS=OURS*FACTOR, such as Ego_Speed_kph=ego_speed_kmh";
+        let (theirs, rest) = text.split_once('=').ok_or(FORM)?;
+        let (ours, factor) = match rest.split_once('*') {
+            None => (rest, 1.0),
+            Some((ours, factor)) => {
+                let factor = factor.trim().parse::<f64>().ok().filter(|f| (1e-9..=1e9).contains(f));
+                (ours, factor.ok_or("the factor must be a number above 0")?)
+            }
+        };
+        if theirs.trim().is_empty() || ours.trim().is_empty() {
+            return Err(FORM.to_owned());
+        }
+        Ok(Rename { theirs: theirs.trim().to_owned(), ours: ours.trim().to_owned(), factor })
+    }
+}
+
+/// The names of a file in a category.
+pub struct Names<'a> {
+    /// Kind of scenario.
+    pub category: Category,
+    /// What the user says of names.
+    pub renames: &'a [Rename],
+    /// The file, for messages.
+    pub path: &'a Path,
+}
+
+impl Names<'_> {
+    /// The parameter of a name, and the factor to its unit.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a name that is none of ours and has no `--rename`; [`Error::Usage`] for a `--rename` to what
+    /// is none.
+    pub fn find(&self, name: &str, line: u64) -> Result<(&'static Parameter, f64)> {
+        if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
+            return Ok((Parameter::find(self.category, &rename.ours, "--rename")?, rename.factor));
+        }
+        Parameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
+            let help = error.help().unwrap_or_default();
+            let problem = format!("a {} has no parameter `{name}`", self.category.label());
+            let help = format!("name it by --rename {name}=OURS or --rename {name}=OURS*FACTOR; {help}");
+            Error::input(Place::file(self.path).row(line).of(format!("parameter `{name}`")), problem, help)
+        })
+    }
+
+    /// A value in the parameter's own unit, a decimal again, within its range.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the range.
+    pub fn value(&self, (parameter, factor): (&Parameter, f64), value: f64, line: u64) -> Result<f64> {
+        let ours = if factor == 1.0 { value } else { (value * factor * 1e9).round() / 1e9 };
+        parameter.check(ours, "").map_err(|error| {
+            let place = Place::file(self.path).row(line).of(format!("parameter `{}`", parameter.key));
+            Error::input(place, format!("{ours} cannot be used"), error.help().unwrap_or_default())
+        })
+    }
+
+    /// Every `--rename` must be of a name that the file has, once.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_renames(&self, names: &[(&str, u64)]) -> Result<()> {
+        for (at, rename) in self.renames.iter().enumerate() {
+            if !names.iter().any(|(name, _)| *name == rename.theirs) {
+                let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+                let problem = format!("the file has no parameter `{}`", rename.theirs);
+                return Err(Error::usage(Place::item("--rename"), problem, format!("it has {}", known.join(", "))));
+            }
+            if self.renames[..at].iter().any(|before| before.theirs == rename.theirs) {
+                let problem = format!("`{}` is renamed twice", rename.theirs);
+                return Err(Error::usage(Place::item("--rename"), problem, "keep one of the two"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,214 @@
+//! Random parameters as sampled lanes: sample `i` is a pure function of (seed, i), made on the host, in f64.
+//!
+//! Every parameter takes one uniform number of the sample's own words, in the file's order; its distribution is cut off at
+//! its own range and at the physical range of the parameter. A point without a case (a deceleration that should end above
+//! the initial speed) is drawn again from the sample's next words.
+
+use super::distribution::{Draw, Range};
+use super::distribution_file::{DistributionFile, Distributions, Stochastic};
+use super::parameters::Names;
+use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::grid::{Parameter, Point, Quantity, check_complete};
+use crate::scenario::{Case, Category, Tables};
+use crate::stats::density::Draws;
+use crate::stats::random::Stream;
+use crate::{Error, Place, Result};
+
+/// Purpose of the stream of these draws.
+pub const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
+
+/// Samples at most: their cases are a table in memory, some 400 bytes each.
+pub const MOST_SAMPLES: u64 = 1_000_000;
+
+/// Points drawn for one sample at most.
+pub const ATTEMPTS: u32 = 64;
+
+/// Name of the only variant.
+const VARIANT: &str = "distribution";
+
+/// One random parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampledParameter {
+    /// The parameter.
+    pub parameter: &'static Parameter,
+    /// Its distribution, in the file's unit.
+    pub draw: Draw,
+    /// To the parameter's unit.
+    pub factor: f64,
+    /// The share of the distribution that the parameter's physical range leaves.
+    pub kept_share: f64,
+}
+
+/// Random parameters of a category, with values that are the same in every sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DistributionSamples {
+    /// Kind of scenario.
+    pub category: Category,
+    /// The random parameters, in the file's order.
+    pub parameters: Vec<SampledParameter>,
+    /// The others.
+    pub fixed: Vec<(&'static Parameter, f64)>,
+    /// `numberOfTestRuns` of the file.
+    pub runs: u64,
+    /// `randomSeed` of the file.
+    pub seed: Option<u64>,
+}
+
+/// A sample's point: values in the units of the parameters, and the draws that it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sampled {
+    /// One per parameter.
+    pub values: Vec<f64>,
+    /// From 1.
+    pub tries: u32,
+}
+
+struct SampledCases {
+    cases: Vec<LaneCase<f64>>,
+    tables: Tables<f64>,
+}
+
+impl CaseSource for SampledCases {
+    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
+        self.cases[unit as usize]
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.tables
+    }
+}
+
+impl DistributionSamples {
+    /// The random parameters of a file.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a deterministic file, for parameters that are missing or there twice; as [`Names::find`];
+    /// [`Error::Input`] where a parameter's range holds nothing of its distribution.
+    pub fn of(
+        file: &DistributionFile,
+        names: &Names,
+        fixed: Vec<(&'static Parameter, f64)>,
+    ) -> Result<DistributionSamples> {
+        names.check_renames(&file.names())?;
+        let Distributions::Stochastic(Stochastic { runs, seed, parameters: of_file }) = &file.distributions else {
+            let problem = format!("{} lists values, and has no probabilities", file.path.display());
+            let help = "map them: lanesweep map CATEGORY --distribution FILE";
+            return Err(Error::usage(Place::item("--distribution"), problem, help));
+        };
+        let mut parameters: Vec<SampledParameter> = Vec::new();
+        for (name, line, distribution) in of_file {
+            let (parameter, factor) = names.find(name, *line)?;
+            let within = Range { low: parameter.least / factor, high: parameter.most / factor };
+            let (draw, kept_share) = distribution.within(within).ok_or_else(|| {
+                let place = Place::file(names.path).row(*line).of(format!("parameter `{name}`"));
+                let problem =
+                    format!("none of its values lies in {} … {} {}", parameter.least, parameter.most, parameter.unit);
+                Error::input(place, problem, "correct the distribution, or its unit with --rename")
+            })?;
+            parameters.push(SampledParameter { parameter, draw, factor, kept_share });
+        }
+        let given: Vec<&Parameter> =
+            parameters.iter().map(|p| p.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
+        for (at, parameter) in given.iter().enumerate() {
+            if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
+                let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
+                return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
+            }
+        }
+        // The headway is a flag's where it is no parameter.
+        let has = |quantity| {
+            let is_given = given.iter().any(|p| p.quantity == quantity);
+            is_given || (quantity == Quantity::Thw && !given.iter().any(|p| p.quantity == Quantity::Gap))
+        };
+        check_complete(names.category, false, &has, ("a sample", "give it a distribution, or a value by --set"))?;
+        Ok(DistributionSamples { category: names.category, parameters, fixed, runs: *runs, seed: *seed })
+    }
+
+    /// Is the initial distance one of the parameters?
+    pub fn has_distance(&self) -> bool {
+        let given = self.parameters.iter().map(|p| p.parameter).chain(self.fixed.iter().map(|(p, _)| *p));
+        given.into_iter().any(|p| matches!(p.quantity, Quantity::Gap | Quantity::Thw))
+    }
+
+    /// The point of a sample: the first of its draws that is a case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where none of [`ATTEMPTS`] is one.
+    pub fn draw(&self, seed: u64, index: u64, profile: &Profile) -> Result<Sampled> {
+        self.drawn(seed, index, profile).map(|(sampled, _, _)| sampled)
+    }
+
+    fn drawn(&self, seed: u64, index: u64, profile: &Profile) -> Result<(Sampled, Point, Case)> {
+        let mut draws = Draws::new(Stream { seed, purpose: DISTRIBUTION_PURPOSE }, index);
+        let mut reason = None;
+        for attempt in 1..=ATTEMPTS {
+            let values: Vec<f64> = self.parameters.iter().map(|p| p.value(draws.uniform())).collect();
+            let mut point = Point::default();
+            let random = self.parameters.iter().map(|p| p.parameter).zip(values.iter().copied());
+            for (parameter, value) in self.fixed.iter().copied().chain(random) {
+                point.set(parameter, value);
+            }
+            match point.plain_case(self.category, profile).case(profile.frame.time_cap_s) {
+                Ok(case) => return Ok((Sampled { values, tries: attempt }, point, case)),
+                Err(error) => reason = Some(error),
+            }
+        }
+        let why = reason.map_or(String::new(), |error| format!(", the last because {error}"));
+        let problem = format!("sample {index}: none of {ATTEMPTS} draws is a case{why}");
+        Err(Error::usage(
+            Place::item("--distribution"),
+            problem,
+            "change the distributions so that most draws are cases",
+        ))
+    }
+
+    /// The plan whose unit `i` is sample `i`, and the draws in all. Headways are those given, or the parameter's own.
+    ///
+    /// # Errors
+    /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than [`MOST_SAMPLES`], and for headways
+    /// beside a parameter.
+    pub fn plan(
+        &self,
+        (samples, seed): (u64, u64),
+        profile: &Profile,
+        models: &[ModelId],
+        headways: &[Headway],
+    ) -> Result<(LanePlan, u64)> {
+        if !(1..=MOST_SAMPLES).contains(&samples) {
+            let problem = format!("{samples} samples of a distribution file cannot be run");
+            let help = format!("give --samples from 1 to {MOST_SAMPLES}: their cases are kept in memory");
+            return Err(Error::usage(Place::item("--samples"), problem, help));
+        }
+        let own = [Headway::GapM(0.0)];
+        let headways = if self.has_distance() { &own[..] } else { headways };
+        let mut source = SampledCases { cases: Vec::with_capacity(samples as usize), tables: Tables::default() };
+        let mut tries = 0;
+        for index in 0..samples {
+            let (sampled, point, case) = self.drawn(seed, index, profile)?;
+            tries += u64::from(sampled.tries);
+            let of_headway = point.get(Quantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
+            let gap_m = point.get(Quantity::Gap).or(of_headway).unwrap_or(0.0);
+            let mut encoded = LaneCase::encode(&case, profile, &mut source.tables);
+            encoded.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
+            source.cases.push(encoded);
+        }
+        let block = Block {
+            category: self.category,
+            units: Units::Numbered(samples),
+            variants: vec![VARIANT.to_owned()],
+            first_unit: 0,
+            first_lane: 0,
+        };
+        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways.to_vec(), vec![block], Box::new(source))?;
+        Ok((plan, tries))
+    }
+}
+
+impl SampledParameter {
+    /// The value of a uniform number, in the parameter's unit.
+    fn value(&self, uniform: f64) -> f64 {
+        (self.draw.value(uniform) * self.factor).clamp(self.parameter.least, self.parameter.most)
+    }
+}

@@ -1,0 +1,77 @@
+//! Deterministic distributions as the axes of a grid.
+
+use super::distribution_file::{Deterministic, DistributionFile, Distributions};
+use super::parameters::Names;
+use crate::run::grid::{GridAxis, MOST_PANELS, Parameter};
+use crate::{Error, Place, Result};
+
+/// What a deterministic file varies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variations {
+    /// Parameters of their own, in the file's order; values rise.
+    pub axes: Vec<GridAxis>,
+    /// Parameters that belong together; values are those of all rows.
+    pub set_axes: Vec<GridAxis>,
+    /// Their rows: every combination of the file's value sets. One empty row where there are none.
+    pub set_rows: Vec<Vec<f64>>,
+}
+
+/// The variations of a file.
+///
+/// # Errors
+/// [`Error::Usage`] for a stochastic file; as [`Names::find`] and [`Names::value`]; [`Error::Input`] for a value that is
+/// there twice, and for too many combinations of sets.
+pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> {
+    names.check_renames(&file.names())?;
+    let Distributions::Deterministic(list) = &file.distributions else {
+        let problem = format!("{} holds random parameters", file.path.display());
+        let help = "draw from them: lanesweep sample --distribution FILE --category NAME";
+        return Err(Error::usage(Place::item("--distribution"), problem, help));
+    };
+    let mut all = Variations { axes: Vec::new(), set_axes: Vec::new(), set_rows: vec![Vec::new()] };
+    for one in list {
+        match one {
+            Deterministic::Values { name, line, values } => {
+                let found = names.find(name, *line)?;
+                let values = values.iter().map(|v| names.value(found, *v, *line)).collect::<Result<Vec<_>>>()?;
+                let sorted = rising(&values);
+                if sorted.len() < values.len() {
+                    let place = Place::file(&file.path).row(*line).of(format!("parameter `{name}`"));
+                    return Err(Error::input(place, "a value is there twice", "give every value once"));
+                }
+                all.axes.push(GridAxis { parameter: found.0, values: sorted });
+            }
+            Deterministic::Sets { names: of_set, line, rows } => {
+                let found: Vec<(&'static Parameter, f64)> =
+                    of_set.iter().map(|name| names.find(name, *line)).collect::<Result<_>>()?;
+                let row = |row: &Vec<f64>| {
+                    found.iter().zip(row).map(|(f, v)| names.value(*f, *v, *line)).collect::<Result<Vec<f64>>>()
+                };
+                let rows = rows.iter().map(row).collect::<Result<Vec<_>>>()?;
+                if all.set_rows.len().saturating_mul(rows.len()) > MOST_PANELS {
+                    let place = Place::file(&file.path).row(*line);
+                    let help = format!("a map has {MOST_PANELS} panels at most: give fewer sets");
+                    return Err(Error::input(place, "the sets make too many combinations", help));
+                }
+                for (at, (parameter, _)) in found.iter().enumerate() {
+                    let values = rising(&rows.iter().map(|row| row[at]).collect::<Vec<_>>());
+                    all.set_axes.push(GridAxis { parameter, values });
+                }
+                let joined = |before: &Vec<f64>| {
+                    let before = before.clone();
+                    rows.iter().map(move |row| [&before[..], row].concat()).collect::<Vec<_>>()
+                };
+                all.set_rows = all.set_rows.iter().flat_map(joined).collect();
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Every value once, in rising order.
+fn rising(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    sorted
+}

@@ -1,0 +1,67 @@
+//! Collision: the boxes overlap along and across the road. Side contacts count.
+
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+
+/// How two vehicles touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Contact {
+    /// They do not.
+    None,
+    /// Type 1: the other vehicle hits the ego from the side or behind (x_e > x_o, centres).
+    BySide,
+    /// Type 2: the ego's front hits the other vehicle.
+    Frontal,
+}
+
+impl Contact {
+    /// 0, 1 or 2, as the tables have it.
+    pub fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// In words: the ego drives into the other one's rear end, or the other one comes from the side or behind.
+    pub fn label(self) -> &'static str {
+        match self {
+            Contact::None => "no contact",
+            Contact::BySide => "side contact",
+            Contact::Frontal => "rear-end contact",
+        }
+    }
+}
+
+/// Do the boxes overlap at one step? Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
+#[inline(always)]
+pub fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
+    lateral_gap.is_negative() & overlaps_along(gap, half_lengths)
+}
+
+/// The part of [`overlaps`] along the road.
+#[inline(always)]
+pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
+    gap.is_negative() & (gap + half_lengths + half_lengths).is_positive()
+}
+
+/// The gap after a step between vehicles that overlap across the road at its end, given the gaps before and after it.
+///
+/// Where the step leads their centres past each other, the vehicles are held in the contact: with the centres side by
+/// side if the other was wholly ahead before, half of that behind if it was wholly behind. Otherwise `after`.
+#[inline(always)]
+pub fn held_in_contact<R: Real>(before: R, after: R, half_lengths: R) -> R {
+    let was_behind = !(before + half_lengths + half_lengths).is_positive();
+    let passes = !(after + half_lengths).is_negative();
+    let from_behind = (was_behind & passes).choose(-(half_lengths * R::from_f64(1.5)), after);
+    before.is_negative().choose(from_behind, after.larger(-half_lengths))
+}
+
+/// Contact at one step.
+#[inline(always)]
+pub fn contact<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Contact {
+    if !overlaps(gap, half_lengths, lateral_gap).holds() {
+        Contact::None
+    } else if (gap + half_lengths).is_negative().holds() {
+        Contact::BySide
+    } else {
+        Contact::Frontal
+    }
+}

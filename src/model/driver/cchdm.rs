@@ -1,0 +1,161 @@
+//! CCHDM: the careful and competent human driver of UN R157, Annex 3. Perceives a cut-in, coasts for the
+//! delay, then ramps up to 0.774 g.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_bound_s,
+    delay_steps, latched_braking,
+};
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+use crate::model::case::Category;
+
+/// Constants of the model as a profile gives them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CchdmProfile {
+    /// The check opens below this lateral gap, m; 0 means that the vehicles overlap across the road.
+    pub lateral_gate_m: f64,
+    /// Absolute time to collision at which the driver reacts, s (Annex 3: 2.0 s).
+    pub ttc_s: f64,
+    /// Delay between perception and braking, s (the paper 0.6 s; Annex 3 and the JRC 0.75 s).
+    pub delay_s: f64,
+    /// Deceleration while the delay runs: the foot is off the accelerator, m/s² (0.4).
+    pub coasting_mps2: f64,
+    /// Jerk of the ramp, m/s³ (12.65).
+    pub jerk_mps3: f64,
+    /// Largest deceleration, m/s² (0.774 g).
+    pub max_deceleration_mps2: f64,
+    /// Categories in which the driver brakes from the first moment of attention on, without a TTC check.
+    pub always_unsafe: Vec<Category>,
+    /// Lateral wandering that counts as normal: risk perception begins beyond it, m (Annex 3: 0.375 m);
+    /// 0 switches the perception rule off.
+    pub wandering_m: f64,
+    /// Risk perception time after the wandering was exceeded, s (Annex 3: 0.4 s).
+    pub perception_time_s: f64,
+    /// Lateral travel that ends the perception early, m (Annex 3: 0.72 m).
+    pub perception_travel_m: f64,
+    /// LVD: perception begins once the leader decelerates more than this, m/s² (Annex 3: 5 m/s²);
+    /// 0 switches the rule off.
+    pub lead_deceleration_trigger_mps2: f64,
+    /// The JRC's cut-in sweep aborts a run at any step with lateral overlap and |TTC| above `ttc_s`.
+    pub abort_on_large_ttc: bool,
+}
+
+/// The model at one time step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cchdm<R> {
+    always_unsafe: bool,
+    lateral_gate: R,
+    ttc: R,
+    coasting: R,
+    jerk_per_step: R,
+    max_deceleration: R,
+    delay_steps: u32,
+    dt: R,
+}
+
+impl DriverProfile for CchdmProfile {
+    type Model<R: Real> = Cchdm<R>;
+
+    fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Cchdm<R> {
+        Cchdm {
+            always_unsafe: self.always_unsafe.contains(&category),
+            lateral_gate: R::from_f64(self.lateral_gate_m),
+            ttc: R::from_f64(self.ttc_s),
+            coasting: R::from_f64(self.coasting_mps2),
+            jerk_per_step: R::from_f64(self.jerk_mps3 * dt_s),
+            max_deceleration: R::from_f64(self.max_deceleration_mps2),
+            delay_steps: delay_steps(self.delay_s, dt_s),
+            dt: R::from_f64(dt_s),
+        }
+    }
+
+    fn bounds(&self) -> Vec<(&'static str, f64, Bound)> {
+        vec![
+            ("jerk_mps3", self.jerk_mps3, Bound::JERK),
+            ("max_deceleration_mps2", self.max_deceleration_mps2, Bound::DECELERATION),
+            ("ttc_s", self.ttc_s, Bound::DELAY),
+            ("delay_s", self.delay_s, Bound::DELAY),
+            ("coasting_mps2", self.coasting_mps2, Bound::ACCELERATION),
+            ("wandering_m", self.wandering_m, Bound::DISTANCE),
+            ("perception_time_s", self.perception_time_s, Bound::DELAY),
+            ("perception_travel_m", self.perception_travel_m, Bound::DISTANCE),
+            ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::ACCELERATION),
+            ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
+        ]
+    }
+
+    fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
+        vec![("delay_s", delay_bound_s(self.delay_s)), ("perception_time_s", delay_bound_s(self.perception_time_s))]
+    }
+
+    fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
+        let perception = Perception {
+            wandering_m: self.wandering_m,
+            time_s: self.perception_time_s,
+            travel_m: self.perception_travel_m,
+        };
+        match category {
+            Category::Lvd => AttentionRule::after_deceleration(self.lead_deceleration_trigger_mps2, dt_s),
+            Category::CutIn | Category::CutOut => AttentionRule::after_wandering(perception, dt_s, category),
+        }
+    }
+
+    fn abort_above_ttc_s(&self) -> f64 {
+        if self.abort_on_large_ttc { self.ttc_s } else { 0.0 }
+    }
+}
+
+impl<R: Real> DriverModel<R> for Cchdm<R> {
+    const SEES_LATERAL_SPEED: bool = false;
+    const SEES_OWN_ACCELERATION: bool = false;
+
+    #[inline(always)]
+    fn safe_gap(&self, v_ego: R, v_other: R) -> R {
+        if self.always_unsafe { R::INFINITY } else { self.ttc * (v_ego - v_other).abs() }
+    }
+
+    #[inline(always)]
+    fn ignores(&self, lateral_gap: R, _lateral_towards: R) -> Flag {
+        !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
+    }
+
+    /// The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
+    #[inline(always)]
+    fn initial(&self) -> DriverState<R> {
+        DriverState { deceleration: self.coasting, delay_steps: self.delay_steps }
+    }
+
+    /// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver goes on braking below the other's
+    /// speed until the opening gap exceeds 2 s of |dv|.
+    #[inline(always)]
+    fn check(&self, view: &View<R>) -> Hazard<R> {
+        let dv = view.closing();
+        let near = view.lateral_gap.is_at_most(self.lateral_gate);
+        let moves = dv.is_negative() | dv.is_positive();
+        let soon = moves & view.gap.abs().is_at_most(self.ttc * dv.abs());
+        let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
+        Hazard { is_unsafe, demand: self.max_deceleration }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
+            ("driver_lateral_gate", self.lateral_gate.to_f64()),
+            ("driver_ttc", self.ttc.to_f64()),
+            ("driver_coasting", self.coasting.to_f64()),
+            ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
+            ("driver_max_deceleration", self.max_deceleration.to_f64()),
+            ("driver_delay_steps", f64::from(self.delay_steps)),
+        ]
+    }
+
+    /// Coast at 0.4 m/s² during the delay, then ramp at 12.65 m/s³ up to 0.774 g.
+    #[inline(always)]
+    fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
+        let braking = (state.deceleration + self.jerk_per_step).smaller(hazard.demand);
+        latched_braking(state, self.coasting, braking, v_ego, self.dt)
+    }
+}

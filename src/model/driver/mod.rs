@@ -1,0 +1,312 @@
+//! The reference drivers of UN R157 and its companions: one file per model, each with its constants
+//! (unit, clause), its check and its reaction, written once over [`Real`].
+//!
+//! Here lives what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. Here lives
+//! no time loop: the latched step stands once, in [`crate::engine`]. Parameters come from a profile;
+//! decisions go to the lane's frame.
+//!
+//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`). A worked
+//! example, which a test builds and runs, stands in `examples/adding-a-driver-model`.
+
+#[macro_use]
+mod registry;
+
+mod attention;
+mod profile;
+
+pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
+pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
+
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
+
+/// Makes the modules, their public names and [`ModelId`] from the registry.
+macro_rules! declare_models {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        $(
+            mod $file;
+            pub use $file::{$model, $profile};
+        )+
+
+        /// A driver model, in the order of every table.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+        pub enum ModelId {
+            $(
+                #[doc = concat!("See [`", stringify!($model), "`].")]
+                #[serde(rename = $name)]
+                $model,
+            )+
+        }
+
+        impl ModelId {
+            /// All, in the order of every table.
+            pub const ALL: [ModelId; MODELS] = [$(ModelId::$model),+];
+
+            /// Name in tables, files and lane keys.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(ModelId::$model => $name,)+
+                }
+            }
+        }
+
+        /// Number of driver models.
+        pub const MODELS: usize = [$($name),+].len();
+    };
+}
+for_every_driver_model!(declare_models);
+
+pub use fsm::CfsStep;
+
+impl ModelId {
+    /// From its name, whatever the case; `CC` and `CC_human_driver` are the JRC's names of CCHDM.
+    pub fn parse(text: &str) -> Option<ModelId> {
+        let folded = text.to_ascii_lowercase();
+        match folded.as_str() {
+            "cc" | "cc_human_driver" => Some(ModelId::Cchdm),
+            _ => ModelId::ALL.into_iter().find(|m| m.name().to_ascii_lowercase() == folded),
+        }
+    }
+
+    /// The names of all, as messages list them: `Reg157, CCHDM, RSS, FSM`.
+    pub fn names() -> String {
+        ModelId::ALL.map(ModelId::name).join(", ")
+    }
+
+    /// Position in [`ModelId::ALL`].
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// What the ego's driver sees of one other vehicle at one step. The ego is in the middle of its lane.
+#[derive(Debug, Clone, Copy)]
+pub struct View<R> {
+    /// v_e, m/s.
+    pub v_ego: R,
+    /// Acceleration of the ego over the last step, m/s²; 0 at the start.
+    pub a_ego: R,
+    /// v_o, m/s.
+    pub v_other: R,
+    /// g: signed gap, bumper to bumper, m; negative when the vehicles overlap along the road.
+    pub gap: R,
+    /// h: gap across the road, m; negative when they overlap across it.
+    pub lateral_gap: R,
+    /// w: lateral speed of the other vehicle towards the ego, m/s.
+    pub lateral_towards: R,
+    /// (L_e + L_o)/2, m: the centre distance is `gap + half_lengths`.
+    pub half_lengths: R,
+}
+
+impl<R: Real> View<R> {
+    /// dv = v_e − v_o: closing speed, m/s.
+    #[inline(always)]
+    pub fn closing(&self) -> R {
+        self.v_ego - self.v_other
+    }
+
+    /// x_e > x_o: the other vehicle's centre is behind the ego's.
+    #[inline(always)]
+    pub fn is_behind(&self) -> Flag {
+        (self.gap + self.half_lengths).is_negative()
+    }
+}
+
+/// The result of a check.
+#[derive(Debug, Clone, Copy)]
+pub struct Hazard<R> {
+    /// The situation is unsafe: the driver reacts.
+    pub is_unsafe: Flag,
+    /// Deceleration that the driver asks for, m/s²; models without a demand ask for their largest.
+    pub demand: R,
+}
+
+/// Latched state of the ego's driver; never reset within a lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriverState<R> {
+    /// Deceleration reached so far, m/s².
+    pub deceleration: R,
+    /// Steps of the reaction time that are left; counted down on unsafe steps only.
+    pub delay_steps: u32,
+}
+
+/// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
+pub trait DriverModel<R: Real>: Copy + Send + Sync {
+    // What follows is what a model promises, and saves batches of lanes trouble; without a word from a model they
+    // assume nothing. What it says has to be tested: verdicts would differ from those of single lanes.
+
+    /// Its check looks at [`View::lateral_towards`].
+    const SEES_LATERAL_SPEED: bool = true;
+
+    /// Its check looks at [`View::a_ego`].
+    const SEES_OWN_ACCELERATION: bool = true;
+    /// Its reaction looks at [`DriverState::deceleration`].
+    const KEEPS_DECELERATION: bool = true;
+
+    /// Safe distance, m ≥ 0: while both keep their speeds, m/s, a vehicle that overlaps with the ego across the road is
+    /// safe at every larger gap. Rounding may be left to the caller; infinite where nothing is promised.
+    #[inline(always)]
+    fn safe_gap(&self, _v_ego: R, _v_other: R) -> R {
+        R::INFINITY
+    }
+
+    /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap,
+    /// at all speeds and whatever the ego's acceleration. To be decided by the comparisons of the check itself, which is
+    /// not asked again, and without the lateral speed where the check does not see it.
+    #[inline(always)]
+    fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
+        Flag::FALSE
+    }
+
+    /// The two that follow are there, and the reaction neither accelerates the ego nor begins to wait again.
+    const KNOWS_EASE: bool = false;
+
+    /// Distance, m ≥ 0, beyond which the driver is at ease with a vehicle that overlaps with the ego across the road
+    /// and keeps its speed: [`DriverModel::check_at_ease`] says what the check says, whatever the ego's deceleration.
+    /// Not larger at a smaller speed of the ego, m/s. Rounding may make it too small by a thousandth and a millimetre.
+    #[inline(always)]
+    fn ease_gap(&self, _v_ego: R, _v_other: R) -> R {
+        R::INFINITY
+    }
+
+    /// The part of the check that is left at ease: unsafe exactly where the check is, with the same demand there, and
+    /// with less work. It sees speeds, gap and lengths; all else of the view is not the lane's.
+    #[inline(always)]
+    fn check_at_ease(&self, view: &View<R>) -> Hazard<R> {
+        self.check(view)
+    }
+
+    /// State at the start of a lane.
+    fn initial(&self) -> DriverState<R>;
+    /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
+    fn check(&self, view: &View<R>) -> Hazard<R>;
+    /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.
+    fn shader_constants(&self) -> Vec<(&'static str, f64)>;
+    /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0 and not above `v_ego`.
+    fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R);
+}
+
+/// One unsafe step of any model: the reaction time is paid once, coasting; then the deceleration
+/// follows `braking`, and the speed stops at 0.
+#[inline(always)]
+fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_ego: R, dt: R) -> (DriverState<R>, R) {
+    let waiting = Flag::reached(state.delay_steps, 1);
+    let applied = waiting.choose(coasting, braking);
+    let deceleration = waiting.choose(state.deceleration, braking);
+    let delay_steps = state.delay_steps - waiting.one();
+    let v_next = (v_ego - applied * dt).larger(R::ZERO);
+    (DriverState { deceleration, delay_steps }, v_next)
+}
+
+/// Whole steps of a delay. Resolved in f64: in f32, 0.6 s / 0.04 s would come out as 16 steps.
+fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
+    ((delay_s / dt_s - 1e-9).ceil().max(0.0) as u32).min(Flag::LATEST_STEP)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::case::Category;
+    use crate::model::profile::Profile;
+    use crate::stats::random::{philox4x32_10, unit_uniform};
+
+    #[test]
+    fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {
+        assert_eq!(delay_steps(0.75, 0.1), 8);
+        assert_eq!(delay_steps(0.35, 0.1), 4);
+        assert_eq!(delay_steps(0.6, 0.04), 15);
+        assert_eq!(delay_steps(0.0, 0.04), 0);
+        // Never, as a step that lanes can count down from.
+        assert_eq!(delay_steps(f64::MAX, 0.04), Flag::LATEST_STEP);
+    }
+
+    /// What a model promises about gaps and vehicles beside the lane, on random vehicles: it keeps the promise, and
+    /// promises as much as it can.
+    fn keeps_its_promises<M: DriverModel<f32>>(name: &str, model: M) {
+        let mut drawn = 0;
+        let mut between = |least: f32, most: f32| {
+            drawn += 1;
+            least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
+        };
+        let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
+        let (mut at_ease, mut uneasy_below) = (0, 0);
+        for _ in 0..200_000 {
+            let (v_ego, v_other) = (between(0.0, 45.0), between(0.0, 45.0));
+            let view = View {
+                v_ego,
+                a_ego: 0.0,
+                v_other,
+                gap: between(0.0, 200.0),
+                lateral_gap: between(-2.0, 0.0),
+                lateral_towards: between(-2.0, 2.0),
+                half_lengths: between(3.0, 10.0),
+            };
+            let safe_gap = model.safe_gap(v_ego, v_other);
+            let is_unsafe = model.check(&view).is_unsafe.holds();
+            if view.gap > 1.001 * safe_gap + 0.001 {
+                assert!(!is_unsafe, "{name}: {view:?} is unsafe beyond {safe_gap} m");
+                safe += 1;
+            } else if is_unsafe && view.gap > 0.9 * safe_gap {
+                unsafe_below += 1;
+            }
+            let (lateral_gap, gap, a_ego) = (between(0.0, 4.0), between(-20.0, 50.0), between(-10.0, 0.0));
+            let beside = View { lateral_gap, gap, a_ego, ..view };
+            let is_unsafe = model.check(&beside).is_unsafe.holds();
+            if model.ignores(beside.lateral_gap, beside.lateral_towards).holds() {
+                assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");
+                ignored += 1;
+            }
+            if !M::KNOWS_EASE {
+                assert_eq!(model.ease_gap(v_ego, v_other), f32::INFINITY, "{name}");
+                continue;
+            }
+            let (ease_gap, slowing) = (model.ease_gap(v_ego, v_other), View { a_ego: between(-10.0, 0.0), ..view });
+            let said =
+                |hazard: Hazard<f32>| (hazard.is_unsafe.holds(), hazard.is_unsafe.holds().then_some(hazard.demand));
+            let hazard = model.check(&slowing);
+            // All else is not the lane's in batches.
+            let seen = View { a_ego: 0.0, lateral_gap: -1.9, lateral_towards: 0.0, ..slowing };
+            let is_same = said(hazard) == said(model.check_at_ease(&seen));
+            if view.gap > 1.001 * ease_gap + 0.001 {
+                assert!(is_same, "{name}: {slowing:?} is not all at ease beyond {ease_gap} m");
+                let state = DriverState { deceleration: -slowing.a_ego, delay_steps: 0 };
+                let (reacting, v_next) = model.react(state, &hazard, v_ego);
+                let reacts_well = v_next <= v_ego && reacting.delay_steps == 0;
+                assert!(!hazard.is_unsafe.holds() || reacts_well, "{name}: {slowing:?}");
+                assert!(model.ease_gap(v_ego - between(0.0, 1.0) * v_ego, v_other) <= ease_gap, "{name}: {slowing:?}");
+                at_ease += 1;
+            } else if !is_same && view.gap > 0.9 * ease_gap {
+                uneasy_below += 1;
+            }
+        }
+        assert!(!M::KNOWS_EASE || at_ease > 1000 && uneasy_below > 100, "{name}: {at_ease}, {uneasy_below}");
+        assert!(safe > 1000 && ignored > 1000, "{name}: {safe} safe, {ignored} ignored");
+        assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
+    }
+
+    /// Of the models that come with the crate.
+    #[test]
+    fn models_keep_their_promises_under_every_profile() {
+        for name in Profile::names() {
+            let profile = Profile::load(name).unwrap();
+            let dt_s = profile.frame.dt_s;
+            let always = |categories: &[Category]| categories.contains(&Category::CutOut);
+            if !always(&profile.reg157.always_unsafe) {
+                keeps_its_promises(name, profile.reg157.resolve::<f32>(dt_s, Category::CutOut));
+            }
+            if !always(&profile.cchdm.always_unsafe) {
+                keeps_its_promises(name, profile.cchdm.resolve::<f32>(dt_s, Category::CutOut));
+            }
+            keeps_its_promises(name, profile.rss.resolve::<f32>(dt_s, Category::CutOut));
+            keeps_its_promises(name, profile.fsm.resolve::<f32>(dt_s, Category::CutOut));
+        }
+    }
+
+    #[test]
+    fn model_names_survive_a_round_trip() {
+        for model in ModelId::ALL {
+            assert_eq!(ModelId::parse(model.name()), Some(model));
+        }
+        assert_eq!(ModelId::parse("CC_human_driver"), Some(ModelId::Cchdm));
+    }
+}

@@ -1,0 +1,397 @@
+//! Profiles: every constant and every named option of models, criteria and frame as data (TOML).
+//!
+//! A profile is resolved at a time step into plain constants; nothing below it knows strings.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::criterion::CriteriaProfile;
+use crate::model::driver::{self, Bound, DriverProfile, ModelId};
+use crate::support::input_file;
+use crate::support::near_name::nearest;
+use crate::support::toml_file;
+use crate::{Error, Place, Result};
+
+/// Which vehicles the ego's driver heeds in a cut-out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutOutTarget {
+    /// Both vehicles are checked each step; the nearest unsafe one drives the reaction.
+    NearestUnsafe,
+    /// Nothing until the cutting-out centre is more than 0.375 m off, then the vehicle ahead alone; a
+    /// cutting-out vehicle that hits it freezes there and becomes the target (the JRC's simulator).
+    Exposed,
+}
+
+/// Which vehicles the criteria judge in a cut-out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutOutJudged {
+    /// Every other vehicle; the worst counts (the paper's words on criteria).
+    Every,
+    /// The vehicle ahead only: contacts with the cutting-out one and its TTC and BTN are ignored.
+    Ahead,
+}
+
+/// The frame around the models.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameProfile {
+    /// Time step, s.
+    pub dt_s: f64,
+    /// A run ends here at the latest, s.
+    pub time_cap_s: f64,
+    /// Positions are cumulative sums: index 0 is one step after the nominal start.
+    pub start_shift: bool,
+    /// Runs stop where nothing can happen any more; otherwise they go on to the cap.
+    pub end_when_settled: bool,
+    /// Whom the driver heeds in a cut-out.
+    pub cut_out_target: CutOutTarget,
+    /// Whom the criteria judge in a cut-out.
+    pub cut_out_judged: CutOutJudged,
+    /// Exposure threshold of `exposed`, m.
+    pub exposure_m: f64,
+    /// Length of vehicles without a size, m.
+    pub default_length_m: f64,
+    /// Width of vehicles without a size, m.
+    pub default_width_m: f64,
+}
+
+impl FrameProfile {
+    /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
+    pub fn step_cap(&self) -> u32 {
+        (self.time_cap_s / self.dt_s - 1e-9).ceil() as u32
+    }
+}
+
+/// Makes [`Profile`] with one table per driver model of the registry.
+macro_rules! declare_profile {
+    ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
+        /// A profile: everything that the lanes' physics takes from outside the cases.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Profile {
+            /// Name.
+            pub name: String,
+            /// One sentence.
+            pub description: String,
+            /// Time and geometry.
+            pub frame: FrameProfile,
+            /// Criteria.
+            pub criteria: CriteriaProfile,
+            $(
+                #[doc = $name]
+                $(#[$attribute])*
+                pub $file: driver::$profile,
+            )+
+        }
+
+        impl Profile {
+            /// The numbers of every driver model: key, value, range.
+            fn driver_bounds(&self) -> Vec<(String, f64, Bound)> {
+                let mut all = Vec::new();
+                $(
+                    let table = stringify!($file);
+                    all.extend(self.$file.bounds().into_iter().map(|(k, v, b)| (format!("{table}.{k}"), v, b)));
+                )+
+                all
+            }
+
+            /// What bounds the time step of these driver models: key, longest step, s.
+            fn driver_time_step_bounds(&self, models: &[ModelId]) -> Vec<(String, f64)> {
+                let mut all = Vec::new();
+                $(
+                    if models.contains(&ModelId::$model) {
+                        let table = stringify!($file);
+                        let bounds = self.$file.time_step_bounds(self.frame.dt_s);
+                        all.extend(bounds.into_iter().map(|(k, s)| (format!("{table}.{k}"), s)));
+                    }
+                )+
+                all
+            }
+        }
+    };
+}
+for_every_driver_model!(declare_profile);
+
+const BUILT_IN: [(&str, &str); 4] = [
+    ("paper", include_str!("../../configs/profiles/paper.toml")),
+    ("paper-fit", include_str!("../../configs/profiles/paper-fit.toml")),
+    ("jrc-2021", include_str!("../../configs/profiles/jrc-2021.toml")),
+    ("un-r157", include_str!("../../configs/profiles/un-r157.toml")),
+];
+
+impl Profile {
+    /// Names of the profiles that ship with the program.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// The files of those profiles, in the same order.
+    pub(crate) fn files() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(_, text)| *text)
+    }
+
+    /// A profile by name, or from a TOML file where the text is a path.
+    pub fn load(name_or_path: &str) -> Result<Profile> {
+        if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
+            return Profile::parse(text, &Place::item(format!("built-in profile {name}")));
+        }
+        let path = Path::new(name_or_path);
+        if !path.exists() && !name_or_path.ends_with(".toml") {
+            let near = nearest(name_or_path, Profile::names(), 0.0).unwrap_or("paper");
+            return Err(Error::usage(
+                Place::item("--profile"),
+                format!("there is no profile `{name_or_path}`"),
+                format!(
+                    "did you mean `{near}`? Profiles: {}; or give the path of a TOML file",
+                    Profile::names().collect::<Vec<_>>().join(", ")
+                ),
+            ));
+        }
+        let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
+        Profile::parse(&text, &Place::file(path))
+    }
+
+    fn parse(text: &str, place: &Place) -> Result<Profile> {
+        let help = "compare with configs/profiles/paper.toml, which has every key with its unit";
+        let profile: Profile = toml_file::parse(text, place, help)?;
+        profile.check(place)?;
+        Ok(profile)
+    }
+
+    /// Every constant that is a number: key, value, range.
+    pub(crate) fn bounds(&self) -> Vec<(String, f64, Bound)> {
+        let (frame, criteria) = (&self.frame, &self.criteria);
+        let own = [
+            ("frame.dt_s", frame.dt_s, Bound::TIME_STEP),
+            ("frame.time_cap_s", frame.time_cap_s, Bound::TIME_CAP),
+            ("frame.default_length_m", frame.default_length_m, Bound::SIZE),
+            ("frame.default_width_m", frame.default_width_m, Bound::SIZE),
+            ("frame.exposure_m", frame.exposure_m, Bound::DISTANCE),
+            ("criteria.ttc_threshold_s", criteria.ttc_threshold_s, Bound::TIME),
+            ("criteria.btn_threshold", criteria.btn_threshold, Bound::RATIO),
+            ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::DECELERATION),
+            ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::JERK),
+        ];
+        let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
+        own.chain(self.driver_bounds()).collect()
+    }
+
+    /// Every constant must be finite and in its range; `place` names the profile in the error.
+    pub fn check(&self, place: &Place) -> Result<()> {
+        let bad = self.bounds().into_iter().find(|(_, value, bound)| !bound.holds(*value));
+        if let Some((key, value, expected)) = bad {
+            return Err(Error::usage(
+                place.clone().of(format!("`{key}`")),
+                format!("{value} is not usable; expected {expected}"),
+                "the chapter on profiles has the range of every key, configs/profiles/paper.toml usual values",
+            ));
+        }
+        if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
+            return Err(Error::usage(
+                place.clone().of("`frame.dt_s`"),
+                format!("{} s with a cap of {} s is not usable", self.frame.dt_s, self.frame.time_cap_s),
+                "use a time step of at most 1 s and at most 4 million steps per run",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Is the time step short enough for these drivers and the TTC threshold? Derivation: docs/src/methods/lane.md, time
+    /// step.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the longest time step and the key that bounds it.
+    pub fn check_time_step(&self, models: &[ModelId]) -> Result<()> {
+        let threshold_s = self.criteria.ttc_threshold_s.max(driver::SHORT_STEP_S);
+        let mut bounds = self.driver_time_step_bounds(models);
+        bounds.push(("criteria.ttc_threshold_s".to_owned(), threshold_s));
+        let Some((key, longest_s)) = bounds.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
+        if self.frame.dt_s <= longest_s {
+            return Ok(());
+        }
+        Err(Error::usage(
+            Place::item("`frame.dt_s`"),
+            format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
+            format!("use a time step (--dt) of at most {longest_s} s, or leave out the driver model that needs it"),
+        ))
+    }
+
+    /// The same profile at another time step.
+    pub fn with_dt(mut self, dt_s: f64) -> Result<Profile> {
+        if !(dt_s > 0.0 && dt_s.is_finite()) {
+            let problem = format!("{dt_s} s is no time step");
+            return Err(Error::usage(Place::item("--dt"), problem, "give seconds above 0, such as 0.04 or 0.1"));
+        }
+        self.frame.dt_s = dt_s;
+        self.check(&Place::item("--dt"))?;
+        Ok(self)
+    }
+
+    /// Steps that a run evaluates at most.
+    pub fn step_cap(&self) -> u32 {
+        self.frame.step_cap()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::Constants;
+    use crate::model::case::Category;
+    use crate::model::driver::ModelId;
+    use crate::stats::random::philox4x32_10;
+    use serde_json::Value;
+
+    #[test]
+    fn every_built_in_profile_is_complete_and_named_as_it_is_called() {
+        for name in Profile::names() {
+            assert_eq!(Profile::load(name).unwrap().name, name);
+        }
+    }
+
+    #[test]
+    fn a_misspelt_profile_is_answered_with_the_nearest_name() {
+        let error = Profile::load("papr").unwrap_err();
+        assert!(error.help().unwrap().contains("did you mean `paper`"), "{error:?}");
+    }
+
+    /// The numbers below a table, with their keys.
+    fn numbers(value: &Value, key: &str, each: &mut dyn FnMut(&str)) {
+        match value {
+            Value::Object(fields) => fields.iter().for_each(|(name, inner)| {
+                numbers(inner, &if key.is_empty() { name.clone() } else { format!("{key}.{name}") }, each);
+            }),
+            Value::Number(_) => each(key),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn every_number_of_a_profile_has_a_range_and_the_profiles_chapter_has_it() {
+        let profile = Profile::load("paper").unwrap();
+        let bounds = profile.bounds();
+        let mut left: Vec<&str> = bounds.iter().map(|(key, ..)| key.as_str()).collect();
+        numbers(&serde_json::to_value(&profile).unwrap(), "", &mut |key| {
+            let at = left.iter().position(|known| *known == key).unwrap_or_else(|| panic!("`{key}` has no range"));
+            left.remove(at);
+        });
+        assert_eq!(left, Vec::<&str>::new());
+        let chapter = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/methods/profiles.md");
+        let chapter = std::fs::read_to_string(chapter).unwrap();
+        let rows: Vec<String> = bounds.iter().map(|(key, _, bound)| format!("| `{key}` | {bound} |\n")).collect();
+        assert!(chapter.contains(&rows.concat()), "the chapter needs these rows:\n{}", rows.concat());
+    }
+
+    /// Ends of the ranges, 0 where it is allowed, and numbers between, in every mixture.
+    #[test]
+    fn a_profile_that_passes_gives_finite_normal_numbers_in_binary32() {
+        let paper = Profile::load("paper").unwrap();
+        let bounds = paper.bounds();
+        let mut value = serde_json::to_value(&paper).unwrap();
+        let (mut word, mut passed) = (157, 0);
+        let mut drawn = || {
+            word = philox4x32_10([word, 0, 0, 0], [10, 0])[0];
+            f64::from(word) / 2_f64.powi(32)
+        };
+        for _ in 0..4000 {
+            for (key, _, bound) in &bounds {
+                let size = match drawn() {
+                    u if u < 0.3 => bound.smallest,
+                    u if u < 0.6 => bound.largest,
+                    u if u < 0.7 && bound.has_zero => 0.0,
+                    u => bound.smallest * libm::pow(bound.largest / bound.smallest, u),
+                };
+                let number = if bound.has_negative && drawn() < 0.5 { -size } else { size };
+                assert!(bound.holds(number), "{key}: {number}");
+                let (table, name) = key.split_once('.').unwrap();
+                value[table][name] = serde_json::json!(number);
+            }
+            let profile: Profile = serde_json::from_value(value.clone()).unwrap();
+            if profile.check(&Place::item("drawn")).is_err() {
+                // Too many steps.
+                continue;
+            }
+            passed += 1;
+            for category in Category::ALL {
+                let constants = Constants::<f32>::resolve(&profile, category);
+                let of_models = ModelId::ALL.into_iter().flat_map(|id| constants.driver_shader_constants(id));
+                let of_frames = constants.frames.iter().flat_map(|frame| frame.shader_constants());
+                for (name, number) in of_models.chain(of_frames).chain(constants.criteria.shader_constants()) {
+                    let narrow = number as f32;
+                    assert!(narrow == 0.0 || narrow.is_normal(), "{name} = {number}: {profile:?}");
+                }
+            }
+        }
+        assert!(passed > 1000, "{passed}");
+    }
+
+    /// Key, value and range of what binary32 has no normal number for.
+    #[test]
+    fn constants_outside_binary32_are_refused_by_key() {
+        for (key, value) in [
+            ("fsm.comfortable_deceleration_mps2", 1e-300),
+            ("fsm.comfortable_deceleration_mps2", 1e300),
+            ("rss.lateral_margin_m", 1e-40),
+            ("cchdm.lateral_gate_m", -1e-42),
+            ("criteria.jerk_mps3", 1e-30),
+            ("frame.default_length_m", f64::INFINITY),
+        ] {
+            let mut table = toml::Value::try_from(Profile::load("paper").unwrap()).unwrap();
+            let (of, name) = key.split_once('.').unwrap();
+            table[of][name] = toml::Value::Float(value);
+            let text = toml::to_string(&table).unwrap();
+            let error = Profile::parse(&text, &Place::file(Path::new("own.toml"))).unwrap_err().to_string();
+            let bound =
+                Profile::load("paper").unwrap().bounds().into_iter().find(|(known, ..)| known == key).unwrap().2;
+            for part in ["own.toml", key, &value.to_string(), &bound.to_string()] {
+                assert!(error.contains(part), "{part}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_unusable_constant_is_named_with_its_key() {
+        let error = Profile::load("paper").unwrap().with_dt(1e9).unwrap_err();
+        assert!(error.to_string().contains("frame.dt_s"), "{error}");
+        for dt_s in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            let error = Profile::load("paper").unwrap().with_dt(dt_s).unwrap_err();
+            assert!(error.to_string().contains("--dt"), "{error}");
+        }
+    }
+
+    /// Steps up to that of the reference simulators are allowed whatever the delays; beyond it the error says which
+    /// model bounds the step, and how long it may be.
+    #[test]
+    fn a_time_step_too_long_for_a_driver_is_refused_with_the_longest_that_is_allowed() {
+        let check = |name: &str, dt_s: f64, models: &[ModelId]| {
+            Profile::load(name).unwrap().with_dt(dt_s).unwrap().check_time_step(models)
+        };
+        for name in Profile::names() {
+            assert!(check(name, 0.1, &ModelId::ALL).is_ok(), "{name}");
+            let error = check(name, 0.101, &ModelId::ALL).unwrap_err();
+            let says = format!("{error} {}", error.help().unwrap());
+            assert!(says.contains("reg157.margin_s") && says.contains("at most 0.1 s"), "{name}: {says}");
+            assert!(check(name, 0.25, &[ModelId::Rss, ModelId::Fsm]).is_ok(), "{name}");
+            assert!(check(name, 0.251, &[ModelId::Fsm]).is_err(), "{name}");
+        }
+        assert!(check("paper", 0.2, &[ModelId::Cchdm]).is_ok());
+        // Reg157's 0.35 s are rounded up to 0.425 s; half a step more is beyond its margin of 0.1 s.
+        let error = check("paper", 0.085, &[ModelId::Reg157]).unwrap_err().to_string();
+        assert!(error.contains("reg157.margin_s") && error.contains("0.07 s"), "{error}");
+        for dt_s in [0.001, 0.01, 0.02, 0.033, 0.04, 0.05, 0.066, 0.07, 0.08, 0.0875, 0.09, 0.1] {
+            assert!(check("paper", dt_s, &ModelId::ALL).is_ok(), "{dt_s}");
+            assert!(check("un-r157", dt_s, &ModelId::ALL).is_ok(), "{dt_s}");
+        }
+        let error = check("un-r157", 0.2, &[ModelId::Cchdm]).unwrap_err().to_string();
+        assert!(error.contains("cchdm.perception_time_s") && error.contains("0.1333 s"), "{error}");
+        // Without a delay the threshold bounds the step.
+        let mut profile = Profile::load("paper").unwrap().with_dt(0.5).unwrap();
+        profile.fsm.reaction_time_s = 0.0;
+        assert!(profile.check_time_step(&[ModelId::Fsm]).is_ok());
+        profile.criteria.ttc_threshold_s = 0.4;
+        assert!(profile.check_time_step(&[ModelId::Fsm]).is_err());
+    }
+}

@@ -1,0 +1,320 @@
+//! The number a lane computes with: f64 (the reference), f32 (the lane arithmetic of every backend) and
+//! a counting type that tells the operations of a step.
+//!
+//! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
+//! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
+//!
+//! Comparisons are sign bits ([`Flag`]), for numbers that are finite and not -0. Inputs lose that sign when they are
+//! rounded, and no sum, difference or magnitude of such numbers is -0; a product or a negated number may be, and is
+//! compared only where another condition excludes it.
+
+use std::cell::Cell;
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use crate::model::flag::Flag;
+
+/// A scalar of the lane arithmetic. Models, criteria and the frame are written once over this trait.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// +∞: "did not happen" of a minimum, "cannot be avoided" of a Brake Threat Number.
+    const INFINITY: Self;
+
+    /// The host's one rounding of an input; -0 becomes 0.
+    fn from_f64(value: f64) -> Self;
+    /// Exact widening for reports.
+    fn to_f64(self) -> f64;
+    /// A step index as a number; exact below 2²⁴.
+    fn from_step(step: u32) -> Self;
+    /// Correctly rounded quotient: the only division of the lane arithmetic.
+    fn exact_div(self, divisor: Self) -> Self;
+    /// Whole steps below a number in [0, 2²⁴): exact.
+    fn floor_to_step(self) -> u32;
+
+    /// x < 0.
+    fn is_negative(self) -> Flag;
+
+    /// x > 0.
+    fn is_positive(self) -> Flag;
+
+    /// Less than another number.
+    fn is_below(self, other: Self) -> Flag;
+
+    /// Greater than another number.
+    #[inline(always)]
+    fn is_above(self, other: Self) -> Flag {
+        other.is_below(self)
+    }
+
+    /// Not less than another number.
+    #[inline(always)]
+    fn is_at_least(self, other: Self) -> Flag {
+        !self.is_below(other)
+    }
+
+    /// Not greater than another number.
+    #[inline(always)]
+    fn is_at_most(self, other: Self) -> Flag {
+        !other.is_below(self)
+    }
+
+    /// Magnitude.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        if self < Self::ZERO { -self } else { self }
+    }
+
+    /// The larger; the second where they are equal.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    /// The smaller; the second where they are equal.
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+}
+
+macro_rules! real_float {
+    ($float:ty, $negative:expr, $positive:expr, $below:expr) => {
+        impl Real for $float {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const INFINITY: Self = <$float>::INFINITY;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                // -0 + 0 is 0.
+                value as $float + 0.0
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self.into()
+            }
+            #[inline(always)]
+            fn from_step(step: u32) -> Self {
+                step as $float
+            }
+            #[inline(always)]
+            fn exact_div(self, divisor: Self) -> Self {
+                self / divisor
+            }
+            #[inline(always)]
+            fn floor_to_step(self) -> u32 {
+                self as u32
+            }
+            #[inline(always)]
+            fn is_negative(self) -> Flag {
+                $negative(self)
+            }
+            #[inline(always)]
+            fn is_positive(self) -> Flag {
+                $positive(self)
+            }
+            #[inline(always)]
+            fn is_below(self, other: Self) -> Flag {
+                $below(self, other)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$float>::abs(self)
+            }
+        }
+    };
+}
+real_float!(
+    f32,
+    |x: f32| Flag::from_bits(x.to_bits()),
+    // The bits of numbers are in the order of the numbers: negated as whole numbers, those above 0 get a sign.
+    |x: f32| Flag::from_bits(0_u32.wrapping_sub(x.to_bits())),
+    // A difference has a sign exactly where the first is less.
+    |a: f32, b: f32| Flag::from_bits((a - b).to_bits())
+);
+real_float!(f64, |x| Flag::of(x < 0.0), |x| Flag::of(x > 0.0), |a, b| Flag::of(a < b));
+
+/// Operations of the counting type, by kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct OperationCount {
+    /// Additions and subtractions.
+    pub additions: u64,
+    /// Multiplications.
+    pub multiplications: u64,
+    /// Correctly rounded divisions.
+    pub divisions: u64,
+    /// Comparisons.
+    pub comparisons: u64,
+}
+
+impl OperationCount {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.additions + self.multiplications + self.divisions + self.comparisons
+    }
+}
+
+thread_local! {
+    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0 }) };
+}
+
+/// Kinds of operations that are counted.
+enum Operation {
+    Addition,
+    Multiplication,
+    Division,
+    Comparison,
+}
+
+fn count(operation: Operation) {
+    COUNT.with(|cell| {
+        let mut now = cell.get();
+        let counter = match operation {
+            Operation::Addition => &mut now.additions,
+            Operation::Multiplication => &mut now.multiplications,
+            Operation::Division => &mut now.divisions,
+            Operation::Comparison => &mut now.comparisons,
+        };
+        *counter += 1;
+        cell.set(now);
+    });
+}
+
+/// An f64 that counts what is done with it, per thread.
+#[derive(Debug, Clone, Copy)]
+pub struct Counting(f64);
+
+impl Counting {
+    /// Runs `work` and returns its result with the operations it took on this thread.
+    pub fn measure<T>(work: impl FnOnce() -> T) -> (T, OperationCount) {
+        COUNT.with(|cell| cell.set(OperationCount::default()));
+        let result = work();
+        (result, COUNT.with(Cell::get))
+    }
+}
+
+impl Add for Counting {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        count(Operation::Addition);
+        Counting(self.0 + other.0)
+    }
+}
+impl Sub for Counting {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        count(Operation::Addition);
+        Counting(self.0 - other.0)
+    }
+}
+impl Mul for Counting {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        count(Operation::Multiplication);
+        Counting(self.0 * other.0)
+    }
+}
+impl Neg for Counting {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Counting(-self.0)
+    }
+}
+impl PartialEq for Counting {
+    fn eq(&self, other: &Self) -> bool {
+        count(Operation::Comparison);
+        self.0 == other.0
+    }
+}
+impl PartialOrd for Counting {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        count(Operation::Comparison);
+        self.0.partial_cmp(&other.0)
+    }
+}
+impl Real for Counting {
+    const ZERO: Self = Counting(0.0);
+    const ONE: Self = Counting(1.0);
+    const INFINITY: Self = Counting(f64::INFINITY);
+
+    fn from_f64(value: f64) -> Self {
+        Counting(value)
+    }
+    fn to_f64(self) -> f64 {
+        self.0
+    }
+    fn from_step(step: u32) -> Self {
+        Counting(f64::from(step))
+    }
+    fn exact_div(self, divisor: Self) -> Self {
+        count(Operation::Division);
+        Counting(self.0 / divisor.0)
+    }
+    fn floor_to_step(self) -> u32 {
+        self.0 as u32
+    }
+    fn is_negative(self) -> Flag {
+        Flag::of(self < Self::ZERO)
+    }
+    fn is_positive(self) -> Flag {
+        Flag::of(self > Self::ZERO)
+    }
+    fn is_below(self, other: Self) -> Flag {
+        Flag::of(self < other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_are_never_minus_zero() {
+        for input in [-0.0, -1e-60, 0.0] {
+            assert_eq!(f32::from_f64(input).to_bits(), 0, "{input}");
+        }
+        assert_eq!(f64::from_f64(-0.0).to_bits(), 0);
+    }
+
+    #[test]
+    fn comparisons_that_end_in_a_flag_are_those_of_the_standard() {
+        let tiny = f32::from_bits(1);
+        let numbers = [-1e6, -2.5, -tiny, 0.0, tiny, 1e-20, 0.3, 2.5, f32::from_bits(0x4020_0001), 1e6, f32::INFINITY];
+        for a in numbers {
+            assert_eq!(a.is_negative().holds(), a < 0.0, "{a}");
+            assert_eq!(a.is_positive().holds(), a > 0.0, "{a}");
+            for b in numbers.into_iter().filter(|b| a.is_finite() || b.is_finite()) {
+                assert_eq!(a.is_below(b).holds(), a < b, "{a} {b}");
+                assert_eq!(a.is_above(b).holds(), a > b, "{a} {b}");
+                assert_eq!(a.is_at_least(b).holds(), a >= b, "{a} {b}");
+                assert_eq!(a.is_at_most(b).holds(), a <= b, "{a} {b}");
+                assert_eq!(f64::from(a).is_below(f64::from(b)).holds(), a < b, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_counting_type_sees_every_operation() {
+        let (value, count) = Counting::measure(|| {
+            let a = Counting::from_f64(3.0);
+            let b = Counting::from_f64(2.0);
+            (a * b + a).exact_div(b).larger(b)
+        });
+        assert_eq!(value.to_f64(), 4.5);
+        assert_eq!(count, OperationCount { additions: 1, multiplications: 1, divisions: 1, comparisons: 1 });
+    }
+}

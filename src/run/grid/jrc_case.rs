@@ -1,0 +1,240 @@
+//! Cases as the JRC's simulator of 2021 makes them: vehicles of 4.3 m × 1.9 m, lateral motion as a running sum that
+//! begins one step after the nominal start, and, in its comparison sweep, a lateral run-up before it. The simulator's
+//! time step is 0.1 s; here cases are given in seconds, and their steps follow from the time step. Conformance replays
+//! the JRC's tables with these; maps sweep its grids.
+
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+
+/// Length of a vehicle, m.
+pub const LENGTH_M: f64 = 4.3;
+/// Width of a vehicle, m.
+pub const WIDTH_M: f64 = 1.9;
+/// Length of a vehicle that stands ahead of a cutting-out one, m.
+pub const STANDING_LENGTH_M: f64 = 5.0;
+/// Lateral distance that a cut-in covers, m.
+pub const CUT_IN_LATERAL_M: f64 = 3.5;
+/// Lateral distance that a cut-out covers, m.
+pub const CUT_OUT_LATERAL_M: f64 = 4.0;
+/// Slowest lane change that has a series, m/s: it takes longer than any run.
+pub const LEAST_LATERAL_MPS: f64 = 1e-3;
+/// Time headway at which a following Reg157 or CCHDM starts, s.
+pub const NATIVE_THW_S: f64 = 2.0;
+/// Lateral acceleration of the run-up, m/s².
+const RUN_UP_MPS2: f64 = 1.5;
+
+/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`LEAST_LATERAL_MPS`], `run_up` counts the steps before
+/// the nominal start.
+pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
+    Case {
+        category: Category::CutIn,
+        ego_length_m: LENGTH_M,
+        ego_width_m: WIDTH_M,
+        ego_speed_mps: ego_mps,
+        principal: Participant {
+            length_m: LENGTH_M,
+            width_m: WIDTH_M,
+            speed: Speed::constant(cutter_mps),
+            lateral: cut_in_lateral(lateral_mps, run_up, dt_s),
+        },
+        ahead: None,
+        horizon_s: 0.0,
+    }
+}
+
+/// The gap at the frame's nominal start: the last step of the run-up has the case's gap `gap_m`, and the frame's start
+/// shift adds one step.
+pub fn gap_before_run_up(gap_m: f64, ego_mps: f64, cutter_mps: f64, run_up: u32, dt_s: f64) -> f64 {
+    gap_m - f64::from(run_up) * (cutter_mps - ego_mps) * dt_s
+}
+
+/// Steps of the comparison sweep's run-up: lateral speeds that grow from 0 to below the full one, at 0.1 s 0, 0.15,
+/// 0.30, … m/s, then a step at it.
+pub fn run_up_steps(lateral_mps: f64, dt_s: f64) -> u32 {
+    // The quotient of 0.3 and 0.15 may lie above 2 by its rounding error.
+    (lateral_mps / run_up_step_mps(dt_s) - 1e-9).ceil().max(0.0) as u32 + 1
+}
+
+/// What a step adds to the lateral speed in the run-up, m/s.
+fn run_up_step_mps(dt_s: f64) -> f64 {
+    RUN_UP_MPS2 / rate_hz(dt_s)
+}
+
+/// Steps per second: 10 exactly at 0.1 s, so that products and quotients with it are the JRC's.
+fn rate_hz(dt_s: f64) -> f64 {
+    1.0 / dt_s
+}
+
+/// Steps of a lateral change, the last one at its end or beyond it.
+fn change_steps(distance_m: f64, lateral_mps: f64, dt_s: f64) -> usize {
+    if lateral_mps > 0.0 { (rate_hz(dt_s) * distance_m / lateral_mps).floor() as usize + 1 } else { 1 }
+}
+
+/// A leader that decelerates from `initial_mps` to `end_mps` at once; the ego is as fast as it.
+pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
+    let until_s = if deceleration_mps2 > 0.0 { (initial_mps - end_mps).max(0.0) / deceleration_mps2 } else { 0.0 };
+    let speed = Speed::Kinematic { initial_mps, acceleration_mps2: -deceleration_mps2, until_s };
+    Case {
+        category: Category::Lvd,
+        ego_length_m: LENGTH_M,
+        ego_width_m: WIDTH_M,
+        ego_speed_mps: initial_mps,
+        principal: Participant { length_m: LENGTH_M, width_m: WIDTH_M, speed, lateral: Lateral::Centred },
+        ahead: None,
+        horizon_s: until_s,
+    }
+}
+
+/// The vehicle ahead of a cutting-out one, as the JRC's tables give it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Front {
+    /// Speed, m/s.
+    pub speed_mps: f64,
+    /// Length, m: [`STANDING_LENGTH_M`] where it stands.
+    pub length_m: f64,
+    /// Distance to it, m: between centres less [`LENGTH_M`], whatever its own length.
+    pub distance_m: f64,
+}
+
+/// A cut-out: ego and cutting-out vehicle are equally fast, the lateral motion begins at once.
+pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Case {
+    Case {
+        category: Category::CutOut,
+        ego_length_m: LENGTH_M,
+        ego_width_m: WIDTH_M,
+        ego_speed_mps: speed_mps,
+        principal: Participant {
+            length_m: LENGTH_M,
+            width_m: WIDTH_M,
+            speed: Speed::constant(speed_mps),
+            lateral: cut_out_lateral(lateral_mps, dt_s),
+        },
+        ahead: Some(Ahead {
+            vehicle: Participant {
+                length_m: front.length_m,
+                width_m: WIDTH_M,
+                speed: Speed::constant(front.speed_mps),
+                lateral: Lateral::Centred,
+            },
+            gap_m: front.distance_m - (front.length_m - LENGTH_M) / 2.0,
+        }),
+        horizon_s: 0.0,
+    }
+}
+
+/// The distance at which a following FSM starts to be unconcerned: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1.
+pub fn native_distance_fsm(profile: &Profile, v: f64) -> f64 {
+    let p = &profile.fsm;
+    v * p.reaction_time_s + v * v / (2.0 * p.comfortable_deceleration_mps2) - v * v / (2.0 * p.lead_deceleration_mps2)
+        + 2.0 * p.margin_m
+}
+
+/// The same of RSS: v ρ + a ρ²/2 + (v + ρ a)²/(2 b) − max(v − b ρ, 0)²/(2 b) + a ρ² with the leader's response.
+pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
+    let p = &profile.rss;
+    let (rho, a, b) = (p.response_time_s, p.max_acceleration_mps2, p.ego_deceleration_mps2);
+    let fast = v + rho * a;
+    let slow = (v - p.other_deceleration_mps2 * rho).max(0.0);
+    v * rho + a * rho * rho / 2.0 + fast * fast / (2.0 * b) - slow * slow / (2.0 * p.other_deceleration_mps2)
+        + a * rho * rho
+}
+
+/// The distance at which a following model starts in the JRC's simulator, m; `speed_mps` is that of both vehicles.
+pub fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64 {
+    match model {
+        ModelId::Fsm => native_distance_fsm(profile, speed_mps),
+        ModelId::Rss => native_distance_rss(profile, speed_mps),
+        _ => NATIVE_THW_S * speed_mps,
+    }
+}
+
+/// Lateral speeds, counted towards the ego: the run-up, one sample at full speed, then the plain change.
+fn cut_in_lateral(lateral_mps: f64, run_up: u32, dt_s: f64) -> Lateral {
+    let m = run_up as usize;
+    let plain = change_steps(CUT_IN_LATERAL_M, lateral_mps, dt_s);
+    let mut towards: Vec<f64> = (0..m.saturating_sub(1)).map(|k| run_up_step_mps(dt_s) * k as f64).collect();
+    towards.resize(m + plain, lateral_mps);
+    let mut position = vec![0.0; towards.len()];
+    if m > 0 {
+        position[m - 1] = CUT_IN_LATERAL_M;
+        for i in (0..m - 1).rev() {
+            position[i] = position[i + 1] + towards[i] * dt_s;
+        }
+    }
+    let mut y = CUT_IN_LATERAL_M;
+    for i in m..towards.len() {
+        y -= towards[i] * dt_s;
+        position[i] = y;
+    }
+    Lateral::Sampled { position_m: position, towards_mps: towards }
+}
+
+/// From the lane centre to −4 m, starting at once.
+fn cut_out_lateral(lateral_mps: f64, dt_s: f64) -> Lateral {
+    let steps = change_steps(CUT_OUT_LATERAL_M, lateral_mps, dt_s);
+    let position: Vec<f64> = (1..=steps).map(|i| -lateral_mps * dt_s * i as f64).collect();
+    Lateral::Sampled { towards_mps: vec![-lateral_mps; position.len()], position_m: position }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_up_has_one_step_for_every_slower_speed_and_one_at_full_speed() {
+        // The counts of the JRC's own table at its lateral speeds.
+        for (lateral_mps, steps) in [(0.23, 3), (0.53, 5), (0.83, 7), (1.13, 9), (1.43, 11), (1.73, 13)] {
+            assert_eq!(run_up_steps(lateral_mps, 0.1), steps);
+        }
+        assert_eq!(run_up_steps(0.3, 0.1), 3);
+        assert_eq!(run_up_steps(0.0, 0.1), 1);
+    }
+
+    #[test]
+    fn the_last_step_of_a_run_up_is_where_the_plain_change_starts() {
+        let Lateral::Sampled { position_m, towards_mps } = cut_in_lateral(0.5, 5, 0.1) else { panic!("a series") };
+        assert_eq!(position_m[4], CUT_IN_LATERAL_M);
+        assert_eq!(towards_mps[4], 0.5);
+        assert_eq!(towards_mps[0], 0.0);
+        assert!((position_m[5] - (CUT_IN_LATERAL_M - 0.05)).abs() < 1e-12);
+    }
+
+    /// What the JRC's simulator has at 10 Hz comes out to the last bit.
+    #[test]
+    fn at_a_tenth_of_a_second_the_steps_are_those_of_the_jrc() {
+        assert_eq!(run_up_step_mps(0.1), 0.15);
+        for k in 1..1000_u32 {
+            let lateral_mps = f64::from(k) * 0.005;
+            for distance_m in [CUT_IN_LATERAL_M, CUT_OUT_LATERAL_M] {
+                let theirs = (10.0 * distance_m / lateral_mps).floor() as usize + 1;
+                assert_eq!(change_steps(distance_m, lateral_mps, 0.1), theirs, "{lateral_mps}");
+            }
+        }
+    }
+
+    /// The vehicle arrives, and as soon as at 10 Hz but for three steps (its start, the end of the run-up, that of the
+    /// change), whatever the time step.
+    #[test]
+    fn a_change_takes_its_time_at_every_time_step() {
+        for dt_s in [0.001, 0.01, 0.03, 0.04, 0.045, 0.07, 0.1, 0.17, 0.35] {
+            for lateral_mps in [0.1, 0.53, 1.0, 1.7, 2.5] {
+                let run_up = run_up_steps(lateral_mps, dt_s);
+                let into = cut_in_lateral(lateral_mps, run_up, dt_s);
+                let out = cut_out_lateral(lateral_mps, dt_s);
+                let length = |lateral: &Lateral| match lateral {
+                    Lateral::Sampled { position_m, .. } => (position_m.len(), position_m[position_m.len() - 1]),
+                    _ => panic!("a series"),
+                };
+                let near = |steps: usize, time_s: f64| (steps as f64 * dt_s - time_s).abs() <= 3.001 * dt_s;
+                let (steps, end) = length(&into);
+                let what = format!("{dt_s} s, {lateral_mps} m/s");
+                assert!(near(steps, lateral_mps / RUN_UP_MPS2 + CUT_IN_LATERAL_M / lateral_mps), "{what}: {steps}");
+                assert!(end <= 1e-9 && end > -1.001 * lateral_mps * dt_s, "{what}: {end}");
+                let (steps, end) = length(&out);
+                assert!(near(steps, CUT_OUT_LATERAL_M / lateral_mps), "{what}: {steps}");
+                assert!((end + CUT_OUT_LATERAL_M).abs() <= 1.001 * lateral_mps * dt_s, "{what}: {end}");
+            }
+        }
+    }
+}

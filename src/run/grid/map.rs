@@ -1,0 +1,200 @@
+//! A swept grid: the verdicts of every cell and model, shares, and the difference of two maps.
+
+use crate::engine::{
+    Backend, LanePlan, LaneRunner, ONE_IN, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
+};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::{Error, Place, Result};
+
+use super::grid::Grid;
+use super::plan::GridPlan;
+
+/// What computes the lanes of a map, and who stands in and checks.
+#[derive(Clone, Copy)]
+pub struct MapBackend<'a> {
+    /// The backend.
+    pub backend: &'a dyn Backend,
+    /// Computes what the backend cannot.
+    pub fallback: Option<&'a dyn Backend>,
+    /// Seed of the choice of lanes that the CPU computes again; `None` checks none.
+    pub recheck_seed: Option<u64>,
+}
+
+/// The verdicts of a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridMap {
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// Per model, per cell.
+    verdicts: Vec<Vec<Verdicts>>,
+}
+
+/// Two verdicts on one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Agreement {
+    /// Neither fails.
+    BothPass,
+    /// Both fail.
+    BothFail,
+    /// The first fails alone.
+    OnlyFirst,
+    /// The second fails alone.
+    OnlySecond,
+}
+
+impl Agreement {
+    /// All, in the order of tables.
+    pub const ALL: [Agreement; 4] =
+        [Agreement::BothPass, Agreement::BothFail, Agreement::OnlyFirst, Agreement::OnlySecond];
+
+    /// From the two.
+    pub fn of(first_fails: bool, second_fails: bool) -> Agreement {
+        match (first_fails, second_fails) {
+            (false, false) => Agreement::BothPass,
+            (true, true) => Agreement::BothFail,
+            (true, false) => Agreement::OnlyFirst,
+            (false, true) => Agreement::OnlySecond,
+        }
+    }
+
+    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Agreement::BothPass => "both_pass",
+            Agreement::BothFail => "both_fail",
+            Agreement::OnlyFirst => "only_first",
+            Agreement::OnlySecond => "only_second",
+        }
+    }
+}
+
+impl GridMap {
+    /// Sweeps a planned grid.
+    ///
+    /// # Errors
+    /// Of the backend; [`Error::Verification`] where a checked lane differs; [`Error::Usage`] where every lane ends at
+    /// the time cap, so that the map says nothing.
+    pub fn sweep(plan: &GridPlan, how: MapBackend) -> Result<(GridMap, SweepSummary)> {
+        let cells = plan.grid.cell_count();
+        let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        for part in &plan.parts {
+            let lanes = &part.plan;
+            let recheck = how.recheck_seed.map(|seed| Recheck::new(lanes, seed, ONE_IN));
+            let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
+            // Where the part's models stand among all.
+            let of_part: Vec<Option<usize>> =
+                lanes.models.iter().map(|model| plan.models.iter().position(|m| m == model)).collect();
+            let per_unit = lanes.headways.len() * lanes.models.len();
+            let swept = sweep(lanes, 0..lanes.unit_count(), how.backend, &options, |chunk| {
+                for (units, of_unit) in (chunk.units.start..).zip(chunk.verdicts.chunks(per_unit.max(1))) {
+                    for (at, verdict) in of_unit.iter().enumerate() {
+                        let cell = part.cell(&plan.grid, units, at / lanes.models.len());
+                        if let Some(model) = of_part[at % lanes.models.len()] {
+                            verdicts[model][cell] = *verdict;
+                        }
+                    }
+                }
+                Ok(())
+            })?;
+            summary.add(&swept);
+        }
+        let map = GridMap { models: plan.models.clone(), verdicts };
+        map.check_ends(plan)?;
+        Ok((map, summary))
+    }
+
+    /// Some lane must end before the time cap; under a profile whose runs all go on to it, another vehicle must come
+    /// into the ego's lane.
+    fn check_ends(&self, plan: &GridPlan) -> Result<()> {
+        let lanes = plan.lane_count();
+        let Some(frame) = plan.parts.first().map(|part| &part.plan.profile.frame) else { return Ok(()) };
+        let all_capped = self.verdicts.iter().flatten().all(|verdict| verdict.capped());
+        if lanes == 0 || !all_capped || !frame.end_when_settled && plan.parts.iter().any(|part| meets(&part.plan)) {
+            return Ok(());
+        }
+        let alone = if frame.end_when_settled { "" } else { ", and no vehicle comes into the ego's lane" };
+        let problem =
+            format!("all {lanes} lanes end at the time cap of {} s{alone}: the map is empty", frame.time_cap_s);
+        let help = format!(
+            "check the time step ({} s, --dt), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
+             and gaps",
+            frame.dt_s
+        );
+        Err(Error::usage(Place::item(format!("map {}", plan.grid.name())), problem, help))
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.verdicts.first().map_or(0, Vec::len)
+    }
+
+    /// The verdicts of a model's cell.
+    pub fn verdicts(&self, model: usize, cell: usize) -> Verdicts {
+        self.verdicts[model][cell]
+    }
+
+    /// Does a model fail, cell by cell?
+    pub fn failed(&self, model: usize, criterion: Criterion) -> Vec<bool> {
+        self.verdicts[model].iter().map(|v| v.failed(criterion)).collect()
+    }
+
+    /// Cells in which a model fails.
+    pub fn failures(&self, model: usize, criterion: Criterion) -> u64 {
+        self.verdicts[model].iter().filter(|v| v.failed(criterion)).count() as u64
+    }
+
+    /// Where two models' verdicts agree and differ, cell by cell; the second may be of another map of the same grid.
+    pub fn difference(&self, first: usize, (other, second): (&GridMap, usize), criterion: Criterion) -> Vec<Agreement> {
+        let pairs = self.verdicts[first].iter().zip(&other.verdicts[second]);
+        pairs.map(|(a, b)| Agreement::of(a.failed(criterion), b.failed(criterion))).collect()
+    }
+}
+
+/// Is there a lane in which TTC and BTN look at another vehicle?
+fn meets(plan: &LanePlan) -> bool {
+    let runner = LaneRunner::<f32>::new(plan);
+    let keys = (0..plan.lane_count()).filter_map(|lane| plan.key(lane));
+    keys.map(|key| runner.run(&key)).any(|outcome| outcome.min_gap < f32::INFINITY)
+}
+
+/// Counts of the four agreements, in the order of [`Agreement::ALL`].
+pub fn count(cells: &[Agreement]) -> [u64; 4] {
+    Agreement::ALL.map(|kind| cells.iter().filter(|c| **c == kind).count() as u64)
+}
+
+/// Ends of the lines between neighbouring cells of a panel that differ in kind: a line along a row's edge from place
+/// to place, in cells from the panel's lower left corner, `((x, y), (x, y))`. Straight runs are one line.
+pub fn boundary(grid: &Grid, kind: &dyn Fn(usize, usize) -> usize) -> Vec<((usize, usize), (usize, usize))> {
+    let (nx, ny) = (grid.x().len(), grid.y().len());
+    let mut lines = Vec::new();
+    for j in 1..ny {
+        for (from, to) in runs(nx, &|i| kind(i, j - 1) != kind(i, j)) {
+            lines.push(((from, j), (to, j)));
+        }
+    }
+    for i in 1..nx {
+        for (from, to) in runs(ny, &|j| kind(i - 1, j) != kind(i, j)) {
+            lines.push(((i, from), (i, to)));
+        }
+    }
+    lines
+}
+
+/// Longest intervals of places at which something holds.
+pub fn runs(count: usize, holds: &dyn Fn(usize) -> bool) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut from = None;
+    for k in 0..=count {
+        match (from, k < count && holds(k)) {
+            (None, true) => from = Some(k),
+            (Some(start), false) => {
+                found.push((start, k));
+                from = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}

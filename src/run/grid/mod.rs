@@ -1,0 +1,23 @@
+//! Grids of concrete cases: what `map` sweeps.
+//!
+//! Here live the parameters and axes, the way from a cell to its case and from a grid to lane plans, the presets, and
+//! the swept map with its differences. Here lives no physics, and no drawing. Cases and plans go to [`crate::engine`],
+//! maps to [`crate::report`]. The cases of the JRC's simulator also serve [`crate::interop::conformance`].
+
+mod axis;
+#[allow(clippy::module_inception)]
+mod grid;
+pub mod jrc_case;
+mod map;
+mod parameter;
+mod plan;
+pub mod presets;
+
+pub use axis::{GridAxis, MOST_VALUES};
+pub(crate) use grid::check_complete;
+pub use grid::{CaseStyle, Grid, GridParts, MOST_CELLS, MOST_PANELS};
+pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
+pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
+pub use plan::{GridPart, GridPlan};
+
+pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};

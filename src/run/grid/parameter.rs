@@ -1,0 +1,233 @@
+//! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
+
+use crate::model::profile::Profile;
+use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase};
+use crate::support::near_name::nearest;
+use crate::support::plausibility::{self, Doubts};
+use crate::{Error, Place, Result};
+
+/// What a parameter sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Initial speed of the ego.
+    EgoSpeed,
+    /// Initial speed of the vehicle that cuts in, cuts out or leads.
+    OtherSpeed,
+    /// Initial gap to it, bumper to bumper.
+    Gap,
+    /// The same as a time headway.
+    Thw,
+    /// Lateral speed of a lane change.
+    LateralSpeed,
+    /// Lateral distance of a lane change.
+    LateralDistance,
+    /// Deceleration of that vehicle.
+    Deceleration,
+    /// Speed at which its deceleration ends.
+    EndSpeed,
+    /// Speed of the vehicle ahead of the one that cuts out.
+    AheadSpeed,
+    /// Gap between these two, bumper to bumper.
+    AheadGap,
+    /// Length of every vehicle.
+    Length,
+    /// Width of every vehicle.
+    Width,
+}
+
+impl Quantity {
+    /// How many there are.
+    pub const COUNT: usize = 12;
+}
+
+/// A parameter by the name that flags, tables and files give it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Name with its unit.
+    pub key: &'static str,
+    /// Name on an axis.
+    pub label: &'static str,
+    /// Unit on an axis.
+    pub unit: &'static str,
+    /// What it sets.
+    pub quantity: Quantity,
+    /// So many of its units are one SI unit.
+    pub per_si: f64,
+    /// Smallest value, in its unit.
+    pub least: f64,
+    /// Largest value, in its unit.
+    pub most: f64,
+    /// Categories that have it.
+    pub categories: &'static [Category],
+}
+
+const EVERY: &[Category] = &Category::ALL;
+const LANE_CHANGES: &[Category] = &[Category::CutIn, Category::CutOut];
+const CUT_OUT: &[Category] = &[Category::CutOut];
+const KMH: f64 = 3.6;
+
+const fn parameter(
+    key: &'static str,
+    label: &'static str,
+    unit: &'static str,
+    quantity: Quantity,
+    per_si: f64,
+    (least, most): (f64, f64),
+    categories: &'static [Category],
+) -> Parameter {
+    Parameter { key, label, unit, quantity, per_si, least, most, categories }
+}
+
+/// All, in the order of help texts.
+pub const PARAMETERS: [Parameter; 16] = [
+    parameter("ego_speed_mps", "Speed of the ego", "m/s", Quantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
+    parameter("ego_speed_kmh", "Speed of the ego", "km/h", Quantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
+    parameter("other_speed_mps", "Speed of the other vehicle", "m/s", Quantity::OtherSpeed, 1.0, (0.0, 150.0), EVERY),
+    parameter("other_speed_kmh", "Speed of the other vehicle", "km/h", Quantity::OtherSpeed, KMH, (0.0, 540.0), EVERY),
+    parameter("gap_m", "Initial gap", "m", Quantity::Gap, 1.0, (0.0, 1e4), EVERY),
+    parameter("thw_s", "Initial time headway", "s", Quantity::Thw, 1.0, (0.0, 100.0), EVERY),
+    parameter("lateral_speed_mps", "Lateral speed", "m/s", Quantity::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
+    parameter(
+        "lateral_distance_m",
+        "Lateral distance",
+        "m",
+        Quantity::LateralDistance,
+        1.0,
+        (0.01, 20.0),
+        LANE_CHANGES,
+    ),
+    parameter(
+        "deceleration_mps2",
+        "Deceleration of the other vehicle",
+        "m/s²",
+        Quantity::Deceleration,
+        1.0,
+        (0.0, 50.0),
+        EVERY,
+    ),
+    parameter("end_speed_mps", "End speed of the other vehicle", "m/s", Quantity::EndSpeed, 1.0, (0.0, 150.0), EVERY),
+    parameter("end_speed_kmh", "End speed of the other vehicle", "km/h", Quantity::EndSpeed, KMH, (0.0, 540.0), EVERY),
+    parameter("ahead_speed_mps", "Speed of the vehicle ahead", "m/s", Quantity::AheadSpeed, 1.0, (0.0, 150.0), CUT_OUT),
+    parameter(
+        "ahead_speed_kmh",
+        "Speed of the vehicle ahead",
+        "km/h",
+        Quantity::AheadSpeed,
+        KMH,
+        (0.0, 540.0),
+        CUT_OUT,
+    ),
+    parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", Quantity::AheadGap, 1.0, (0.0, 1e4), CUT_OUT),
+    parameter("length_m", "Length of every vehicle", "m", Quantity::Length, 1.0, (0.1, 50.0), EVERY),
+    parameter("width_m", "Width of every vehicle", "m", Quantity::Width, 1.0, (0.1, 10.0), EVERY),
+];
+
+impl Parameter {
+    /// By name, among those of a category; `flag` names the place of an error.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the nearest name.
+    pub fn find(category: Category, key: &str, flag: &str) -> Result<&'static Parameter> {
+        let of_category = || PARAMETERS.iter().filter(|p| p.categories.contains(&category));
+        if let Some(found) = of_category().find(|p| p.key == key) {
+            return Ok(found);
+        }
+        let near = nearest(key, of_category().map(|p| p.key), 0.0);
+        let keys: Vec<&str> = of_category().map(|p| p.key).collect();
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`? There are {}", keys.join(", ")),
+            None => format!("there are {}", keys.join(", ")),
+        };
+        Err(Error::usage(Place::item(flag), format!("a {} has no parameter `{key}`", category.label()), help))
+    }
+
+    /// A value in SI units.
+    pub fn si(&self, value: f64) -> f64 {
+        value / self.per_si
+    }
+
+    /// `Initial gap (m)`, for axes.
+    pub fn title(&self) -> String {
+        format!("{} ({})", self.label, self.unit)
+    }
+
+    /// What it is to a table of plausible values, and in which sign that has it.
+    fn plausible(&self) -> (plausibility::Quantity, f64) {
+        use plausibility::Quantity as Of;
+        match self.quantity {
+            Quantity::EgoSpeed | Quantity::OtherSpeed | Quantity::EndSpeed | Quantity::AheadSpeed => (Of::Speed, 1.0),
+            Quantity::Gap | Quantity::AheadGap => (Of::Gap, 1.0),
+            Quantity::Thw => (Of::Headway, 1.0),
+            Quantity::LateralSpeed => (Of::LateralSpeed, 1.0),
+            Quantity::LateralDistance => (Of::LateralPosition, 1.0),
+            Quantity::Deceleration => (Of::Acceleration, -1.0),
+            Quantity::Length => (Of::Length, 1.0),
+            Quantity::Width => (Of::Width, 1.0),
+        }
+    }
+
+    /// Looks at a value that a user gave.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for one beyond the physical range, unless such are accepted.
+    pub fn judge(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
+        let (quantity, sign) = self.plausible();
+        let judged = doubts.judge(quantity, sign * self.si(value), || self.key.to_owned());
+        judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
+    }
+
+    /// A value in the range; a speed that is noise of a standing vehicle is 0, which is told.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the range.
+    pub fn check(&self, value: f64, flag: &str) -> Result<f64> {
+        let mut doubts = Doubts::default();
+        let is_still = self.plausible().0 == plausibility::Quantity::Speed
+            && doubts.speed(self.si(value), || format!("{} = {value}", self.key)) != self.si(value);
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        let value = if is_still { 0.0 } else { value };
+        if (self.least..=self.most).contains(&value) {
+            return Ok(value);
+        }
+        let problem = format!("{} = {value} cannot be used", self.key);
+        let help = format!("give a number of at least {} and at most {} {}", self.least, self.most, self.unit);
+        Err(Error::usage(Place::item(flag), problem, help))
+    }
+}
+
+/// Values of some quantities, in SI units.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Point([Option<f64>; Quantity::COUNT]);
+
+impl Point {
+    /// Sets what a parameter stands for, from its own unit.
+    pub fn set(&mut self, parameter: &Parameter, value: f64) {
+        self.0[parameter.quantity as usize] = Some(parameter.si(value));
+    }
+
+    /// The value of a quantity, where it has one.
+    pub fn get(&self, quantity: Quantity) -> Option<f64> {
+        self.0[quantity as usize]
+    }
+
+    /// The plain case of these values; what they do not set has the value that `simulate` gives it.
+    pub fn plain_case(&self, category: Category, profile: &Profile) -> PlainCase {
+        let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
+        let ego_speed_mps = value(Quantity::EgoSpeed, 0.0);
+        let deceleration = value(Quantity::Deceleration, 0.0);
+        PlainCase {
+            category,
+            ego_speed_mps,
+            speed_mps: value(Quantity::OtherSpeed, ego_speed_mps),
+            // No negative zero.
+            acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
+            end_speed_mps: self.get(Quantity::EndSpeed),
+            lateral_speed_mps: value(Quantity::LateralSpeed, 0.0),
+            lateral_distance_m: value(Quantity::LateralDistance, LATERAL_DISTANCE_M),
+            ahead_speed_mps: value(Quantity::AheadSpeed, 0.0),
+            ahead_gap_m: value(Quantity::AheadGap, 0.0),
+            length_m: value(Quantity::Length, profile.frame.default_length_m),
+            width_m: value(Quantity::Width, profile.frame.default_width_m),
+        }
+    }
+}

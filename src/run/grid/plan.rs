@@ -1,0 +1,168 @@
+//! From a grid to lane plans. Where the gap is an axis it is the plan's headways and a unit is a row of cells, whose
+//! lanes share one case; otherwise a unit is a cell and its gap is part of its case. Models that start at distances of
+//! their own have plans of their own.
+
+use crate::Result;
+use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::Tables;
+
+use super::axis::GridAxis;
+use super::grid::Grid;
+use super::jrc_case;
+use super::parameter::{Parameter, Quantity};
+
+/// Name of the only variant.
+const VARIANT: &str = "cell";
+
+/// A grid with the plans of its lanes.
+pub struct GridPlan {
+    /// The grid.
+    pub grid: Grid,
+    /// Models, in order; every one is in exactly one of the parts.
+    pub models: Vec<ModelId>,
+    /// The plans.
+    pub parts: Vec<GridPart>,
+}
+
+/// The lanes of some models on every cell.
+pub struct GridPart {
+    /// The plan: units are an interval, so it can be cut as any other.
+    pub plan: LanePlan,
+    layout: Layout,
+}
+
+/// How units and headways lead to cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// A unit is a cell.
+    Cells,
+    /// Headways are the values across; a unit is a row.
+    HeadwaysAcross,
+    /// Headways are the values upwards; a unit is a column of a panel.
+    HeadwaysUp,
+}
+
+/// The cases of a plan, made once: a table by unit.
+struct GridCases {
+    cases: Vec<LaneCase<f64>>,
+    tables: Tables<f64>,
+}
+
+impl CaseSource for GridCases {
+    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
+        self.cases[unit as usize]
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.tables
+    }
+}
+
+impl GridPlan {
+    /// Plans every cell with every model.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] without a model and for a case that cannot be.
+    pub fn new(grid: Grid, profile: &Profile, models: &[ModelId]) -> Result<GridPlan> {
+        let profile = grid.profile(profile);
+        let mut groups: Vec<Vec<ModelId>> = Vec::new();
+        if grid.has_native_gap() {
+            // The same distance at every speed: the same plan.
+            let distances = |model| [0.0, 40.0].map(|v| jrc_case::native_distance(&profile, model, v));
+            for &model in models {
+                match groups.iter_mut().find(|group| distances(group[0]) == distances(model)) {
+                    Some(group) => group.push(model),
+                    None => groups.push(vec![model]),
+                }
+            }
+        } else {
+            groups.push(models.to_vec());
+        }
+        let parts = groups.into_iter().map(|group| GridPart::new(&grid, &profile, group)).collect::<Result<_>>()?;
+        Ok(GridPlan { grid, models: models.to_vec(), parts })
+    }
+
+    /// Number of lanes.
+    pub fn lane_count(&self) -> u64 {
+        self.parts.iter().map(|part| part.plan.lane_count()).sum()
+    }
+}
+
+impl GridPart {
+    fn new(grid: &Grid, profile: &Profile, models: Vec<ModelId>) -> Result<GridPart> {
+        let layout = if is_distance(grid.x().parameter) {
+            Layout::HeadwaysAcross
+        } else if is_distance(grid.y().parameter) {
+            Layout::HeadwaysUp
+        } else {
+            Layout::Cells
+        };
+        let fixed = grid.fixed().iter().find(|(parameter, _)| is_distance(parameter));
+        let headways = match (layout, fixed) {
+            (Layout::HeadwaysAcross, _) => headways(grid.x()),
+            (Layout::HeadwaysUp, _) => headways(grid.y()),
+            (Layout::Cells, Some((parameter, value))) => vec![headway(parameter, *value)],
+            (Layout::Cells, None) => vec![Headway::GapM(0.0)],
+        };
+        let dt_s = profile.frame.dt_s;
+        let mut source = GridCases { cases: Vec::new(), tables: Tables::default() };
+        let mut names = Vec::new();
+        for unit in 0..grid.cell_count() / headways.len() {
+            let cell = layout.cell(grid, unit, 0);
+            let mut case = LaneCase::encode(&grid.case(cell, profile)?, profile, &mut source.tables);
+            let of_cell = layout == Layout::Cells && fixed.is_none();
+            let gap_m = if of_cell { models.first().map_or(0.0, |m| grid.gap_m(cell, *m, profile)) } else { 0.0 };
+            for other in &mut case.others {
+                other.gap_offset += gap_m + grid.run_up_gap_m(cell, dt_s);
+            }
+            source.cases.push(case);
+            let varies = |parameter: &Parameter| layout == Layout::Cells || !is_distance(parameter);
+            let values = grid.values(cell).into_iter().filter(|(parameter, _)| varies(parameter));
+            names.push(
+                values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
+            );
+        }
+        let block = Block {
+            category: grid.category(),
+            units: Units::Named(names),
+            variants: vec![VARIANT.to_owned()],
+            first_unit: 0,
+            first_lane: 0,
+        };
+        let plan = LanePlan::new(profile.clone(), models, headways, vec![block], Box::new(source))?;
+        Ok(GridPart { plan, layout })
+    }
+
+    /// The cell of a lane's unit and headway.
+    pub fn cell(&self, grid: &Grid, unit: u64, headway: usize) -> usize {
+        self.layout.cell(grid, unit as usize, headway)
+    }
+}
+
+impl Layout {
+    fn cell(self, grid: &Grid, unit: usize, headway: usize) -> usize {
+        let (nx, ny) = (grid.x().len(), grid.y().len());
+        match self {
+            Layout::Cells => unit,
+            Layout::HeadwaysAcross => grid.cell(unit / ny, headway, unit % ny),
+            Layout::HeadwaysUp => grid.cell(unit / nx, unit % nx, headway),
+        }
+    }
+}
+
+fn is_distance(parameter: &Parameter) -> bool {
+    matches!(parameter.quantity, Quantity::Gap | Quantity::Thw)
+}
+
+fn headway(parameter: &Parameter, value: f64) -> Headway {
+    match parameter.quantity {
+        Quantity::Thw => Headway::ThwS(parameter.si(value)),
+        _ => Headway::GapM(parameter.si(value)),
+    }
+}
+
+fn headways(axis: &GridAxis) -> Vec<Headway> {
+    axis.values.iter().map(|&value| headway(axis.parameter, value)).collect()
+}

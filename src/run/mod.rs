@@ -1,0 +1,10 @@
+//! Runs: what is planned, computed in parts, merged and scored.
+//!
+//! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`grid`] sweeps maps.
+//! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
+
+pub mod grid;
+pub mod parts;
+pub mod sampling;
+pub mod score;
+pub mod study;

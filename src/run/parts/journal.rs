@@ -1,0 +1,321 @@
+//! The journal of a part that is not finished: one record per line, each with its checksum. The first line says which
+//! run and which interval. A torn or damaged record ends what is believed; all after it is computed again.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::engine::ENGINE_VERSION;
+use crate::support::atomic_file::{is_named, refuse_link};
+use crate::support::hex::hex;
+use crate::{Error, Place, Result};
+
+/// Records are not written more often.
+const SHORTEST_WAIT: Duration = Duration::from_millis(250);
+/// A record waits this many times as long as the last one took to reach the disk, so that journals cost at most 1 %.
+const PATIENCE: u32 = 100;
+/// Largest journal that is read.
+const LARGEST_BYTES: u64 = 4 << 30;
+/// Characters of a checksum in hexadecimal.
+const CHECKSUM: usize = 64;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Head {
+    lanesweep_journal: u64,
+    engine: u64,
+    run_sha256: String,
+    units: Range<u64>,
+}
+
+/// An open journal. The file begins with the first record: a run that ends before leaves none.
+pub struct Journal<T> {
+    path: PathBuf,
+    head: Head,
+    file: Option<File>,
+    due: Instant,
+    spent: Duration,
+    kind: PhantomData<T>,
+}
+
+/// What an earlier process left.
+pub struct Records<T> {
+    /// The whole records, in the order in which they were written.
+    pub records: Vec<T>,
+    /// A record was torn or damaged; it and all after it were dropped.
+    pub torn: bool,
+}
+
+impl<T: Serialize + DeserializeOwned> Journal<T> {
+    /// Opens the journal of a run's interval; what is whole in it is kept and given back.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] where the file is the journal of another run or interval.
+    pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
+        let engine = ENGINE_VERSION;
+        let head = Head { lanesweep_journal: 2, engine, run_sha256: run_sha256.to_owned(), units };
+        let due = Instant::now() + SHORTEST_WAIT;
+        let mut journal =
+            Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
+        refuse_link(path)?;
+        let mut file = match OpenOptions::new().read(true).write(true).open(path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                return Ok((journal, Records { records: Vec::new(), torn: false }));
+            }
+            Err(e) => return Err(Error::io(path, "read", e)),
+        };
+        let io = |e| Error::io(path, "read", e);
+        let about = file.metadata().map_err(io)?;
+        if !about.is_file() || about.len() > LARGEST_BYTES {
+            let help = "move it away; what it holds is then computed again";
+            return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
+        }
+        let mut text = Vec::new();
+        file.read_to_end(&mut text).map_err(io)?;
+        let (records, whole) = journal.parse(&text)?;
+        let torn = whole < text.len();
+        let io = |e| Error::io(path, "write", e);
+        file.set_len(whole as u64).map_err(io)?;
+        file.seek(SeekFrom::End(0)).map_err(io)?;
+        if whole > 0 {
+            journal.file = Some(file);
+        } else {
+            // Not even the head is whole: it is begun anew.
+            std::fs::remove_file(path).map_err(io)?;
+        }
+        Ok((journal, Records { records, torn }))
+    }
+
+    /// The whole records and where they end.
+    fn parse(&self, text: &[u8]) -> Result<(Vec<T>, usize)> {
+        let (mut records, mut whole) = (Vec::new(), 0);
+        for line in text.split_inclusive(|&byte| byte == b'\n') {
+            let Some(body) = checked(line) else { break };
+            if whole == 0 {
+                let help = "move it away, or finish that run first: give the command that it was begun with";
+                let Ok(head) = serde_json::from_slice::<Head>(body) else {
+                    let problem = "this journal is of another version of lanesweep";
+                    return Err(Error::input(Place::file(&self.path), problem, help));
+                };
+                if head.engine != self.head.engine {
+                    let problem = format!(
+                        "this journal is of engine {}, this program has engine {ENGINE_VERSION}: their lanes differ, \
+                         and are never mixed",
+                        head.engine
+                    );
+                    return Err(Error::input(Place::file(&self.path), problem, help));
+                }
+                if head != self.head {
+                    let problem = "this journal belongs to another run or another interval of it";
+                    return Err(Error::input(Place::file(&self.path), problem, help));
+                }
+            } else {
+                let Ok(record) = serde_json::from_slice(body) else { break };
+                records.push(record);
+            }
+            whole += line.len();
+        }
+        Ok((records, whole))
+    }
+
+    /// Is it time for the next record?
+    pub fn is_due(&self) -> bool {
+        Instant::now() >= self.due
+    }
+
+    /// Appends records and brings them to the disk.
+    ///
+    /// # Errors
+    /// [`Error::Io`]: what was there before stays whole, unless the error says that the file itself is gone.
+    pub fn append(&mut self, records: &[T]) -> Result<()> {
+        let started = Instant::now();
+        let mut text = Vec::new();
+        if self.file.is_none() {
+            text = line_of(&self.head)?;
+        }
+        for record in records {
+            text.extend(line_of(record)?);
+        }
+        match &self.file {
+            // The system would go on writing into a file that nobody finds again.
+            Some(file) if !is_named(&self.path, file) => return Err(self.gone()),
+            Some(_) => {}
+            None => {
+                let created = File::create_new(&self.path).map_err(|e| match e.kind() {
+                    std::io::ErrorKind::NotFound => self.gone(),
+                    _ => self.failed(e),
+                })?;
+                self.file = Some(created);
+            }
+        }
+        if let Some(mut file) = self.file.as_ref() {
+            file.write_all(&text).and_then(|()| file.sync_data()).map_err(|e| self.failed(e))?;
+        }
+        let took = started.elapsed();
+        self.spent += took;
+        self.due = Instant::now() + SHORTEST_WAIT.max(took * PATIENCE);
+        Ok(())
+    }
+
+    /// Time that appending has taken so far.
+    pub fn spent(&self) -> Duration {
+        self.spent
+    }
+
+    /// A write that failed leaves a torn record at most.
+    fn failed(&self, source: std::io::Error) -> Error {
+        let kept = "the records before are whole: once this is mended, the same command goes on from them";
+        Error::io(&self.path, "write", std::io::Error::new(source.kind(), format!("{source}; {kept}")))
+    }
+
+    /// The file or its folder was taken away while the run was at work.
+    fn gone(&self) -> Error {
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let what = if folder.is_dir() {
+            "the journal was removed or replaced".to_owned()
+        } else {
+            format!("the folder {} vanished", folder.display())
+        };
+        let why = format!("{what} while the run was at work; what it held is lost: the same command begins anew");
+        Error::io(&self.path, "write", std::io::Error::other(why))
+    }
+
+    /// The part is finished, or is to be forgotten: takes the file away.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn remove(mut self) -> Result<()> {
+        self.file = None;
+        match std::fs::remove_file(&self.path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&self.path, "remove", e)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// `checksum content` and an end of line.
+fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
+    let body =
+        serde_json::to_vec(record).map_err(|e| Error::Internal(format!("a journal record cannot be written: {e}")))?;
+    let mut line = hex(&Sha256::digest(&body)).into_bytes();
+    line.push(b' ');
+    line.extend(body);
+    line.push(b'\n');
+    Ok(line)
+}
+
+/// The content of a whole line.
+fn checked(line: &[u8]) -> Option<&[u8]> {
+    let line = line.strip_suffix(b"\n")?;
+    let (checksum, body) = line.split_at_checked(CHECKSUM)?;
+    let body = body.strip_prefix(b" ")?;
+    (hex(&Sha256::digest(body)).as_bytes() == checksum).then_some(body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(path: &Path) -> (Journal<Vec<u32>>, Records<Vec<u32>>) {
+        Journal::open(path, "run", 0..10).unwrap()
+    }
+
+    #[test]
+    fn wherever_a_journal_is_cut_or_damaged_the_records_before_are_kept_and_no_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("journal");
+        let written = [vec![1], vec![2, 3], vec![4]];
+        let (mut journal, before) = open(&path);
+        assert!(before.records.is_empty() && !path.exists());
+        for record in &written {
+            journal.append(std::slice::from_ref(record)).unwrap();
+        }
+        drop(journal);
+        let text = std::fs::read(&path).unwrap();
+        let ends: Vec<usize> = (0..text.len()).filter(|&at| text[at] == b'\n').map(|at| at + 1).collect();
+        for cut in 0..=text.len() {
+            std::fs::write(&path, &text[..cut]).unwrap();
+            let (_, kept) = open(&path);
+            let whole = ends.iter().filter(|&&end| end <= cut).count().saturating_sub(1);
+            assert_eq!(kept.records, written[..whole], "cut at {cut}");
+            assert_eq!(kept.torn, cut != 0 && !ends.contains(&cut), "cut at {cut}");
+        }
+        for at in ends[0]..text.len() {
+            let mut damaged = text.clone();
+            damaged[at] ^= 0x20;
+            std::fs::write(&path, &damaged).unwrap();
+            let (mut journal, kept) = open(&path);
+            let whole = ends.iter().filter(|&&end| end <= at).count() - 1;
+            assert_eq!(kept.records, written[..whole], "damaged at {at}");
+            journal.append(&[vec![9]]).unwrap();
+            let (_, again) = open(&path);
+            assert_eq!(again.records.len(), whole + 1, "what is appended after a repair is read");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_journal_that_is_taken_away_in_mid_run_is_told_and_not_written_to_in_vain() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let path = out.join("journal");
+        let told = |what: &str, journal: &mut Journal<Vec<u32>>| {
+            let error = journal.append(&[vec![2]]).unwrap_err();
+            assert!(matches!(error, Error::Io { .. }), "{error}");
+            assert!(error.to_string().contains(what) && error.to_string().contains("begins anew"), "{error}");
+            assert!(!error.help().unwrap().contains("typing"), "{error}");
+        };
+        for has_begun in [true, false] {
+            std::fs::create_dir(&out).unwrap();
+            let mut journal = open(&path).0;
+            if has_begun {
+                journal.append(&[vec![1]]).unwrap();
+                std::fs::remove_file(&path).unwrap();
+                told("removed or replaced", &mut journal);
+                std::fs::write(&path, "another one").unwrap();
+                told("removed or replaced", &mut journal);
+            }
+            std::fs::remove_dir_all(&out).unwrap();
+            told("out vanished", &mut journal);
+            assert!(!out.exists());
+        }
+    }
+
+    #[test]
+    fn the_journal_of_another_run_is_refused_and_left_as_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("journal");
+        open(&path).0.append(&[vec![1]]).unwrap();
+        let before = std::fs::read(&path).unwrap();
+        for (run, units) in [("other", 0..10), ("run", 0..9)] {
+            let error = Journal::<Vec<u32>>::open(&path, run, units).err().unwrap();
+            assert!(error.to_string().contains("another run"), "{error}");
+        }
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+        // Of another engine, whose version is part of the head and its checksum; and as earlier versions began.
+        let units = 0..10;
+        let head = Head { lanesweep_journal: 2, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
+        let earlier =
+            serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
+        for (text, said) in [(line_of(&head), "of engine "), (line_of(&earlier), "another version")] {
+            let text = text.unwrap();
+            std::fs::write(&path, &text).unwrap();
+            let error = Journal::<Vec<u32>>::open(&path, "run", 0..10).err().unwrap();
+            assert!(error.to_string().contains(said), "{error}");
+            assert_eq!(std::fs::read(&path).unwrap(), text);
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! What a running part has counted: in memory and, now and then, in its journal.
+
+use std::ops::Range;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::journal::{Journal, Records};
+use crate::support::interrupt;
+use crate::{Error, Place, Result};
+
+/// Counts over a set of units of one plan that join in any order.
+pub trait Countable: Sized + Clone + Serialize + DeserializeOwned {
+    /// The units counted, as disjoint intervals, ascending.
+    fn covered(&self) -> Vec<Range<u64>>;
+    /// Counts over both sets.
+    ///
+    /// # Errors
+    /// Where a unit is in both, or the plans differ.
+    fn join(self, other: Self) -> Result<Self>;
+    /// Whether counts that were read from a file can be those of a run.
+    ///
+    /// # Errors
+    /// What contradicts itself.
+    fn check(&self) -> std::result::Result<(), String>;
+}
+
+/// Finished counts of an interval of units. Where the interval has cuts (the checkpoints of a sampling run), counts on
+/// the two sides of a cut stay apart.
+pub struct Ledger<T> {
+    units: Range<u64>,
+    /// Ends of the segments, ascending; the last is that of the interval.
+    ends: Vec<u64>,
+    /// Counts per segment.
+    segments: Vec<Option<T>>,
+    /// The newest counts, all of one segment.
+    pending: Option<T>,
+    /// Counts of segments that are not in the journal yet.
+    unwritten: Vec<T>,
+    journal: Option<Journal<T>>,
+}
+
+impl<T: Countable> Ledger<T> {
+    /// Nothing counted yet, cut at these units; without a journal nothing outlives the process.
+    pub fn new(units: Range<u64>, cuts: &[u64]) -> Ledger<T> {
+        let inside = cuts.iter().copied().filter(|cut| units.start < *cut && *cut < units.end);
+        let mut ends: Vec<u64> = inside.chain([units.end]).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        let segments = ends.iter().map(|_| None).collect();
+        Ledger { units, ends, segments, pending: None, unwritten: Vec::new(), journal: None }
+    }
+
+    /// Takes over what a journal holds and writes on in it. Returns the number of units that need not be computed.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where a record's counts cannot be, or fit no segment of the interval: its checksum is whole all
+    /// the same.
+    pub fn resume(&mut self, journal: Journal<T>, found: Records<T>) -> Result<u64> {
+        if found.torn {
+            tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
+        }
+        for record in found.records {
+            let refused = |problem: String| {
+                let help = "move the journal away; what it holds is then computed again";
+                Error::input(Place::file(journal.path()), format!("its counts cannot be: {problem}"), help)
+            };
+            record.check().map_err(refused)?;
+            let covered = record.covered();
+            if !covered.is_empty() && self.segment_holding(&covered).is_none() {
+                return Err(refused(format!("units {covered:?} fit no segment of {:?}", self.units)));
+            }
+            self.place(record)?;
+        }
+        self.journal = Some(journal);
+        Ok(self.done())
+    }
+
+    fn segment_of(&self, unit: u64) -> usize {
+        self.ends.partition_point(|end| *end <= unit)
+    }
+
+    /// The one segment that holds all of these intervals.
+    fn segment_holding(&self, covered: &[Range<u64>]) -> Option<usize> {
+        let (first, last) = (covered.first()?, covered.last()?);
+        let segment = self.segment_of(first.start);
+        (first.start >= self.units.start && last.end <= *self.ends.get(segment)?).then_some(segment)
+    }
+
+    fn place(&mut self, counts: T) -> Result<()> {
+        let covered = counts.covered();
+        if covered.is_empty() {
+            return Ok(());
+        }
+        let Some(segment) = self.segment_holding(&covered) else {
+            return Err(Error::Internal(format!("units {covered:?} do not fit a segment of {:?}", self.units)));
+        };
+        let slot = &mut self.segments[segment];
+        *slot = Some(match slot.take() {
+            Some(before) => before.join(counts)?,
+            None => counts,
+        });
+        Ok(())
+    }
+
+    /// Adds the counts of a chunk, which crosses no cut; now and then they go to the journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`] of the journal; [`Error::Interrupted`] once an end was asked for: then everything is in it.
+    pub fn add(&mut self, counts: T) -> Result<()> {
+        let start = |counts: &T| counts.covered().first().map(|range| range.start);
+        let is_same = match (self.pending.as_ref().and_then(start), start(&counts)) {
+            (Some(a), Some(b)) => self.segment_of(a) == self.segment_of(b),
+            _ => true,
+        };
+        if !is_same {
+            self.settle()?;
+        }
+        self.pending = Some(match self.pending.take() {
+            Some(before) => before.join(counts)?,
+            None => counts,
+        });
+        if self.journal.as_ref().is_some_and(Journal::is_due) {
+            self.flush()?;
+        }
+        self.check_interrupted()
+    }
+
+    /// Ends the run where an end was asked for; needs a journal, else there is nothing to go on from.
+    fn check_interrupted(&mut self) -> Result<()> {
+        if self.journal.is_none() || !interrupt::requested() {
+            return Ok(());
+        }
+        self.flush()?;
+        let total = self.units.end - self.units.start;
+        match self.done() {
+            done if done == total => Ok(()),
+            done => Err(Error::Interrupted { done: format!("{done} of {total} units are done and kept") }),
+        }
+    }
+
+    /// Puts the newest counts into their segment.
+    fn settle(&mut self) -> Result<()> {
+        let Some(counts) = self.pending.take() else { return Ok(()) };
+        if self.journal.is_some() {
+            self.unwritten.push(counts.clone());
+        }
+        self.place(counts)
+    }
+
+    /// Brings everything to the journal.
+    fn flush(&mut self) -> Result<()> {
+        self.settle()?;
+        if let Some(journal) = self.journal.as_mut().filter(|_| !self.unwritten.is_empty()) {
+            journal.append(&self.unwritten)?;
+            self.unwritten.clear();
+        }
+        Ok(())
+    }
+
+    /// Number of units counted, pending ones left out.
+    fn done(&self) -> u64 {
+        self.segments.iter().flatten().flat_map(Countable::covered).map(|range| range.end - range.start).sum()
+    }
+
+    /// The interval.
+    pub fn units(&self) -> Range<u64> {
+        self.units.clone()
+    }
+
+    /// The intervals of a range that are not counted yet, cut at the cuts, ascending.
+    ///
+    /// # Errors
+    /// Of [`Countable::join`].
+    pub fn missing(&mut self, range: Range<u64>) -> Result<Vec<Range<u64>>> {
+        self.settle()?;
+        let mut covered: Vec<Range<u64>> = self.segments.iter().flatten().flat_map(Countable::covered).collect();
+        covered.sort_by_key(|range| range.start);
+        let mut missing = Vec::new();
+        let mut at = range.start;
+        let mut gap = |from: u64, to: u64| {
+            let cuts = self.ends.iter().copied().filter(|cut| from < *cut && *cut < to);
+            let mut start = from;
+            for end in cuts.chain([to]) {
+                if start < end {
+                    missing.push(start..end);
+                }
+                start = end;
+            }
+        };
+        for done in covered.iter().filter(|done| done.end > range.start && done.start < range.end) {
+            gap(at, done.start.max(at));
+            at = at.max(done.end);
+        }
+        gap(at.min(range.end), range.end);
+        Ok(missing)
+    }
+
+    /// The counts of the segments that lie in a range, joined; `None` where nothing is counted there.
+    ///
+    /// # Errors
+    /// Of [`Countable::join`].
+    pub fn counts(&mut self, range: Range<u64>) -> Result<Option<T>> {
+        self.settle()?;
+        let inside = self.segments.iter().flatten().filter(|counts| {
+            counts.covered().first().is_some_and(|covered| range.start <= covered.start && covered.start < range.end)
+        });
+        let mut joined: Option<T> = None;
+        for counts in inside {
+            joined = Some(match joined {
+                Some(before) => before.join(counts.clone())?,
+                None => counts.clone(),
+            });
+        }
+        Ok(joined)
+    }
+
+    /// The counts of all segments, joined; nothing is counted afterwards, so that no count is held twice.
+    ///
+    /// # Errors
+    /// Of [`Countable::join`].
+    pub fn take(&mut self) -> Result<Option<T>> {
+        self.settle()?;
+        self.unwritten.clear();
+        let mut all = self.segments.iter_mut().filter_map(Option::take);
+        let Some(first) = all.next() else { return Ok(None) };
+        all.try_fold(first, T::join).map(Some)
+    }
+
+    /// Everything counted, segment by segment, and the journal, to be removed once the result stands.
+    ///
+    /// # Errors
+    /// Of [`Countable::join`].
+    pub fn finish(mut self) -> Result<(Vec<T>, Option<Journal<T>>)> {
+        self.settle()?;
+        Ok((self.segments.into_iter().flatten().collect(), self.journal))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    /// Counts every unit once.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    struct Units(Vec<u64>);
+
+    impl Countable for Units {
+        fn covered(&self) -> Vec<Range<u64>> {
+            self.0.iter().map(|&unit| unit..unit + 1).collect()
+        }
+
+        fn join(mut self, other: Self) -> Result<Self> {
+            self.0.extend(other.0);
+            self.0.sort_unstable();
+            Ok(self)
+        }
+
+        fn check(&self) -> std::result::Result<(), String> {
+            Ok(())
+        }
+    }
+
+    fn units(range: Range<u64>) -> Units {
+        Units(range.collect())
+    }
+
+    #[test]
+    fn what_a_journal_holds_is_not_missing_and_segments_stay_apart() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("journal");
+        let open = |ledger: &mut Ledger<Units>| {
+            let (journal, found) = Journal::open(&path, "run", 10..100).unwrap();
+            ledger.resume(journal, found).unwrap()
+        };
+        let mut ledger = Ledger::new(10..100, &[5, 20, 40, 100, 400]);
+        assert_eq!(open(&mut ledger), 0);
+        assert_eq!(ledger.missing(10..100).unwrap(), [10..20, 20..40, 40..100]);
+        for range in [10..15, 15..20, 20..30, 50..60] {
+            ledger.add(units(range)).unwrap();
+        }
+        ledger.flush().unwrap();
+        drop(ledger);
+
+        let mut ledger = Ledger::new(10..100, &[20, 40]);
+        assert_eq!(open(&mut ledger), 30);
+        assert_eq!(ledger.missing(10..100).unwrap(), [30..40, 40..50, 60..100]);
+        assert_eq!(ledger.missing(0..35).unwrap(), [0..10, 30..35]);
+        for range in ledger.missing(10..100).unwrap() {
+            ledger.add(units(range)).unwrap();
+        }
+        assert_eq!(ledger.counts(10..40).unwrap(), Some(units(10..40)));
+        // A record that is whole but of other units, or of two segments: the file's fault.
+        for strange in [units(15..25), units(0..11), units(99..101)] {
+            let path = dir.path().join("strange");
+            let mut journal = Journal::<Units>::open(&path, "run", 10..100).unwrap().0;
+            journal.append(&[strange]).unwrap();
+            let (journal, found) = Journal::<Units>::open(&path, "run", 10..100).unwrap();
+            let error = Ledger::new(10..100, &[20, 40]).resume(journal, found).unwrap_err();
+            assert!(matches!(error, Error::Input { .. }) && error.to_string().contains("no segment"), "{error}");
+            std::fs::remove_file(path).unwrap();
+        }
+        let (segments, journal) = ledger.finish().unwrap();
+        assert_eq!(segments, [units(10..20), units(20..40), units(40..100)]);
+        journal.unwrap().remove().unwrap();
+        assert!(!path.exists());
+    }
+}

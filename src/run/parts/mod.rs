@@ -1,0 +1,20 @@
+//! Runs in parts: shards of a plan, journals of finished chunks, part files, and what merging checks.
+//!
+//! A part is an interval of units. While it runs, a [`Ledger`] keeps what is counted and appends it to a journal; when
+//! it is done, it becomes a part file. Both say which run they belong to, by its hash. Counts themselves live
+//! in [`sweep`](crate::engine) and [`sampling`](crate::run::sampling); verbs that can be split are in [`cli`](crate::cli).
+
+mod countable;
+mod folder;
+mod journal;
+mod ledger;
+mod part;
+mod sealed;
+mod shard;
+
+pub use folder::{Found, collect};
+pub use journal::{Journal, Records};
+pub use ledger::{Countable, Ledger};
+pub use part::{Part, read_part, write_part};
+pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};
+pub use shard::Shard;

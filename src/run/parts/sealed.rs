@@ -1,0 +1,203 @@
+//! JSON with kind, version and checksum around it: whole and unchanged, or refused.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+use sha2::{Digest, Sha256};
+
+use crate::engine::ENGINE_VERSION;
+use crate::support::hex::hex;
+use crate::{Error, Place, Result};
+
+const VERSION: u64 = 2;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed<'a> {
+    /// What the content is: `part`, `plan`.
+    lanesweep: String,
+    version: u64,
+    /// [`ENGINE_VERSION`] of the program that wrote it.
+    engine: u64,
+    /// SHA-256 of kind, version, engine and the content's bytes, in hexadecimal.
+    sha256: String,
+    #[serde(borrow)]
+    content: &'a RawValue,
+}
+
+/// A checksum detects damage. It is no signature: whoever changes a file can make its checksum anew.
+fn checksum(kind: &str, content: &RawValue) -> String {
+    let digest = Sha256::new().chain_update(format!("{kind} {VERSION} {ENGINE_VERSION}\n"));
+    hex(&digest.chain_update(content.get()).finalize())
+}
+
+/// The text of a sealed file, with its content's hash.
+///
+/// # Errors
+/// None for what this program makes.
+pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> {
+    let unwritable = |e: serde_json::Error| unwritable(kind, &e);
+    let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
+    let sha256 = checksum(kind, &content);
+    let (lanesweep, engine) = (kind.to_owned(), ENGINE_VERSION);
+    let sealed = Sealed { lanesweep, version: VERSION, engine, sha256, content: &content };
+    let mut text = serde_json::to_vec(&sealed).map_err(unwritable)?;
+    text.push(b'\n');
+    Ok((text, sealed.sha256))
+}
+
+fn unwritable(kind: &str, e: &serde_json::Error) -> Error {
+    Error::Internal(format!("a {kind} cannot be written: {e}"))
+}
+
+/// The content of a sealed text with its checksum. `again` says how such a file is made.
+///
+/// # Errors
+/// [`Error::Input`] for another kind or version, or anything but the bytes that were written.
+pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again: &str) -> Result<(T, String)> {
+    let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    if let Some(head) = head_of(text).filter(|head| head.kind == kind) {
+        head.check().map_err(wrong)?;
+    }
+    let sealed: Sealed = serde_json::from_slice(text).map_err(|e| wrong(format!("this is no whole {kind}: {e}")))?;
+    if sealed.lanesweep != kind {
+        return Err(wrong(format!("this is a `{}`, where a `{kind}` is needed", sealed.lanesweep)));
+    }
+    let head = Head { kind: sealed.lanesweep, version: sealed.version, engine: Some(sealed.engine) };
+    head.check().map_err(wrong)?;
+    if checksum(kind, sealed.content) != sealed.sha256 {
+        return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
+    }
+    let content = serde_json::from_str(sealed.content.get())
+        .map_err(|e| wrong(format!("its content is of another version: {e}")))?;
+    Ok((content, sealed.sha256))
+}
+
+/// Reads a sealed file of at most so many bytes.
+///
+/// # Errors
+/// [`Error::Io`]; as [`unseal`].
+pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, most_bytes: u64, again: &str) -> Result<(T, String)> {
+    unseal(kind, &crate::support::input_file::read(path, most_bytes)?, &Place::file(path), again)
+}
+
+/// What a sealed file calls itself before its content.
+struct Head {
+    kind: String,
+    version: u64,
+    /// None before version 2.
+    engine: Option<u64>,
+}
+
+impl Head {
+    /// Whether this program may use the file.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.version != VERSION {
+            return Err(format!("its version is {}, this program reads {VERSION}", self.version));
+        }
+        match self.engine {
+            Some(ENGINE_VERSION) => Ok(()),
+            Some(engine) => Err(format!(
+                "it is of engine {engine}, this program has engine {ENGINE_VERSION}: their lanes differ, and are never \
+                 mixed"
+            )),
+            None => Err("it does not tell its engine".to_owned()),
+        }
+    }
+}
+
+/// The beginning of a sealed file, as [`seal`] writes it.
+fn head_of(text: &[u8]) -> Option<Head> {
+    fn number<'a>(rest: &'a str, before: &str) -> Option<(u64, &'a str)> {
+        let rest = rest.strip_prefix(before)?;
+        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+        Some((rest[..digits].parse().ok()?, &rest[digits..]))
+    }
+    let text = String::from_utf8_lossy(&text[..text.len().min(LONGEST_HEAD)]);
+    let (kind, rest) = text.strip_prefix("{\"lanesweep\":\"")?.split_once('"')?;
+    let (version, rest) = number(rest, ",\"version\":")?;
+    let engine = number(rest, ",\"engine\":").map(|(engine, _)| engine);
+    Some(Head { kind: kind.to_owned(), version, engine })
+}
+
+/// Bytes in which a sealed file tells its kind and versions.
+const LONGEST_HEAD: usize = 256;
+
+/// Reads the first line of a sealed file, behind which more may come: that is left in the reader.
+///
+/// # Errors
+/// [`Error::Io`]; as [`unseal`].
+pub fn read_sealed_line<T: DeserializeOwned>(
+    kind: &str,
+    path: &Path,
+    most_bytes: u64,
+    again: &str,
+) -> Result<(T, String, BufReader<File>)> {
+    let mut file = BufReader::new(crate::support::input_file::open(path)?);
+    let io = |e| Error::io(path, "read", e);
+    let wrong = |problem: String| Error::input(Place::file(path), problem, again);
+    // Of another version all may be one line.
+    if let Some(head) = head_of(file.fill_buf().map_err(io)?).filter(|head| head.kind == kind) {
+        head.check().map_err(wrong)?;
+    }
+    let mut line = Vec::new();
+    file.by_ref().take(most_bytes).read_until(b'\n', &mut line).map_err(io)?;
+    let (content, sha256) = unseal(kind, &line, &Place::file(path), again)?;
+    Ok((content, sha256, file))
+}
+
+/// The kind of a sealed file, without reading its content.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] for what is not sealed.
+pub fn kind_of(path: &Path) -> Result<String> {
+    let mut text = Vec::new();
+    let file = crate::support::input_file::open(path)?;
+    file.take(LONGEST_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
+    head_of(&text).map(|head| head.kind).ok_or_else(|| {
+        let help = "give a file or folder that a run in parts has written";
+        Error::input(Place::file(path), "this is no whole file of a run in parts", help)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_another_engine_or_version_is_refused_by_its_number() {
+        let (text, sha256) = seal("part", &vec![1.5_f64]).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let told = |from: &str, to: &str| {
+            assert!(text.contains(from), "{text}");
+            let changed = text.replace(from, to);
+            unseal::<Vec<f64>>("part", changed.as_bytes(), &Place::item("here"), "").unwrap_err().to_string()
+        };
+        let engine = format!("\"engine\":{ENGINE_VERSION}");
+        let other = told(&engine, "\"engine\":999");
+        assert!(other.contains(&format!("of engine 999, this program has engine {ENGINE_VERSION}")), "{other}");
+        assert!(told(&format!("\"version\":{VERSION},{engine}"), "\"version\":1").contains("its version is 1"));
+        // The number alone does not pass for another one: it is in the checksum.
+        let of_other = hex(&Sha256::digest(format!("part {VERSION} {}\n[1.5]", ENGINE_VERSION + 1)));
+        assert!(told(&sha256, &of_other).contains("checksum"));
+    }
+
+    #[test]
+    fn every_changed_byte_and_every_cut_is_noticed() {
+        let (text, sha256) = seal("part", &vec![1.5_f64, 0.1, 3.0]).unwrap();
+        let place = Place::item("here");
+        let read = |text: &[u8]| unseal::<Vec<f64>>("part", text, &place, "make it again");
+        assert_eq!(read(&text).unwrap(), (vec![1.5, 0.1, 3.0], sha256));
+        for at in 0..text.len() - 1 {
+            let mut changed = text.clone();
+            changed[at] ^= 1;
+            assert!(read(&changed).is_err(), "byte {at}");
+            assert!(read(&text[..at]).is_err(), "cut at {at}");
+        }
+        assert!(unseal::<Vec<f64>>("plan", &text, &place, "").unwrap_err().to_string().contains("a `plan` is needed"));
+    }
+}

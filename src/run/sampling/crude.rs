@@ -1,0 +1,229 @@
+//! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the samples.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::rows::{EstimateRow, crude_rows};
+use super::tally::{SampleTally, TallyOptions};
+use crate::engine::{Backend, Chunk, LanePlan, Recheck, SweepOptions, SweepSummary, Wanted, sweep};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::parts::Ledger;
+use crate::stats::density::Exposure;
+use crate::stats::estimate::{BinomialInterval, Checkpoints, StopReason, StopRule};
+use crate::{Error, Place, Result};
+
+/// How sampled lanes are computed.
+#[derive(Clone, Copy)]
+pub struct Lanes<'a> {
+    /// What computes.
+    pub backend: &'a dyn Backend,
+    /// What stands in for a device that fails.
+    pub fallback: Option<&'a dyn Backend>,
+    /// Checks a sample of a device's lanes.
+    pub recheck: Option<&'a Recheck<'a>>,
+}
+
+/// How estimates are made of counts.
+#[derive(Debug, Clone, Copy)]
+pub struct CrudeOptions<'a> {
+    /// When to end; looked at only where the whole run is sampled.
+    pub stop: StopRule,
+    /// Kind of interval.
+    pub interval: BinomialInterval,
+    /// Its level.
+    pub level: f64,
+    /// The exposure that risks follow from.
+    pub exposure: Option<&'a Exposure>,
+    /// The headway is a parameter of the density.
+    pub is_sampled_headway: bool,
+}
+
+/// The estimates after so many samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Checkpoint {
+    /// Samples, void ones included.
+    pub samples: u64,
+    /// One per model and criterion: probability, interval. Over all headways where there are several.
+    pub rows: Vec<CheckpointRow>,
+}
+
+/// One estimate at a checkpoint.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckpointRow {
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Estimate.
+    pub probability: f64,
+    /// Ends of the interval of the draws alone: more samples make it smaller.
+    pub interval: [f64; 2],
+}
+
+/// What a run of crude Monte Carlo gave.
+#[derive(Debug, Clone)]
+pub struct CrudeRun {
+    /// The counts.
+    pub tally: SampleTally,
+    /// The estimates.
+    pub rows: Vec<EstimateRow>,
+    /// How they came about; empty for a range that does not begin at 0.
+    pub convergence: Vec<Checkpoint>,
+    /// What ended it.
+    pub stopped: StopReason,
+    /// How the sweep went.
+    pub summary: SweepSummary,
+}
+
+/// Samples `range` of a plan that makes its own cases. The stop rules are looked at after 4,096·2^k samples. `each`
+/// takes every chunk (rows on request, progress).
+///
+/// # Errors
+/// [`Error::Usage`] for stop rules or an end beyond the plan with a range that is not the whole; of the backends; of
+/// `each`.
+pub fn sample_crude(
+    plan: &LanePlan,
+    range: Range<u64>,
+    lanes: &Lanes,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+    each: impl FnMut(&Chunk) -> Result<()>,
+) -> Result<CrudeRun> {
+    let mut ledger = Ledger::new(range, &checkpoints(plan.unit_count()));
+    sample_into(plan, &mut ledger, lanes, counting, options, each)
+}
+
+/// The sample sizes at which a run of so many samples is looked at.
+pub fn checkpoints(samples: u64) -> Vec<u64> {
+    let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
+    std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
+}
+
+/// The same, as far as the ledger does not hold it already; its cuts must be the plan's [`checkpoints`].
+///
+/// # Errors
+/// As [`sample_crude`], and of the ledger's journal; [`Error::Interrupted`].
+pub fn sample_into(
+    plan: &LanePlan,
+    ledger: &mut Ledger<SampleTally>,
+    lanes: &Lanes,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+    mut each: impl FnMut(&Chunk) -> Result<()>,
+) -> Result<CrudeRun> {
+    let started = Instant::now();
+    let range = ledger.units();
+    if range.start >= range.end || range.end > plan.unit_count() {
+        let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
+        return Err(Error::usage(
+            Place::item("--shard"),
+            problem,
+            "give an interval that is not empty, counted from 0",
+        ));
+    }
+    let is_whole = range == (0..plan.unit_count());
+    if !is_whole && (options.stop.relative_half_width.is_some() || options.stop.time_limit.is_some()) {
+        let problem = "a part of a run cannot tell when the whole is good enough";
+        return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
+    }
+    let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
+    let how = SweepOptions { wanted, fallback: lanes.fallback, recheck: lanes.recheck };
+    let mut tally = SampleTally::empty(plan, counting);
+    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+    let mut convergence = Vec::new();
+    let looks = checkpoints(plan.unit_count());
+    let mut at = range.start;
+    loop {
+        let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
+        let next = if is_whole { look } else { range.end };
+        for missing in ledger.missing(at..next)? {
+            let part = sweep(plan, missing, lanes.backend, &how, |chunk| {
+                each(&chunk)?;
+                ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
+            })?;
+            summary.add(&part);
+        }
+        if let Some(counts) = ledger.counts(at..next)? {
+            tally = tally.merge(counts)?;
+        }
+        at = next;
+        let rows = rows_of(plan, &tally, options, StopReason::Samples);
+        if is_whole {
+            convergence.push(Checkpoint { samples: at, rows: overall(&rows) });
+        }
+        if let Some(stopped) = stopped(options, counting.criterion, &rows, at, range.end, started) {
+            let rows = rows_of(plan, &tally, options, stopped);
+            return Ok(CrudeRun { tally, rows, convergence, stopped, summary });
+        }
+    }
+}
+
+/// The run that parts of it make together: with the convergence of the run in one piece where they are all there.
+///
+/// # Errors
+/// [`Error::Input`] where parts are of different runs or hold the same samples.
+pub fn crude_of_segments(
+    plan: &LanePlan,
+    mut segments: Vec<SampleTally>,
+    counting: &TallyOptions,
+    options: &CrudeOptions,
+) -> Result<CrudeRun> {
+    segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
+    let looks = checkpoints(plan.unit_count());
+    let mut tally = SampleTally::empty(plan, counting);
+    let mut convergence = Vec::new();
+    for segment in segments {
+        tally = tally.merge(segment)?;
+        // Only what begins at the first sample and has no gap was ever looked at.
+        if let [covered] = tally.covered()
+            && covered.start == 0
+            && looks.contains(&covered.end)
+        {
+            let rows = overall(&rows_of(plan, &tally, options, StopReason::Samples));
+            convergence.push(Checkpoint { samples: covered.end, rows });
+        }
+    }
+    if tally.samples() < plan.unit_count() {
+        convergence.clear();
+    }
+    let rows = rows_of(plan, &tally, options, StopReason::Samples);
+    Ok(CrudeRun { tally, rows, convergence, stopped: StopReason::Samples, summary: SweepSummary::default() })
+}
+
+fn rows_of(plan: &LanePlan, tally: &SampleTally, options: &CrudeOptions, stopped: StopReason) -> Vec<EstimateRow> {
+    let &CrudeOptions { interval, level, exposure, is_sampled_headway, .. } = options;
+    crude_rows(plan, tally, exposure, is_sampled_headway, interval, level, stopped)
+}
+
+/// The rows over all headways.
+fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
+    let has_all = rows.iter().any(|row| row.headway == "all");
+    let kept = rows.iter().filter(|row| !has_all || row.headway == "all");
+    let of = |row: &EstimateRow| CheckpointRow {
+        model: row.model,
+        criterion: row.criterion,
+        probability: row.estimate.probability,
+        interval: row.draws,
+    };
+    kept.map(of).collect()
+}
+
+/// The widest of the criterion's intervals decides, over all models.
+fn stopped(
+    options: &CrudeOptions,
+    criterion: Criterion,
+    rows: &[EstimateRow],
+    samples: u64,
+    end: u64,
+    started: Instant,
+) -> Option<StopReason> {
+    let has_all = rows.iter().any(|row| row.headway == "all");
+    let judged = rows.iter().filter(|r| r.criterion == criterion && (!has_all || r.headway == "all"));
+    // More samples make the draws' share of the uncertainty smaller, never that of the data.
+    let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
+    let rule = StopRule { samples: end, ..options.stop };
+    rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
+}

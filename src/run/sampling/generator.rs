@@ -1,0 +1,254 @@
+//! From a parameter space and a mixture to the numbers that a case generator holds.
+
+use crate::engine::attention_rules;
+use crate::engine::generated::{
+    Generator, Lateral, MOST_PARAMETERS, NO_SLOT, Path, PointSource, Points, Quantity, Recipe, ReducedColumns,
+};
+use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use crate::model::scalar::Real;
+use crate::scenario::Category;
+use crate::scenario::parameterization::{AfterDuration, Kind, Sizes};
+use crate::stats::density::{Mixture, ParameterSpace, Quantity as Parameter};
+use crate::stats::random::{AliasTable, Sobol, Stream};
+use crate::{Error, Place, Result};
+
+/// Purpose of the stream that samples are drawn from.
+pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
+
+/// Where points come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleSource {
+    /// Independent draws.
+    Random,
+    /// Scrambled Sobol points.
+    Sobol,
+}
+
+/// The generator that draws from a mixture over a parameter space.
+///
+/// # Errors
+/// [`Error::Usage`] for more than [`MOST_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
+/// Sobol points that there are not; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
+pub fn generator_of(
+    space: &ParameterSpace,
+    mixture: &Mixture,
+    sizes: &Sizes,
+    profile: &Profile,
+    source: SampleSource,
+    seed: u64,
+) -> Result<Generator> {
+    let d = mixture.dimensions();
+    let n = mixture.weights().len();
+    let is_even = mixture.weights().iter().all(|w| *w == mixture.weights()[0]);
+    let mut points = Points {
+        source: match source {
+            SampleSource::Random => PointSource::Random(Stream { seed, purpose: SAMPLE_PURPOSE }),
+            SampleSource::Sobol => PointSource::Sobol(Sobol::new(seed, 2 + d as u32)?),
+        },
+        dimensions: d,
+        weights: if is_even { None } else { Some(AliasTable::new(mixture.weights())?) },
+        means: Vec::with_capacity(n * d),
+        factor_of: Vec::with_capacity(n),
+        factors: Vec::new(),
+    };
+    for component in 0..n {
+        points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
+        let factor: Vec<f32> = mixture.factor(component).iter().map(|&v| v as f32).collect();
+        // Kernels share one factor.
+        let known = points.factors.len() / (d * d);
+        let last = known.checked_sub(1).filter(|&at| points.factors[at * d * d..] == factor);
+        points.factor_of.push(last.unwrap_or(known) as u32);
+        if last.is_none() {
+            points.factors.extend(factor);
+        }
+    }
+    assembled(space, points, sizes, profile)
+}
+
+/// The generator whose sample `i` is point `i`.
+///
+/// # Errors
+/// As [`generator_of`]; [`Error::Internal`] without points or for one of another length.
+pub fn generator_of_points(
+    space: &ParameterSpace,
+    points: &[Vec<f64>],
+    sizes: &Sizes,
+    profile: &Profile,
+) -> Result<Generator> {
+    let d = space.dimensions();
+    if points.is_empty() || points.iter().any(|p| p.len() != d) {
+        return Err(Error::Internal(format!("points to simulate must have {d} parameters")));
+    }
+    let points = Points {
+        source: PointSource::Given,
+        dimensions: d,
+        weights: None,
+        means: points.iter().flatten().map(|&v| rounded(v)).collect(),
+        factor_of: vec![0; points.len()],
+        factors: vec![0.0; d * d],
+    };
+    assembled(space, points, sizes, profile)
+}
+
+fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Profile) -> Result<Generator> {
+    let d = points.dimensions;
+    if d > MOST_PARAMETERS || d != space.dimensions() {
+        return Err(Error::usage(
+            Place::item(name_of(space)),
+            format!("{d} parameters cannot be sampled, {MOST_PARAMETERS} can"),
+            "use a parameterization with fewer",
+        ));
+    }
+    let category = space.id().category;
+    if category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed {
+        return Err(Error::usage(
+            Place::item(format!("profile {}", profile.name)),
+            "its cut-outs begin at the exposure of the vehicle ahead, which sampled lanes do not follow",
+            "use a profile with cut_out_target = \"nearest-unsafe\", for instance --profile paper",
+        ));
+    }
+    let recipe = recipe(space, sizes, profile)?;
+    Ok(Generator { points, recipe, basis: basis(space) })
+}
+
+fn name_of(space: &ParameterSpace) -> String {
+    format!("{} {}", space.id().category.label(), space.id().key)
+}
+
+fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Recipe> {
+    let id = space.id();
+    let category = id.category;
+    let pair = category == Category::CutOut;
+    let lead = match (pair, sizes.lead) {
+        (true, None) => {
+            let problem = "a cut-out needs the size of the vehicle ahead of the cutting-out one";
+            return Err(Error::input(Place::item(name_of(space)), problem, "fit the density again"));
+        }
+        (_, lead) => lead.unwrap_or(sizes.target),
+    };
+    let mut slots = [NO_SLOT; 11];
+    let (mut lower, mut upper) = ([f32::MIN; MOST_PARAMETERS], [f32::MAX; MOST_PARAMETERS]);
+    for (j, (quantity, parameter)) in space.quantities().iter().zip(space.parameters()).enumerate() {
+        if let Some(slot) = slot_of(*quantity) {
+            slots[slot as usize] = j as u32;
+        }
+        if let Some(bound) = parameter.lower {
+            lower[j] = at_least(bound, parameter.lower_excluded);
+        }
+        if let Some(bound) = parameter.upper {
+            upper[j] = at_most(bound);
+        }
+    }
+    let path = match (id.kind, id.key) {
+        (Kind::Svd(_), _) => Path::Reduced,
+        (_, "ii") => Path::Sinusoid,
+        _ => Path::Kinematic,
+    };
+    let lateral = match (category, id.key) {
+        (Category::CutIn, "1" | "2") => Lateral::Entering,
+        (Category::CutOut, "a" | "b") => Lateral::Leaving,
+        (Category::CutOut, _) => Lateral::Gone,
+        _ => Lateral::Centred,
+    };
+    let frame = &profile.frame;
+    let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
+    let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
+    let [least_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
+    Ok(Recipe {
+        path: path as u32,
+        lateral: lateral as u32,
+        dimensions: space.dimensions() as u32,
+        pair: u32::from(pair),
+        decelerates: u32::from(category == Category::Lvd && id.kind == Kind::Kinematic),
+        unlimited: u32::from(unlimited),
+        judged: u32::from(!(pair && frame.cut_out_judged == CutOutJudged::Ahead)),
+        step_cap: profile.step_cap(),
+        slots,
+        columns: columns(space),
+        lower,
+        upper,
+        least_duration: at_least(least_duration, false),
+        longest_duration: at_most(longest_duration),
+        dt: frame.dt_s as f32,
+        inverse_dt: (1.0 / frame.dt_s) as f32,
+        lane_change: space.options().lane_change_m as f32,
+        half_lengths: [half(sizes.ego.length_m, sizes.target.length_m), half(sizes.ego.length_m, lead.length_m)],
+        half_widths: [half(sizes.ego.width_m, sizes.target.width_m), half(sizes.ego.width_m, lead.width_m)],
+        principal_length: sizes.target.length_m as f32,
+        ego_width: sizes.ego.width_m as f32,
+        attention: attention_rules(profile, category).map(|rule| rule.cast()),
+    })
+}
+
+/// Where a case generator keeps a parameter; `None` for coefficients.
+fn slot_of(parameter: Parameter) -> Option<Quantity> {
+    Some(match parameter {
+        Parameter::TargetSpeed | Parameter::InitialSpeed => Quantity::TargetSpeed,
+        Parameter::LateralSpeed => Quantity::LateralSpeed,
+        Parameter::EgoSpeed => Quantity::EgoSpeed,
+        Parameter::TargetAcceleration => Quantity::TargetAcceleration,
+        Parameter::LeadSpeed => Quantity::LeadSpeed,
+        Parameter::LeadAcceleration => Quantity::LeadAcceleration,
+        Parameter::LeadGap => Quantity::LeadGap,
+        Parameter::Duration => Quantity::Duration,
+        Parameter::FinalSpeed => Quantity::FinalSpeed,
+        Parameter::MeanDeceleration => Quantity::MeanDeceleration,
+        Parameter::TimeHeadway => Quantity::TimeHeadway,
+        Parameter::Coefficient(_) => return None,
+    })
+}
+
+/// The least number of the lane arithmetic that keeps a lower bound; never a subnormal one.
+fn at_least(bound: f64, excluded: bool) -> f32 {
+    let rounded = bound as f32;
+    let kept = |v: f32| if excluded { f64::from(v) > bound } else { f64::from(v) >= bound };
+    let least = if kept(rounded) { rounded } else { rounded.next_up() };
+    if least.is_subnormal() { f32::MIN_POSITIVE } else { least }
+}
+
+/// The largest number of the lane arithmetic that keeps an upper bound.
+fn at_most(bound: f64) -> f32 {
+    let rounded = bound as f32;
+    if f64::from(rounded) <= bound { rounded } else { rounded.next_down() }
+}
+
+fn columns(space: &ParameterSpace) -> ReducedColumns {
+    let (Some(reduction), Kind::Svd(d)) = (space.reduction(), space.id().kind) else {
+        return ReducedColumns {
+            lateral: NO_SLOT,
+            lead_speed: NO_SLOT,
+            lead_gap: NO_SLOT,
+            ..ReducedColumns::default()
+        };
+    };
+    let instants = space.options().svd_instants as u32;
+    let (lateral, speed, lead_speed) = match space.id().category {
+        Category::CutIn => (0, instants, NO_SLOT),
+        Category::CutOut => (0, instants, 2 * instants),
+        Category::Lvd => (NO_SLOT, 0, NO_SLOT),
+    };
+    ReducedColumns {
+        width: reduction.basis.mean.len() as u32,
+        instants,
+        coefficients: d as u32,
+        lateral,
+        speed,
+        lead_speed,
+        ego_speed: reduction.ego_speed_column() as u32,
+        lead_gap: reduction.lead_gap_column().map_or(NO_SLOT, |column| column as u32),
+        duration: reduction.duration_column() as u32,
+    }
+}
+
+/// The host's one rounding; -0 becomes 0, as no number of a lane is -0.
+fn rounded(value: f64) -> f32 {
+    f32::from_f64(value)
+}
+
+/// Mean and directions divided by the weights, so that a lane only multiplies and adds.
+fn basis(space: &ParameterSpace) -> Vec<f32> {
+    let (Some(reduction), Kind::Svd(d)) = (space.reduction(), space.id().kind) else { return Vec::new() };
+    let basis = &reduction.basis;
+    let divided = |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| rounded(v / w)).collect::<Vec<_>>();
+    std::iter::once(&basis.mean).chain(&basis.directions[..d]).flat_map(divided).collect()
+}

@@ -1,0 +1,158 @@
+//! Samples and failures by the kernel that they were drawn from. A kernel is one scenario, so these counts tell how far
+//! other data would give another estimate.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::engine::{Chunk, LanePlan};
+use crate::model::criterion::Criterion;
+use crate::stats::estimate::{ClusterRate, Clusters, cluster_rate};
+
+/// Groups that kernels are counted in, at most: kernel k counts in group k mod 512. Fewer kernels are groups of their
+/// own; of more, groups vary as much as kernels do, and a journal stays small.
+const MAX_GROUPS: usize = 512;
+
+/// A sample without a kernel: void.
+pub(super) const NO_KERNEL: u32 = u32::MAX;
+
+/// Counts over a set of samples, per group of kernels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KernelCounts {
+    /// Valid samples per group.
+    #[serde(with = "packed")]
+    samples: Vec<u64>,
+    /// Failed lanes: headway × model × criterion × group, the last innermost.
+    #[serde(with = "packed")]
+    failures: Vec<u64>,
+}
+
+impl KernelCounts {
+    /// Nothing yet; `None` for a plan whose points come from no kernels.
+    pub(super) fn empty(plan: &LanePlan) -> Option<KernelCounts> {
+        let points = &plan.generator()?.points;
+        // Whether a point has a kernel is the same for all points.
+        points.component(0, 1)?;
+        let groups = (points.components() as usize).min(MAX_GROUPS);
+        let cells = plan.headways.len() * plan.models.len() * Criterion::ALL.len();
+        Some(KernelCounts { samples: vec![0; groups], failures: vec![0; cells * groups] })
+    }
+
+    /// Counts the lanes of a chunk; `kernels` has one number per sample.
+    pub(super) fn count(&mut self, plan: &LanePlan, chunk: &Chunk, kernels: &[u32]) {
+        let groups = self.samples.len();
+        let group = |kernel: u32| kernel as usize % groups;
+        let valid = || kernels.iter().enumerate().filter(|(_, kernel)| **kernel != NO_KERNEL);
+        valid().for_each(|(_, kernel)| self.samples[group(*kernel)] += 1);
+        let lanes = plan.headways.len() * plan.models.len();
+        // One task per lane of a sample: each has counts of its own.
+        self.failures.par_chunks_mut(Criterion::ALL.len() * groups).enumerate().for_each(|(at, counts)| {
+            for (sample, kernel) in valid() {
+                let verdicts = chunk.verdicts[sample * lanes + at];
+                for criterion in Criterion::ALL {
+                    counts[criterion.index() * groups + group(*kernel)] += u64::from(verdicts.failed(criterion));
+                }
+            }
+        });
+    }
+
+    pub(super) fn add(&mut self, other: &KernelCounts) {
+        let sum =
+            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
+        sum(&mut self.samples, &other.samples);
+        sum(&mut self.failures, &other.failures);
+    }
+
+    /// Numbers of groups and counts.
+    pub(super) fn shape(&self) -> [usize; 2] {
+        [self.samples.len(), self.failures.len()]
+    }
+
+    /// Whether the counts add up to those over all kernels.
+    pub(super) fn adds_up(&self, valid: u64, failures: &[u64]) -> bool {
+        let groups = self.samples.len();
+        let sum = |counts: &[u64]| counts.iter().fold(0_u64, |sum, count| sum.saturating_add(*count));
+        groups > 0
+            && self.failures.len() == groups * failures.len()
+            && sum(&self.samples) == valid
+            && self.failures.chunks_exact(groups).zip(failures).all(|(counts, of_all)| sum(counts) == *of_all)
+    }
+
+    /// The rate of failed lanes over some cells (headway × model × criterion), each kernel being a cluster.
+    pub(super) fn rate(&self, cells: &[usize], level: f64) -> ClusterRate {
+        let groups = self.samples.len();
+        let runs: Vec<u64> = self.samples.iter().map(|n| n * cells.len() as u64).collect();
+        let of_group = |group: usize| cells.iter().map(|cell| self.failures[cell * groups + group]).sum();
+        let failures: Vec<u64> = (0..groups).map(of_group).collect();
+        cluster_rate(Clusters { runs: &runs, failures: &failures }, level)
+    }
+}
+
+/// Counts in files: base-32 digits, the most significant first, small letters and digits for the last one of a number
+/// and capitals for the others. Most counts of a journal's record are one character.
+mod packed {
+    use serde::de::Error as _;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    const LAST: &[u8; 32] = b"0123456789abcdefghijklmnopqrstuv";
+    const MORE: &[u8; 32] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ+-*/=_";
+
+    pub(super) fn serialize<S: Serializer>(counts: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
+        let mut text = String::with_capacity(2 * counts.len());
+        for count in counts {
+            let digits = (64 - count.leading_zeros()).div_ceil(5).max(1);
+            for digit in (0..digits).rev() {
+                let value = (count >> (5 * digit)) as usize % 32;
+                text.push(if digit == 0 { LAST[value] } else { MORE[value] } as char);
+            }
+        }
+        serializer.serialize_str(&text)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u64>, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let (mut counts, mut count, mut is_whole) = (Vec::new(), 0_u64, true);
+        for byte in text.bytes() {
+            let value = |digits: &[u8; 32]| digits.iter().position(|digit| *digit == byte).map(|value| value as u64);
+            if count >> 59 != 0 {
+                return Err(D::Error::custom("a count is too large"));
+            }
+            match (value(LAST), value(MORE)) {
+                (Some(value), _) => {
+                    counts.push(32 * count + value);
+                    (count, is_whole) = (0, true);
+                }
+                (None, Some(value)) => (count, is_whole) = (32 * count + value, false),
+                (None, None) => return Err(D::Error::custom("a character stands for no count")),
+            }
+        }
+        if is_whole { Ok(counts) } else { Err(D::Error::custom("the last count is not complete")) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_come_back_from_files_and_damage_does_not() {
+        let samples = vec![0, 1, 31, 32, 1023, 1024, u64::MAX, 7];
+        let counts = KernelCounts { failures: vec![3; 8], samples };
+        let text = serde_json::to_string(&counts).unwrap();
+        assert_eq!(serde_json::from_str::<KernelCounts>(&text).unwrap(), counts, "{text}");
+        assert!(text.starts_with(r#"{"samples":"01vB0"#), "{text}");
+        for wrong in ["A", "é", "!", "____________v", "ZZZZZZZZZZZZZZZZZZZZZ0"] {
+            let text = format!(r#"{{"samples":"{wrong}","failures":"0"}}"#);
+            assert!(serde_json::from_str::<KernelCounts>(&text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn counts_that_do_not_add_up_are_found() {
+        let counts = KernelCounts { samples: vec![5, 6], failures: vec![1, 2, 0, 4] };
+        assert!(counts.adds_up(11, &[3, 4]));
+        assert!(!counts.adds_up(12, &[3, 4]) && !counts.adds_up(11, &[3, 5]) && !counts.adds_up(11, &[3]));
+        let rate = counts.rate(&[0, 1], 0.95);
+        assert_eq!(rate.rate, 7.0 / 22.0);
+    }
+}

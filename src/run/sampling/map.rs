@@ -1,0 +1,119 @@
+//! Failure maps: how often lanes fail over two parameters.
+
+use serde::{Deserialize, Serialize};
+
+use crate::stats::density::DensityModel;
+use crate::{Error, Place, Result};
+
+/// Cells along each axis.
+pub const MAP_CELLS: usize = 40;
+/// Standard deviations of the kernels that a map shows beyond the outermost kernel.
+const MARGIN: f64 = 2.0;
+
+/// One axis: a parameter and its range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapAxis {
+    /// Parameter's place in a point.
+    pub parameter: usize,
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+}
+
+/// Two axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapAxes {
+    /// Across.
+    pub x: MapAxis,
+    /// Up.
+    pub y: MapAxis,
+}
+
+impl MapAxis {
+    /// The range that a parameter's kernels fill.
+    fn of(density: &DensityModel, name: &str) -> Result<MapAxis> {
+        let parameter = density.space.index_of(name)?;
+        let described = &density.space.parameters()[parameter];
+        let values = density.kde.points().iter().map(|p| p[parameter]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let margin = MARGIN * density.kde.spread()[parameter];
+        Ok(MapAxis {
+            parameter,
+            name: described.name.clone(),
+            unit: described.unit.clone(),
+            lower: (low - margin).max(described.lower.unwrap_or(f64::NEG_INFINITY)),
+            upper: (high + margin).min(described.upper.unwrap_or(f64::INFINITY)),
+        })
+    }
+
+    fn cell(&self, value: f64) -> Option<usize> {
+        let share = (value - self.lower) / (self.upper - self.lower);
+        // Written so that NaN is refused.
+        if !(0.0..1.0).contains(&share) {
+            return None;
+        }
+        Some(((share * MAP_CELLS as f64) as usize).min(MAP_CELLS - 1))
+    }
+
+    /// Borders of the cells, one more than cells.
+    pub fn edges(&self) -> Vec<f64> {
+        let width = (self.upper - self.lower) / MAP_CELLS as f64;
+        (0..=MAP_CELLS).map(|k| self.lower + width * k as f64).collect()
+    }
+}
+
+impl MapAxes {
+    /// Of two parameters of a density.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a name that is no parameter, or the same one twice.
+    pub fn of(density: &DensityModel, x: &str, y: &str) -> Result<MapAxes> {
+        let axes = MapAxes { x: MapAxis::of(density, x)?, y: MapAxis::of(density, y)? };
+        if axes.x.parameter == axes.y.parameter {
+            let problem = format!("a map over `{x}` twice shows nothing");
+            return Err(Error::usage(Place::item("--map"), problem, "name two parameters"));
+        }
+        Ok(axes)
+    }
+
+    /// Cell of a point, row by row from below; `None` outside.
+    pub fn cell(&self, point: &[f32]) -> Option<usize> {
+        let along = |axis: &MapAxis| axis.cell(f64::from(*point.get(axis.parameter)?));
+        Some(along(&self.y)? * MAP_CELLS + along(&self.x)?)
+    }
+}
+
+/// Lanes and failures per cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapCounts {
+    /// The axes.
+    pub axes: MapAxes,
+    /// Lanes per model, row by row from below.
+    pub lanes: Vec<u64>,
+    /// Failed lanes of each model.
+    pub failures: Vec<Vec<u64>>,
+}
+
+impl MapCounts {
+    pub(super) fn new(axes: MapAxes, models: usize) -> MapCounts {
+        let cells = MAP_CELLS * MAP_CELLS;
+        MapCounts { axes, lanes: vec![0; cells], failures: vec![vec![0; cells]; models] }
+    }
+
+    pub(super) fn add(&mut self, other: &MapCounts) {
+        let sum =
+            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
+        sum(&mut self.lanes, &other.lanes);
+        for (ours, theirs) in self.failures.iter_mut().zip(&other.failures) {
+            sum(ours, theirs);
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Sampling: a density becomes lanes.
+//!
+//! Here live the way from a density file to a case generator and the plan of a sampling run. Here lives nothing
+//! about estimators. Densities come from [`crate::stats::density`], lanes run in [`crate::engine`].
+
+mod bootstrap;
+mod compare;
+mod conditional;
+mod crude;
+mod generator;
+mod kernels;
+mod lanes;
+mod limit_state;
+mod map;
+mod plan;
+mod proposal_file;
+mod risk;
+mod rows;
+mod tally;
+mod weighted_tally;
+
+pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
+pub use compare::{
+    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
+    SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
+};
+pub use conditional::{Conditional, conditional, mixture_of};
+pub use crude::{
+    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, checkpoints, crude_of_segments, sample_crude, sample_into,
+};
+pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
+pub use kernels::KernelCounts;
+pub use lanes::{LaneLimitState, scenario_shares, truncated};
+pub use limit_state::limit_state;
+pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
+pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
+pub use proposal_file::{proposal_from_text, proposal_text, read_proposal, write_proposal};
+pub use risk::{Risk, RiskRate};
+pub use rows::{EstimateRow, crude_rows, headway_name};
+pub use tally::{SampleTally, TallyOptions, WorstSample};
+pub use weighted_tally::WeightedTally;

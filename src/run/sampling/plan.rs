@@ -1,0 +1,129 @@
+//! The lane plan of a sampling run: one block whose units are sample indices.
+
+use crate::engine::generated::Generator;
+use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::Tables;
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::random::SOBOL_POINTS;
+use crate::{Error, Place, Result};
+
+use super::generator::{SampleSource, generator_of, generator_of_points};
+
+/// Initial headways of sampled lanes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SampleHeadways {
+    /// Every sample from each of these.
+    Each(Vec<Headway>),
+    /// The parameter `thw_s` of the density.
+    Sampled,
+}
+
+/// What is sampled and how lanes run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SamplePlanOptions {
+    /// Samples: indices below this count.
+    pub samples: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+    /// Kind of points.
+    pub source: SampleSource,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// Headways.
+    pub headways: SampleHeadways,
+}
+
+struct Generated(Generator);
+
+impl CaseSource for Generated {
+    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
+        // Only for what asks without tables: series are not kept.
+        self.0.case(unit, &mut Tables::default())
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
+        &NONE
+    }
+
+    fn generator(&self) -> Option<&Generator> {
+        Some(&self.0)
+    }
+}
+
+/// The plan whose unit `i` is draw `i` of `proposal` (the density itself for crude Monte Carlo).
+///
+/// # Errors
+/// [`Error::Usage`] for no samples, more than 2⁶³ lanes or than there are Sobol points, headways that the density
+/// does not have, and as [`generator_of`].
+pub fn plan_samples(
+    density: &DensityModel,
+    proposal: &Mixture,
+    profile: &Profile,
+    options: &SamplePlanOptions,
+) -> Result<LanePlan> {
+    let place = || Place::item("--samples");
+    if options.samples == 0 {
+        return Err(Error::usage(place(), "0 samples estimate nothing", "give 1000000, for instance"));
+    }
+    if options.source == SampleSource::Sobol && options.samples > SOBOL_POINTS {
+        let problem = format!("{} Sobol points are asked for, {SOBOL_POINTS} there are", options.samples);
+        return Err(Error::usage(place(), problem, "use independent random points beyond"));
+    }
+    let generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
+    plan(density, profile, generator, options.samples, &options.models, &options.headways)
+}
+
+/// The plan whose unit `i` is point `i`.
+///
+/// # Errors
+/// As [`plan_samples`].
+pub fn plan_points(
+    density: &DensityModel,
+    points: &[Vec<f64>],
+    profile: &Profile,
+    models: &[ModelId],
+    headways: &SampleHeadways,
+) -> Result<LanePlan> {
+    let generator = generator_of_points(&density.space, points, &density.sizes, profile)?;
+    plan(density, profile, generator, points.len() as u64, models, headways)
+}
+
+fn plan(
+    density: &DensityModel,
+    profile: &Profile,
+    generator: Generator,
+    samples: u64,
+    models: &[ModelId],
+    headways: &SampleHeadways,
+) -> Result<LanePlan> {
+    let headways = match (headways, density.space.has_thw()) {
+        (SampleHeadways::Sampled, true) => vec![Headway::GapM(0.0)],
+        (SampleHeadways::Sampled, false) => {
+            return Err(Error::usage(
+                Place::item("--thw"),
+                "this density has no parameter `thw_s`, so headways cannot be drawn from it",
+                "fit it with --with-thw, or give a headway in seconds",
+            ));
+        }
+        (SampleHeadways::Each(_), true) => {
+            return Err(Error::usage(
+                Place::item("--thw"),
+                "this density draws the headway itself (parameter `thw_s`)",
+                "use --thw sampled, or fit it without --with-thw",
+            ));
+        }
+        (SampleHeadways::Each(list), false) => list.clone(),
+    };
+    let id = density.space.id();
+    let block = Block {
+        category: id.category,
+        units: Units::Numbered(samples),
+        variants: vec![id.key.to_owned()],
+        first_unit: 0,
+        first_lane: 0,
+    };
+    LanePlan::new(profile.clone(), models.to_vec(), headways, vec![block], Box::new(Generated(generator)))
+}

@@ -1,0 +1,92 @@
+//! Proposals as files, so that one that was found can be sampled again, in parts or with other seeds.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::stats::density::{DensityModel, LARGEST_FILE_BYTES, Mixture};
+use crate::support::atomic_file::AtomicFile;
+use crate::support::input_file;
+use crate::{Error, Place, Result};
+
+const VERSION: u64 = 1;
+
+/// The mixture of a proposal over the parameters of a density.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    lanesweep_proposal: u64,
+    /// Names of the parameters, in order.
+    parameters: Vec<String>,
+    /// SHA-256 of the density that it was made for.
+    density_sha256: String,
+    weights: Vec<f64>,
+    means: Vec<Vec<f64>>,
+    /// Lower-triangular factors of the covariances, row by row, one per component.
+    factors: Vec<Vec<f64>>,
+}
+
+fn names(density: &DensityModel) -> Vec<String> {
+    density.space.parameters().iter().map(|p| p.name.clone()).collect()
+}
+
+/// A proposal for a density as the text of a file.
+///
+/// # Errors
+/// None for what this program makes.
+pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<String> {
+    let components = 0..proposal.weights().len();
+    let file = File {
+        lanesweep_proposal: VERSION,
+        parameters: names(density),
+        density_sha256: density.content_sha256()?,
+        weights: proposal.weights().to_vec(),
+        means: components.clone().map(|k| proposal.mean(k).to_vec()).collect(),
+        factors: components.map(|k| proposal.factor(k).to_vec()).collect(),
+    };
+    serde_json::to_string_pretty(&file).map_err(|e| Error::Internal(format!("a proposal cannot be written: {e}")))
+}
+
+/// Writes a proposal: whole or not at all.
+///
+/// # Errors
+/// [`Error::Io`] if the folder cannot be written to.
+pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -> Result<()> {
+    let mut out = AtomicFile::create(path)?;
+    out.append(proposal_text(density, proposal)?.as_bytes())?;
+    out.stage()?.publish()
+}
+
+/// Reads a proposal for a density.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
+pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
+    proposal_from_text(&input_file::read(path, LARGEST_FILE_BYTES)?, density, &Place::file(path))
+}
+
+/// A proposal for a density from the text of a file.
+///
+/// # Errors
+/// [`Error::Input`] at `place`, as [`read_proposal`].
+pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) -> Result<Mixture> {
+    let again = "write it again with `lanesweep sample --estimator ce` or `is`";
+    let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    let value: serde_json::Value = serde_json::from_slice(text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
+    match value.get("lanesweep_proposal").map(serde_json::Value::as_u64) {
+        None => return Err(wrong("it is no proposal: `lanesweep_proposal` is missing".to_owned())),
+        Some(Some(VERSION)) => (),
+        Some(other) => {
+            let found = other.map_or("unreadable".to_owned(), |v| v.to_string());
+            return Err(wrong(format!("its version is {found}, this program reads {VERSION}")));
+        }
+    }
+    let file: File = serde_json::from_value(value).map_err(|e| wrong(format!("it is no proposal: {e}")))?;
+    if file.parameters != names(density) {
+        let problem =
+            format!("it is over {}, the density over {}", file.parameters.join(", "), names(density).join(", "));
+        return Err(wrong(problem));
+    }
+    let n = file.means.len();
+    Mixture::new(file.weights, file.means, file.factors, (0..n).collect()).map_err(|e| wrong(e.to_string()))
+}

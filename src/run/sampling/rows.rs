@@ -1,0 +1,115 @@
+//! From counts to estimates: one row per model, criterion and headway, and one over all headways.
+
+use serde::Serialize;
+
+use super::risk::Risk;
+use super::tally::SampleTally;
+use crate::engine::LanePlan;
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::stats::density::Exposure;
+use crate::stats::estimate::{
+    BinomialInterval, Counts, Estimate, Interval, KernelShares, StopReason, Warning, from_clusters, from_counts,
+};
+
+/// An estimate and what it is of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EstimateRow {
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Headway: `1.4s`, `sampled`, or `all` for the mean over those of the plan.
+    pub headway: String,
+    /// The probability that a sampled lane fails. Where samples tell their scenarios, the uncertainty of the data is in
+    /// its variance and interval.
+    pub estimate: Estimate,
+    /// Ends of the interval of the draws alone: as if the density were the truth.
+    pub draws: [f64; 2],
+    /// Effective number of scenarios that the failures come from, where samples tell their scenarios.
+    pub failing_scenarios: Option<f64>,
+    /// Failures per hour and per 1,000 km, where the exposure is known.
+    pub risk: Risk,
+}
+
+impl EstimateRow {
+    /// A row whose interval is that of the draws alone.
+    pub fn of_draws(
+        model: ModelId,
+        criterion: Criterion,
+        headway: String,
+        estimate: Estimate,
+        exposure: Option<&Exposure>,
+    ) -> EstimateRow {
+        let draws = [estimate.interval.low, estimate.interval.high];
+        let risk = Risk::of(&estimate, exposure);
+        EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk }
+    }
+
+    /// The same with the uncertainty of the data in it, or a warning that it is not.
+    pub fn with_data(mut self, shares: Option<&KernelShares>, exposure: Option<&Exposure>) -> EstimateRow {
+        let Some(shares) = shares else {
+            self.estimate.trust.warn_if(true, Warning::DataLeftOut);
+            return self;
+        };
+        self.estimate = self.estimate.over_kernels(shares);
+        self.failing_scenarios = Some(shares.effective_failing);
+        self.risk = Risk::of(&self.estimate, exposure);
+        self
+    }
+
+    /// Half the width of the draws' interval over the probability, which more samples make smaller; ∞ at zero.
+    pub fn draws_half_width(&self) -> f64 {
+        let [low, high] = self.draws;
+        Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
+    }
+}
+
+/// Name of a plan's headway in tables.
+pub fn headway_name(plan: &LanePlan, headway: usize, is_sampled: bool) -> String {
+    if is_sampled { "sampled".to_owned() } else { plan.headways[headway].to_string() }
+}
+
+/// All rows of crude Monte Carlo. Headways share their samples, so the mean over them counts samples as clusters.
+pub fn crude_rows(
+    plan: &LanePlan,
+    tally: &SampleTally,
+    exposure: Option<&Exposure>,
+    is_sampled: bool,
+    interval: BinomialInterval,
+    level: f64,
+    stopped: StopReason,
+) -> Vec<EstimateRow> {
+    let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
+    let runs = tally.valid();
+    let mut rows = Vec::new();
+    for (model, &id) in plan.models.iter().enumerate() {
+        for criterion in Criterion::ALL {
+            let cell = |headway: usize| (headway * models + model) * criteria + criterion.index();
+            let mut push = |headway: String, estimate: Estimate, cells: &[usize]| {
+                let mut row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
+                if let Some(counts) = &tally.by_kernel {
+                    let clusters = counts.rate(cells, level);
+                    row.estimate = row.estimate.over_scenarios(&clusters);
+                    row.failing_scenarios = Some(clusters.effective_failing);
+                    row.risk = Risk::of(&row.estimate, exposure);
+                }
+                rows.push(row);
+            };
+            if headways > 1 {
+                let sum = (0..headways).map(|headway| tally.failures[cell(headway)]).sum();
+                let squares = tally.squares[model * criteria + criterion.index()];
+                let mut all = from_clusters(runs, headways as u64, sum, squares, level, stopped);
+                all.voids = tally.voids;
+                push("all".to_owned(), all, &(0..headways).map(cell).collect::<Vec<_>>());
+            }
+            for headway in 0..headways {
+                let failures = tally.failures[cell(headway)];
+                let counts = Counts { runs, failures, voids: tally.voids, tries: tally.tries };
+                let estimate = from_counts(&counts, interval, level, stopped);
+                push(headway_name(plan, headway, is_sampled), estimate, &[cell(headway)]);
+            }
+        }
+    }
+    rows
+}

@@ -1,0 +1,324 @@
+//! What remains of sampled lanes: exact integer counts and the worst lanes, for any set of sample indices. Tallies
+//! of disjoint sets join in any order.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::kernels::{KernelCounts, NO_KERNEL};
+use super::limit_state::limit_state;
+use super::map::{MAP_CELLS, MapAxes, MapCounts};
+use crate::engine::generated::{ATTEMPTS, Drawn, Generator};
+use crate::engine::{Chunk, LanePlan};
+use crate::model::criterion::Criterion;
+use crate::run::parts::Countable;
+use crate::{Error, Place, Result};
+
+/// Samples that one task counts.
+const TASK: usize = 4096;
+
+/// A lane with its limit state.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorstSample {
+    /// See [`limit_state`].
+    pub value: f64,
+    /// Lane index in the plan.
+    pub lane: u64,
+}
+
+/// What is counted beside the verdicts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TallyOptions {
+    /// Worst lanes kept per model; 0 needs verdicts only.
+    pub worst: usize,
+    /// Criterion of the worst lanes and of the map.
+    pub criterion: Criterion,
+    /// Failure map over two parameters.
+    pub map: Option<MapAxes>,
+}
+
+/// Counts over a set of samples of one plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SampleTally {
+    plan_sha256: String,
+    /// Disjoint, ascending, no two touch.
+    covered: Vec<Range<u64>>,
+    /// Indices without a valid point.
+    pub voids: u64,
+    /// Draws in all.
+    pub tries: u64,
+    /// Failed lanes: headway × model × criterion, the last innermost.
+    pub failures: Vec<u64>,
+    /// Σ over samples of (headways that failed)²: model × criterion.
+    pub squares: Vec<u64>,
+    /// Lanes that ended at the time cap: headway × model.
+    pub capped: Vec<u64>,
+    /// The worst lanes of each model, ascending by (value, lane).
+    pub worst: Vec<Vec<WorstSample>>,
+    worst_limit: usize,
+    /// The failure map, one count of failures per model.
+    pub map: Option<MapCounts>,
+    /// The same samples and failures by kernel, where the points come from kernels.
+    pub by_kernel: Option<KernelCounts>,
+}
+
+impl SampleTally {
+    /// Nothing yet.
+    pub fn empty(plan: &LanePlan, options: &TallyOptions) -> SampleTally {
+        let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
+        SampleTally {
+            plan_sha256: plan.hash().to_owned(),
+            covered: Vec::new(),
+            voids: 0,
+            tries: 0,
+            failures: vec![0; headways * models * criteria],
+            squares: vec![0; models * criteria],
+            capped: vec![0; headways * models],
+            worst: vec![Vec::new(); models],
+            worst_limit: options.worst,
+            map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), models)),
+            by_kernel: KernelCounts::empty(plan),
+        }
+    }
+
+    /// Counts a chunk of a plan whose units are samples. Where the plan holds the cases, every sample is valid at once, and
+    /// there is no map.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a chunk of another plan, without lanes, or without the outcomes that worst lanes need.
+    pub fn of_chunk(plan: &LanePlan, chunk: &Chunk, options: &TallyOptions) -> Result<SampleTally> {
+        let generator = plan.generator();
+        if generator.is_none() && options.map.is_some() {
+            return Err(Error::Internal("a plan that holds its cases has no points to map".to_owned()));
+        }
+        chunk.check(plan)?;
+        if chunk.verdicts.is_empty() || (options.worst > 0 && chunk.outcomes.is_empty()) {
+            return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
+        }
+        let empty = || SampleTally { by_kernel: None, ..SampleTally::empty(plan, options) };
+        let units = chunk.units.clone();
+        let mut kernels = vec![NO_KERNEL; (units.end - units.start) as usize];
+        let tasks = kernels.par_chunks_mut(TASK).enumerate();
+        let counted = tasks.fold(empty, |mut tally, (task, kernels)| {
+            for (unit, kernel) in (units.start + (task * TASK) as u64..).zip(kernels) {
+                *kernel = tally.count(plan, generator, chunk, options, unit);
+            }
+            tally
+        });
+        // Whole numbers and a total order: how tasks are joined does not matter.
+        let mut tally = counted.reduce(empty, |mut a, b| {
+            a.add(b);
+            a
+        });
+        tally.covered = vec![units];
+        tally.by_kernel = KernelCounts::empty(plan);
+        if let Some(counts) = &mut tally.by_kernel {
+            counts.count(plan, chunk, &kernels);
+        }
+        Ok(tally)
+    }
+
+    /// Counts the lanes of one sample; returns its kernel.
+    fn count(
+        &mut self,
+        plan: &LanePlan,
+        generator: Option<&Generator>,
+        chunk: &Chunk,
+        options: &TallyOptions,
+        unit: u64,
+    ) -> u32 {
+        let drawn = generator.map(|generator| generator.draw(unit));
+        if drawn.as_ref().is_some_and(Drawn::is_void) {
+            self.voids += 1;
+            self.tries += u64::from(ATTEMPTS);
+            return NO_KERNEL;
+        }
+        self.tries += drawn.as_ref().map_or(1, |drawn| u64::from(drawn.tries));
+        let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
+        let first = (unit - chunk.units.start) as usize * headways * models;
+        let lanes = &chunk.verdicts[first..first + headways * models];
+        let cell = self.map.as_ref().zip(drawn.as_ref()).and_then(|(map, drawn)| map.axes.cell(&drawn.values));
+        for model in 0..models {
+            let mut failed = [0_u64; Criterion::ALL.len()];
+            for headway in 0..headways {
+                let at = headway * models + model;
+                let verdicts = lanes[at];
+                self.capped[at] += u64::from(verdicts.capped());
+                for criterion in Criterion::ALL {
+                    let fails = u64::from(verdicts.failed(criterion));
+                    self.failures[at * criteria + criterion.index()] += fails;
+                    failed[criterion.index()] += fails;
+                }
+                if self.worst_limit > 0 {
+                    let value = limit_state(&plan.profile, options.criterion, &chunk.outcomes[first + at]);
+                    let lane = chunk.first_lane + (first + at) as u64;
+                    self.offer(model, WorstSample { value, lane });
+                }
+            }
+            for (square, k) in self.squares[model * criteria..].iter_mut().zip(failed) {
+                *square += k * k;
+            }
+            if let (Some(map), Some(cell)) = (&mut self.map, cell) {
+                map.failures[model][cell] += failed[options.criterion.index()];
+            }
+        }
+        if let (Some(map), Some(cell)) = (&mut self.map, cell) {
+            map.lanes[cell] += headways as u64;
+        }
+        let kernel = generator.zip(drawn).and_then(|(generator, drawn)| generator.points.component(unit, drawn.tries));
+        kernel.unwrap_or(NO_KERNEL)
+    }
+
+    /// Keeps a lane where it is among the worst.
+    fn offer(&mut self, model: usize, lane: WorstSample) {
+        let worst = &mut self.worst[model];
+        // Most lanes are refused at once.
+        if worst.len() >= self.worst_limit && worst.last().is_some_and(|last| !is_worse(&lane, last)) {
+            return;
+        }
+        let at = worst.partition_point(|w| is_worse(w, &lane));
+        worst.insert(at, lane);
+        worst.truncate(self.worst_limit);
+    }
+
+    /// Adds counts of other samples; the covered intervals are the caller's to join.
+    fn add(&mut self, other: SampleTally) {
+        let sum =
+            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
+        self.voids = self.voids.saturating_add(other.voids);
+        self.tries = self.tries.saturating_add(other.tries);
+        sum(&mut self.failures, &other.failures);
+        sum(&mut self.squares, &other.squares);
+        sum(&mut self.capped, &other.capped);
+        for (model, lanes) in other.worst.into_iter().enumerate() {
+            for lane in lanes {
+                self.offer(model, lane);
+            }
+        }
+        if let (Some(ours), Some(theirs)) = (&mut self.map, &other.map) {
+            ours.add(theirs);
+        }
+        if let (Some(ours), Some(theirs)) = (&mut self.by_kernel, &other.by_kernel) {
+            ours.add(theirs);
+        }
+    }
+
+    /// Joins the counts of other samples of the same plan: associative, and the same in any order.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the plans or what was counted differ, or a sample is in both.
+    pub fn merge(mut self, other: SampleTally) -> Result<SampleTally> {
+        let place = || Place::item("part of a sampling run");
+        if self.plan_sha256 != other.plan_sha256 {
+            let problem = format!("it belongs to plan {}, not to {}", other.plan_sha256, self.plan_sha256);
+            return Err(Error::input(place(), problem, "join only parts of one run: same density, flags and seed"));
+        }
+        let axes = |tally: &SampleTally| tally.map.as_ref().map(|map| map.axes.clone());
+        if self.shape() != other.shape() {
+            return Err(Error::input(place(), "the parts have other models or headways", "make the part again"));
+        }
+        if self.worst_limit != other.worst_limit || axes(&self) != axes(&other) {
+            let help = "make all parts with the same --worst, --criterion and --map";
+            return Err(Error::input(place(), "the parts counted different things", help));
+        }
+        let mut covered = std::mem::take(&mut self.covered);
+        covered.extend(other.covered.iter().cloned());
+        covered.sort_by_key(|range| range.start);
+        let mut joined: Vec<Range<u64>> = Vec::new();
+        for range in covered {
+            match joined.last_mut() {
+                Some(last) if last.end > range.start => {
+                    let problem = format!("samples {} to {} are in both", range.start, last.end.min(range.end) - 1);
+                    return Err(Error::input(place(), problem, "give every part once"));
+                }
+                Some(last) if last.end == range.start => last.end = range.end,
+                _ => joined.push(range),
+            }
+        }
+        self.covered = joined;
+        self.add(other);
+        Ok(self)
+    }
+
+    /// Numbers of cells: they follow from models, headways and criteria.
+    fn shape(&self) -> [usize; 6] {
+        let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
+        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts]
+    }
+
+    /// Whether counts that were read from a file can be those of a run.
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
+        let mut free_from = 0;
+        for range in &self.covered {
+            if range.start < free_from || range.end <= range.start || range.end >> 63 != 0 {
+                return Err(format!("samples {} to {} are misplaced", range.start, range.end));
+            }
+            free_from = range.end;
+        }
+        let (models, criteria, samples) = (self.worst.len(), Criterion::ALL.len(), self.samples());
+        let cells = self.capped.len();
+        let mut problems = vec![
+            (self.squares.len() != models * criteria || self.failures.len() != cells * criteria, "lengths differ"),
+            (models == 0 || cells == 0 || !cells.is_multiple_of(models), "no whole number of headways per model"),
+            (self.worst.iter().any(|lanes| lanes.len() > self.worst_limit), "more worst lanes than are kept"),
+            (self.voids > samples, "more void samples than samples"),
+            (self.failures.iter().chain(&self.capped).any(|n| *n > samples), "more failures than samples"),
+        ];
+        if let Some(map) = &self.map {
+            let complete = |cells: &Vec<u64>| cells.len() == MAP_CELLS * MAP_CELLS;
+            let fits = complete(&map.lanes) && map.failures.len() == models && map.failures.iter().all(complete);
+            problems.push((!fits, "the map has another number of cells"));
+        }
+        if let Some(counts) = &self.by_kernel {
+            let adds_up = counts.adds_up(samples.saturating_sub(self.voids), &self.failures);
+            problems.push((!adds_up, "the counts by kernel do not add up"));
+        }
+        problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
+    }
+
+    /// Worst lanes kept per model.
+    pub fn worst_limit(&self) -> usize {
+        self.worst_limit
+    }
+
+    /// Hash of the plan.
+    pub fn plan_sha256(&self) -> &str {
+        &self.plan_sha256
+    }
+
+    /// The samples counted, as disjoint intervals, ascending.
+    pub fn covered(&self) -> &[Range<u64>] {
+        &self.covered
+    }
+
+    /// Number of samples counted, void ones included.
+    pub fn samples(&self) -> u64 {
+        self.covered.iter().map(|r| r.end - r.start).sum()
+    }
+
+    /// Number of samples with a valid point.
+    pub fn valid(&self) -> u64 {
+        self.samples() - self.voids
+    }
+}
+
+impl Countable for SampleTally {
+    fn covered(&self) -> Vec<Range<u64>> {
+        self.covered.clone()
+    }
+
+    fn join(self, other: Self) -> Result<Self> {
+        self.merge(other)
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        SampleTally::check(self)
+    }
+}
+
+/// A total order: smaller value first, then the lane.
+fn is_worse(a: &WorstSample, b: &WorstSample) -> bool {
+    a.value.total_cmp(&b.value).then(a.lane.cmp(&b.lane)).is_lt()
+}

@@ -1,0 +1,219 @@
+//! The score table: per category, parameterization, model and criterion the agreement of S' with S over
+//! (scenario, THW) pairs.
+
+use rayon::prelude::*;
+
+use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws};
+use super::contradiction::contradiction;
+use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::scenario::Category;
+use crate::stats::estimate::{Clusters, cluster_rate};
+use crate::{Error, Place, Result};
+
+/// Recall TP/(TP + FN); `None` where S never fails.
+pub fn recall(c: &Confusion) -> Option<f64> {
+    ratio(c.both as f64, c.both as f64 + c.only_s as f64)
+}
+
+/// Precision TP/(TP + FP); `None` where S' never fails.
+pub fn precision(c: &Confusion) -> Option<f64> {
+    ratio(c.both as f64, c.both as f64 + c.only_s_prime as f64)
+}
+
+/// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
+///
+/// ```
+/// use lanesweep::run::score::f1;
+/// use lanesweep::engine::Confusion;
+///
+/// // S and S' fail together 8 times, S alone twice, S' alone never.
+/// let counts = Confusion { both: 8, only_s: 2, only_s_prime: 0, neither: 90 };
+/// assert_eq!(f1(&counts), Some(16.0 / 18.0));
+/// assert_eq!(f1(&Confusion { both: 0, only_s: 0, only_s_prime: 0, neither: 100 }), None);
+/// ```
+pub fn f1(c: &Confusion) -> Option<f64> {
+    let twice = 2.0 * c.both as f64;
+    ratio(twice, twice + c.only_s as f64 + c.only_s_prime as f64)
+}
+
+/// In f64, where no sum wraps; sums below 2^53 are exact.
+fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
+    (denominator > 0.0).then(|| numerator / denominator)
+}
+
+/// The interval of F1 from the counts of each scenario. F1 = 2J/(1 + J) rises with J = TP/(TP + FP + FN), the share of
+/// agreement among all failures, so the interval of J over scenarios as clusters gives that of F1.
+///
+/// `None` below [`ScoreOptions::least_failures`] failures of S.
+pub fn f1_interval<'a>(
+    scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
+    options: &ScoreOptions,
+) -> Option<Interval> {
+    let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.both) + u64::from(c.only_s)).sum();
+    if failures_of_s < u64::from(options.least_failures.max(1)) {
+        return None;
+    }
+    let any = |c: &Confusion<u32>| u64::from(c.both) + u64::from(c.only_s) + u64::from(c.only_s_prime);
+    let (runs, agreed): (Vec<u64>, Vec<u64>) =
+        scenarios.map(|c| (any(c), u64::from(c.both))).filter(|(any, _)| *any > 0).unzip();
+    let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
+    let f1 = |j: f64| 2.0 * j / (1.0 + j);
+    Some(Interval { low: f1(share.low), high: f1(share.high) })
+}
+
+/// One cell of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Index into [`CategoryScores::variants`]; 0 is S itself.
+    pub variant: usize,
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Counts over (scenario, THW) pairs.
+    pub counts: Confusion,
+    /// Interval of F1 over scenarios; `None` below [`ScoreOptions::least_failures`] failures of S.
+    pub f1_interval: Option<Interval>,
+    /// Bootstrap draws in which F1 is 0/0: claims about it leave them out. Its interval needs no draws.
+    pub undefined_draws: u32,
+}
+
+/// Scores of one category.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CategoryScores {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Scenarios that were simulated.
+    pub scenarios: u64,
+    /// Simulations of S per model: scenarios × headways.
+    pub simulations: u64,
+    /// Names of the variants; the first is `S`.
+    pub variants: Vec<String>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// One per variant × model × criterion, in that order.
+    pub cells: Vec<Cell>,
+    /// Lanes that ended at the time cap, one per variant × model.
+    pub capped: Vec<u64>,
+    /// Bootstrap draws: the cells' counts in each.
+    pub draws: Vec<Vec<Confusion>>,
+}
+
+impl CategoryScores {
+    /// Position of a cell in [`CategoryScores::cells`]; `None` for a model that was not run.
+    pub fn index(&self, variant: usize, model: ModelId, criterion: Criterion) -> Option<usize> {
+        let model = self.models.iter().position(|m| *m == model)?;
+        Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
+    }
+
+    /// A variant by its name.
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.variants.iter().position(|v| v == name)
+    }
+}
+
+/// Scores of a whole study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreTable {
+    /// One per category of the plan.
+    pub categories: Vec<CategoryScores>,
+    /// Headways of the simulations.
+    pub headways: Vec<Headway>,
+    /// How the intervals were made.
+    pub options: ScoreOptions,
+}
+
+/// Scores a complete partial.
+///
+/// # Errors
+/// [`Error::Input`] if units are missing, the partial belongs to another plan, or its counts contradict themselves or
+/// the plan.
+pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Result<ScoreTable> {
+    if !partial.is_complete(plan) {
+        let problem = if partial.plan_hash() == plan.hash() {
+            format!("{} of {} units are there", partial.units().len(), plan.unit_count())
+        } else {
+            format!("it belongs to plan {}, not to {}", partial.plan_hash(), plan.hash())
+        };
+        return Err(Error::input(Place::item("partial result"), problem, "compute the missing units first"));
+    }
+    // Counts that this program made never fail here; a file may hold anything under a checksum that fits.
+    if let Some(problem) = contradiction(plan, partial) {
+        let help = "compute it again: take the parts and journals of this run away first";
+        return Err(Error::input(Place::item("partial result"), format!("its counts cannot be: {problem}"), help));
+    }
+    let criteria = Criterion::ALL.len();
+    let mut categories = Vec::new();
+    for block in &plan.blocks {
+        let first = block.first_unit as usize;
+        let units: &[UnitCounts] = &partial.units()[first..first + block.units.len() as usize];
+        let width = block.variants.len() * plan.models.len() * criteria;
+        let mut totals = vec![Confusion::default(); width];
+        let mut capped = vec![0_u64; block.variants.len() * plan.models.len()];
+        for unit in units {
+            totals.iter_mut().zip(&unit.cells).for_each(|(total, cell)| total.add(cell));
+            capped.iter_mut().zip(&unit.capped).for_each(|(total, &count)| *total += u64::from(count));
+        }
+        let draws = bootstrap_draws(units, width, block.category, options);
+        let cells = (0..width)
+            .into_par_iter()
+            .map(|at| {
+                let undefined = draws.iter().filter(|draw| f1(&draw[at]).is_none()).count();
+                Cell {
+                    variant: at / (plan.models.len() * criteria),
+                    model: plan.models[at / criteria % plan.models.len()],
+                    criterion: Criterion::ALL[at % criteria],
+                    counts: totals[at],
+                    undefined_draws: undefined as u32,
+                    f1_interval: f1_interval(units.iter().map(|unit| &unit.cells[at]), options),
+                }
+            })
+            .collect();
+        categories.push(CategoryScores {
+            category: block.category,
+            scenarios: block.units.len(),
+            simulations: block.units.len() * plan.headways.len() as u64,
+            variants: block.variants.clone(),
+            models: plan.models.clone(),
+            cells,
+            capped,
+            draws,
+        });
+    }
+    Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_confusion_by_hand() {
+        let c = Confusion { both: 6, only_s: 2, only_s_prime: 4, neither: 88 };
+        assert_eq!(recall(&c), Some(0.75));
+        assert_eq!(precision(&c), Some(0.6));
+        assert_eq!(f1(&c), Some(12.0 / 18.0));
+    }
+
+    #[test]
+    fn counts_past_2_to_the_32_score_as_their_shares_do() {
+        let c = Confusion { both: 6 << 40, only_s: 2 << 40, only_s_prime: 4 << 40, neither: 88 << 40 };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
+        let most = Confusion { both: u64::MAX, ..Confusion::default() };
+        assert_eq!(f1(&most), Some(1.0));
+    }
+
+    #[test]
+    fn where_nothing_ever_fails_there_is_no_score() {
+        let c = Confusion { neither: 100, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (None, None, None));
+    }
+
+    #[test]
+    fn a_parameterization_that_misses_every_failure_scores_0_and_has_no_precision() {
+        let c = Confusion { only_s: 3, neither: 7, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.0), None, Some(0.0)));
+    }
+}

@@ -1,0 +1,133 @@
+//! Reduction of vectors by singular value decomposition: weights, fit, reconstruction. Knows columns, not
+//! scenarios.
+//!
+//! Rows of X are weight ∘ z − mean; an economy SVD X = U Σ Vᵀ; the first d coefficients are kept. Computed
+//! by faer without parallelism: its bits must not depend on the number of threads.
+
+use faer::Mat;
+
+use super::options::SeriesScale;
+use crate::support::vector_state::clear_upper_halves;
+use crate::{Error, Place, Result};
+
+/// A fitted decomposition.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SvdBasis {
+    /// Weight of each column of z; > 0.
+    pub weights: Vec<f64>,
+    /// Mean of the weighted vectors.
+    pub mean: Vec<f64>,
+    /// Singular values, falling.
+    pub singular_values: Vec<f64>,
+    /// Right singular vectors, one per singular value, each as long as z.
+    pub directions: Vec<Vec<f64>>,
+    /// Rows it was fitted on.
+    pub rows: usize,
+}
+
+/// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `name` says in errors
+/// what the rows are.
+pub fn fit_svd(
+    rows: &[Vec<f64>],
+    series: usize,
+    instants: usize,
+    needed: usize,
+    scale: SeriesScale,
+    name: &str,
+) -> Result<SvdBasis> {
+    let n = rows.len();
+    let place = || Place::item(name);
+    if n <= needed {
+        return Err(Error::input(
+            place(),
+            format!("{n} scenarios are too few for a decomposition with {needed} parameters"),
+            format!(
+                "at least {} are needed: use more data; the kinematic parameterizations are run all the same",
+                needed + 1
+            ),
+        ));
+    }
+    let p = rows[0].len();
+    let deviation = |column: usize| {
+        let mean = rows.iter().map(|r| r[column]).sum::<f64>() / n as f64;
+        (rows.iter().map(|r| (r[column] - mean) * (r[column] - mean)).sum::<f64>() / n as f64).sqrt()
+    };
+    let mut weights = Vec::with_capacity(p);
+    for j in 0..series {
+        let spread = (0..instants).map(|k| deviation(j * instants + k)).sum::<f64>() / instants as f64;
+        let root = match scale {
+            SeriesScale::PerInstant => instants as f64,
+            SeriesScale::PerSeries => (instants as f64).sqrt(),
+        };
+        weights.extend(std::iter::repeat_n(1.0 / (root * spread), instants));
+    }
+    weights.extend((series * instants..p).map(|column| 1.0 / deviation(column)));
+    if weights.iter().any(|w| !w.is_finite()) {
+        return Err(Error::input(
+            place(),
+            "a series or an extra is the same in all scenarios, so it has no spread to scale by",
+            "use scenarios that differ in speed, lateral motion, duration and gap",
+        ));
+    }
+    let mean: Vec<f64> = (0..p).map(|c| rows.iter().map(|r| r[c] * weights[c]).sum::<f64>() / n as f64).collect();
+    let x = Mat::from_fn(n, p, |r, c| rows[r][c] * weights[c] - mean[c]);
+    let svd = x.thin_svd();
+    clear_upper_halves();
+    let svd =
+        svd.map_err(|e| Error::input(place(), format!("the decomposition did not converge: {e:?}"), "report this"))?;
+    let rank = n.min(p);
+    let singular_values = (0..rank).map(|j| svd.S()[j]).collect();
+    let directions = (0..rank).map(|j| (0..p).map(|c| svd.V()[(c, j)]).collect()).collect();
+    Ok(SvdBasis { weights, mean, singular_values, directions, rows: n })
+}
+
+impl SvdBasis {
+    /// The first `d` coefficients of a vector: σ_j u_j for the rows of the fit.
+    pub fn coefficients(&self, z: &[f64], d: usize) -> Vec<f64> {
+        let centred: Vec<f64> = z.iter().zip(&self.weights).zip(&self.mean).map(|((z, w), m)| z * w - m).collect();
+        self.directions[..d].iter().map(|v| v.iter().zip(&centred).map(|(v, x)| v * x).sum()).collect()
+    }
+
+    /// The vector that belongs to coefficients: (μ + Σ c_j V_j) / weights.
+    pub fn reconstruct(&self, coefficients: &[f64]) -> Vec<f64> {
+        let mut weighted = self.mean.clone();
+        for (c, direction) in coefficients.iter().zip(&self.directions) {
+            for (z, v) in weighted.iter_mut().zip(direction) {
+                *z += c * v;
+            }
+        }
+        weighted.iter().zip(&self.weights).map(|(z, w)| z / w).collect()
+    }
+
+    /// Σ_{j ≤ d} σ_j² / Σ σ_j² for d = 1, 2, …
+    pub fn explained(&self) -> Vec<f64> {
+        let total: f64 = self.singular_values.iter().map(|s| s * s).sum();
+        let mut sum = 0.0;
+        self.singular_values
+            .iter()
+            .map(|s| {
+                sum += s * s;
+                sum / total
+            })
+            .collect()
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use super::*;
+    use crate::support::vector_state::tests::upper_halves_in_use;
+
+    /// What runs after a fit runs as fast as before.
+    #[test]
+    fn a_fit_leaves_the_registers_as_scalar_code_wants_them() {
+        let rows: Vec<Vec<f64>> =
+            (0..60).map(|r| (0..41).map(|c| (f64::from(r) * 0.7 + f64::from(c * c)).sin()).collect()).collect();
+        fit_svd(&rows, 1, 40, 4, SeriesScale::PerInstant, "rows").unwrap();
+        match upper_halves_in_use() {
+            Some(in_use) => assert!(!in_use),
+            None => eprintln!("SKIPPED: this machine does not say which registers are in use"),
+        }
+    }
+}

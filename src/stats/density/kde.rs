@@ -1,0 +1,180 @@
+//! Kernel density estimate: isotropic Gaussian kernels on points divided by their scales, one bandwidth chosen by
+//! leave-one-out likelihood. Densities are over the parameters in their own units.
+
+use rayon::prelude::*;
+
+use super::bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut};
+use super::mixture::Mixture;
+use super::normal::{Draws, normal_cdf};
+use super::scaling::scale_of;
+use crate::stats::random::Stream;
+use crate::{Error, Place, Result};
+
+/// f̂(x) = 1/N Σ_i Π_j φ((x_j − x_ij)/(h s_j))/(h s_j).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kde {
+    /// One per point, each of d numbers.
+    points: Vec<Vec<f64>>,
+    /// s_j, > 0.
+    scale: Vec<f64>,
+    bandwidth: Bandwidth,
+}
+
+impl Kde {
+    /// Fits scale and bandwidth. `names` are the parameters' names, for messages.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for fewer than d + 1 points (or 2), for a parameter that is the same in all of them, or
+    /// for one that is not finite.
+    pub fn fit(points: Vec<Vec<f64>>, names: &[&str], rule: BandwidthRule) -> Result<Kde> {
+        let (n, d) = (points.len(), names.len());
+        let data = || Place::item("density");
+        if n < (d + 1).max(2) {
+            let what = match n {
+                0 => "no scenario".to_owned(),
+                1 => "1 scenario".to_owned(),
+                n => format!("{n} scenarios"),
+            };
+            return Err(Error::input(
+                data(),
+                format!("{what} cannot tell a density of {d} parameters"),
+                format!("at least {} are needed: use more data, or a parameterization with fewer", (d + 1).max(2)),
+            ));
+        }
+        check_points(&points, names)?;
+        let column = |j: usize| points.iter().map(|p| p[j]).collect::<Vec<_>>();
+        let scale: Vec<f64> = (0..d).map(|j| scale_of(&column(j))).collect();
+        if let Some(j) = scale.iter().position(|s| *s <= 0.0) {
+            return Err(Error::input(
+                data().column(names[j]),
+                format!("is {} in all {n} scenarios, so it has no density", points[0][j]),
+                "use scenarios that differ in it, or a parameterization without it",
+            ));
+        }
+        let scaled: Vec<Vec<f64>> = points.iter().map(|p| p.iter().zip(&scale).map(|(v, s)| v / s).collect()).collect();
+        let bandwidth = LeaveOneOut::new(&scaled).search(rule);
+        Ok(Kde { points, scale, bandwidth })
+    }
+
+    /// An estimate whose scale and bandwidth are known.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where lengths differ, there is no point, or a number is not finite or a spread not above 0.
+    pub fn from_parts(points: Vec<Vec<f64>>, scale: Vec<f64>, bandwidth: Bandwidth) -> Result<Kde> {
+        let wrong = |problem: String| Err(Error::input(Place::item("density"), problem, "fit it again"));
+        if points.is_empty() || scale.is_empty() {
+            return wrong("has no kernel or no parameter".to_owned());
+        }
+        if let Some(j) = scale.iter().position(|s| !(s.is_finite() && *s > 0.0)) {
+            return wrong(format!("scale {} of parameter {} is not above 0", scale[j], j + 1));
+        }
+        if !(bandwidth.value.is_finite() && bandwidth.value > 0.0) {
+            return wrong(format!("bandwidth {} is not above 0", bandwidth.value));
+        }
+        let names: Vec<String> = (1..=scale.len()).map(|j| format!("parameter {j}")).collect();
+        check_points(&points, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
+        Ok(Kde { points, scale, bandwidth })
+    }
+
+    /// Kernel centres.
+    pub fn points(&self) -> &[Vec<f64>] {
+        &self.points
+    }
+
+    /// s_j, one per parameter, in its unit.
+    pub fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    /// h and how it was found.
+    pub fn bandwidth(&self) -> &Bandwidth {
+        &self.bandwidth
+    }
+
+    /// Number of parameters.
+    pub fn dimensions(&self) -> usize {
+        self.scale.len()
+    }
+
+    /// h s_j: standard deviation of a kernel, one per parameter, in its unit.
+    pub fn spread(&self) -> Vec<f64> {
+        self.scale.iter().map(|s| s * self.bandwidth.value).collect()
+    }
+
+    /// The same density as a mixture of Gaussians.
+    ///
+    /// # Errors
+    /// None for an estimate that this type made.
+    pub fn mixture(&self) -> Result<Mixture> {
+        Mixture::of_kernels(self.points.clone(), &self.spread())
+    }
+
+    /// log f̂(x); −∞ only where it underflows the exponent of an f64.
+    pub fn log_density(&self, x: &[f64]) -> f64 {
+        let spread = self.spread();
+        let exponents: Vec<f64> = self
+            .points
+            .iter()
+            .map(|point| {
+                let squared = point.iter().zip(x).zip(&spread).map(|((p, x), s)| ((x - p) / s) * ((x - p) / s));
+                0.5 * squared.sum::<f64>()
+            })
+            .collect();
+        let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
+        let sum: f64 = exponents.iter().map(|e| libm::exp(least - e)).sum();
+        let logs: f64 = spread.iter().map(|s| libm::log(*s)).sum();
+        let d = spread.len() as f64;
+        let constant = logs + 0.5 * d * libm::log(2.0 * std::f64::consts::PI) + libm::log(self.points.len() as f64);
+        libm::log(sum) - least - constant
+    }
+
+    /// f̂(x), over the parameters' units.
+    pub fn density(&self, x: &[f64]) -> f64 {
+        libm::exp(self.log_density(x))
+    }
+
+    /// Probability that every parameter is at most that of `x`. Infinite bounds are allowed.
+    pub fn cdf(&self, x: &[f64]) -> f64 {
+        let below = vec![f64::NEG_INFINITY; x.len()];
+        self.probability(&below, x)
+    }
+
+    /// Probability of the box between two corners. Infinite bounds are allowed.
+    pub fn probability(&self, lower: &[f64], upper: &[f64]) -> f64 {
+        let spread = self.spread();
+        let inside = |point: &Vec<f64>| -> f64 {
+            let share = |j: usize| {
+                normal_cdf((upper[j] - point[j]) / spread[j]) - normal_cdf((lower[j] - point[j]) / spread[j])
+            };
+            (0..spread.len()).map(share).product()
+        };
+        self.points.iter().map(inside).sum::<f64>() / self.points.len() as f64
+    }
+
+    /// The draw of an index: a kernel at random, then normal noise. Not checked for validity.
+    pub fn draw(&self, stream: &Stream, index: u64) -> Vec<f64> {
+        let mut draws = Draws::new(*stream, index);
+        let point = &self.points[draws.below(self.points.len())];
+        point.iter().zip(&self.scale).map(|(p, s)| p + s * self.bandwidth.value * draws.normal()).collect()
+    }
+
+    /// The draws of a range of indices, in order, made in parallel.
+    pub fn draws(&self, stream: &Stream, indices: std::ops::Range<u64>) -> Vec<Vec<f64>> {
+        indices.into_par_iter().map(|index| self.draw(stream, index)).collect()
+    }
+}
+
+fn check_points(points: &[Vec<f64>], names: &[&str]) -> Result<()> {
+    for (i, point) in points.iter().enumerate() {
+        let place = || Place::item(format!("kernel {}", i + 1));
+        if point.len() != names.len() {
+            let problem = format!("has {} numbers, expected {}", point.len(), names.len());
+            return Err(Error::input(place(), problem, "give one number per parameter"));
+        }
+        if let Some(j) = point.iter().position(|v| !v.is_finite()) {
+            let problem = format!("is {}, expected a finite number", point[j]);
+            return Err(Error::input(place().column(names[j]), problem, "correct the scenario or leave it out"));
+        }
+    }
+    Ok(())
+}

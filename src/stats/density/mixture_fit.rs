@@ -1,0 +1,259 @@
+//! Weighted maximum likelihood of a Gaussian mixture by expectation and maximisation (Dempster, Laird and Rubin
+//! 1977), for cross-entropy and for modelling points: few components, full covariances.
+
+use super::Mixture;
+use super::covariance::{cholesky, moments};
+use super::standard_normal::uniform;
+use crate::stats::random::Stream;
+use crate::{Error, Place, Result};
+
+/// Purpose of the words that choose first centres.
+const PURPOSE: u32 = 0x464D_0001;
+/// A component below this weight is dropped.
+const LEAST_WEIGHT: f64 = 1e-3;
+/// Added to every variance, as a share of the points' variance of that parameter.
+const JITTER: f64 = 1e-6;
+
+/// How a mixture is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitOptions {
+    /// Most components, ≥ 1; fewer where the points do not carry them.
+    pub components: usize,
+    /// Try 1, 2, … `components` as long as each lowers the Bayesian information criterion, in which the
+    /// effective sample size (Σw)²/Σw² stands for the number of points. Otherwise exactly `components`.
+    pub choose: bool,
+    /// Most iterations for each number of components.
+    pub iterations: usize,
+    /// End when the mean log-likelihood grows by less than this in an iteration.
+    pub tolerance: f64,
+    /// Seed of the first centres.
+    pub seed: u64,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        FitOptions { components: 4, choose: true, iterations: 50, tolerance: 1e-4, seed: 0 }
+    }
+}
+
+impl Mixture {
+    /// The mixture of largest weighted likelihood Σ w ln q(x). Covariances are regularised: each is drawn towards
+    /// the covariance of all points by (d + 1)/(d + 1 + its effective sample size), so that few points never give
+    /// a needle.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where there is no point, shapes differ, weights are negative, not finite or all zero.
+    pub fn fit(points: &[Vec<f64>], weights: &[f64], options: &FitOptions) -> Result<Mixture> {
+        let total: f64 = weights.iter().sum();
+        let d = points.first().map_or(0, Vec::len);
+        let well_formed = d > 0
+            && points.len() == weights.len()
+            && points.iter().all(|p| p.len() == d && p.iter().all(|x| x.is_finite()))
+            && weights.iter().all(|w| *w >= 0.0)
+            && total.is_finite()
+            && total > 0.0;
+        if !well_formed || options.components == 0 {
+            return Err(Error::usage(
+                Place::item("fit of a mixture"),
+                format!("{} points of {d} parameters with weights that sum to {total} cannot be fitted", points.len()),
+                "give finite points of one length, weights that are not all zero, and at least one component",
+            ));
+        }
+        // Points without weight carry nothing.
+        let kept: Vec<(&[f64], f64)> =
+            points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
+        let sample = Weighted::of(kept, d);
+        let least = if options.choose { 1 } else { options.components };
+        let mut best: Option<(f64, Mixture)> = None;
+        for components in least..=options.components {
+            let (mixture, log_likelihood) = sample.expectation_maximisation(components, options)?;
+            let parameters = mixture.weights().len() * (1 + d + d * (d + 1) / 2) - 1;
+            let bic = parameters as f64 * libm::log(sample.effective) - 2.0 * sample.effective * log_likelihood;
+            if best.as_ref().is_some_and(|(lowest, _)| bic >= *lowest) {
+                break; // one more did not pay
+            }
+            best = Some((bic, mixture));
+        }
+        best.map(|(_, mixture)| mixture).ok_or_else(|| Error::Internal("no mixture was fitted".to_owned()))
+    }
+}
+
+/// Points with weights of sum 1 and what all components share.
+struct Weighted<'a> {
+    points: Vec<(&'a [f64], f64)>,
+    d: usize,
+    covariance: Vec<f64>,
+    effective: f64,
+}
+
+impl<'a> Weighted<'a> {
+    fn of(points: Vec<(&'a [f64], f64)>, d: usize) -> Self {
+        let (mean, mut covariance) = moments(points.iter().copied(), d);
+        for j in 0..d {
+            // A parameter that does not vary keeps a spread that is small beside its size.
+            let least = (1e-9 * (1.0 + mean[j].abs())).powi(2);
+            covariance[j * d + j] = covariance[j * d + j] * (1.0 + JITTER) + least;
+        }
+        let effective = 1.0 / points.iter().map(|(_, w)| w * w).sum::<f64>();
+        Weighted { points, d, covariance, effective }
+    }
+
+    /// L of (1 − λ) S + λ (covariance of all points); its diagonal alone where that has no factor.
+    fn factor(&self, own: &[f64], effective: f64) -> Vec<f64> {
+        let d = self.d;
+        let pull = (d as f64 + 1.0) / (d as f64 + 1.0 + effective);
+        let mut matrix: Vec<f64> =
+            own.iter().zip(&self.covariance).map(|(s, all)| (1.0 - pull) * s + pull * all).collect();
+        for j in 0..d {
+            matrix[j * d + j] += JITTER * self.covariance[j * d + j];
+        }
+        cholesky(&matrix, d).unwrap_or_else(|| {
+            let mut diagonal = vec![0.0; d * d];
+            (0..d).for_each(|j| diagonal[j * d + j] = self.covariance[j * d + j].sqrt());
+            diagonal
+        })
+    }
+
+    /// First responsibilities: each point belongs to the nearest of centres chosen as k-means++ does (Arthur and
+    /// Vassilvitskii 2007), in units of the parameters' spreads, after a few rounds of k-means.
+    fn first_assignment(&self, components: usize, seed: u64) -> Vec<usize> {
+        let d = self.d;
+        let scale: Vec<f64> = (0..d).map(|j| self.covariance[j * d + j].sqrt()).collect();
+        let distance = |a: &[f64], b: &[f64]| -> f64 { (0..d).map(|j| ((a[j] - b[j]) / scale[j]).powi(2)).sum() };
+        let stream = Stream { seed, purpose: PURPOSE };
+        let choose = |shares: &[f64], k: usize| {
+            let goal = uniform(stream.words(k as u64, 0)[0]) * shares.iter().sum::<f64>();
+            let mut sum = 0.0;
+            shares.iter().position(|s| {
+                sum += s;
+                sum >= goal
+            })
+        };
+        let shares: Vec<f64> = self.points.iter().map(|p| p.1).collect();
+        let mut centres = vec![self.points[choose(&shares, 0).unwrap_or(0)].0.to_vec()];
+        let mut nearest: Vec<f64> = self.points.iter().map(|p| distance(p.0, &centres[0])).collect();
+        for k in 1..components {
+            let shares: Vec<f64> = self.points.iter().zip(&nearest).map(|(p, n)| p.1 * n).collect();
+            let centre = self.points[choose(&shares, k).unwrap_or(0)].0.to_vec();
+            nearest.iter_mut().zip(&self.points).for_each(|(n, p)| *n = n.min(distance(p.0, &centre)));
+            centres.push(centre);
+        }
+        let mut assignment = vec![0; self.points.len()];
+        for _ in 0..5 {
+            for (own, point) in assignment.iter_mut().zip(&self.points) {
+                let to = |c: usize| distance(point.0, &centres[c]);
+                *own = (0..components).min_by(|a, b| to(*a).total_cmp(&to(*b))).unwrap_or(0);
+            }
+            for (c, centre) in centres.iter_mut().enumerate() {
+                let own = self.points.iter().zip(&assignment).filter(|(_, a)| **a == c).map(|(p, _)| *p);
+                if own.clone().next().is_some() {
+                    *centre = moments(own, d).0;
+                }
+            }
+        }
+        assignment
+    }
+
+    /// The fitted mixture and its mean log-likelihood.
+    fn expectation_maximisation(&self, components: usize, options: &FitOptions) -> Result<(Mixture, f64)> {
+        let n = self.points.len();
+        let mut shares = vec![vec![0.0; n]; components];
+        for (i, own) in self.first_assignment(components, options.seed).into_iter().enumerate() {
+            shares[own][i] = 1.0;
+        }
+        let mut mixture = self.maximise(&shares)?;
+        let mut last = f64::NEG_INFINITY;
+        let mut parts = Vec::new();
+        for _ in 0..options.iterations {
+            shares = vec![vec![0.0; n]; mixture.weights().len()];
+            let mut log_likelihood = 0.0;
+            for (i, (point, weight)) in self.points.iter().enumerate() {
+                let top = mixture.log_parts(point, &mut parts);
+                let sum: f64 = parts.iter().map(|p| libm::exp(p - top)).sum();
+                log_likelihood += weight * (top + libm::log(sum));
+                for (share, part) in shares.iter_mut().zip(&parts) {
+                    share[i] = libm::exp(part - top) / sum;
+                }
+            }
+            if log_likelihood - last < options.tolerance {
+                return Ok((mixture, log_likelihood));
+            }
+            last = log_likelihood;
+            mixture = self.maximise(&shares)?;
+        }
+        Ok((mixture, last))
+    }
+
+    /// Weights, means and factors for given responsibilities.
+    fn maximise(&self, shares: &[Vec<f64>]) -> Result<Mixture> {
+        let (mut weights, mut means, mut factors) = (Vec::new(), Vec::new(), Vec::new());
+        for share in shares {
+            let own = self.points.iter().zip(share).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
+            let weight: f64 = own.clone().map(|p| p.1).sum();
+            if weight < LEAST_WEIGHT {
+                continue;
+            }
+            let effective = weight * weight / own.clone().map(|p| p.1 * p.1).sum::<f64>();
+            let (mean, covariance) = moments(own, self.d);
+            weights.push(weight);
+            means.push(mean);
+            factors.push(self.factor(&covariance, effective));
+        }
+        let each = (0..factors.len()).collect();
+        Mixture::new(weights, means, factors, each)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn three() -> Mixture {
+        Mixture::new(
+            vec![0.5, 0.3, 0.2],
+            vec![vec![0.0, 0.0], vec![8.0, 0.0], vec![0.0, 9.0]],
+            vec![vec![1.0, 0.0, 0.8, 0.6], vec![0.5, 0.0, 0.0, 1.5]],
+            vec![0, 1, 1],
+        )
+        .expect("well formed")
+    }
+
+    #[test]
+    fn a_fit_finds_the_number_the_places_and_the_shapes_of_components() {
+        let stream = Stream { seed: 1, purpose: 2 };
+        let points: Vec<Vec<f64>> = (0..4000).map(|i| three().draw(&stream, i, 0)).collect();
+        let fitted = Mixture::fit(&points, &vec![2.5; 4000], &FitOptions::default()).expect("a fit");
+        assert_eq!(fitted.weights().len(), 3);
+        for k in 0..3 {
+            let truth = three();
+            let near = |c: &usize| (0..2).map(|j| (fitted.mean(*c)[j] - truth.mean(k)[j]).powi(2)).sum::<f64>();
+            let own = (0..3).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
+            assert!(near(&own).sqrt() < 0.15);
+            assert!((fitted.weights()[own] - truth.weights()[k]).abs() < 0.03);
+            let off = fitted.factor(own).iter().zip(truth.factor(k)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 0.12, "{:?}", fitted.factor(own));
+        }
+    }
+
+    #[test]
+    fn weights_move_the_fit_as_repetitions_would() {
+        let stream = Stream { seed: 4, purpose: 2 };
+        let points: Vec<Vec<f64>> = (0..500).map(|i| three().draw(&stream, i, 0)).collect();
+        let weights: Vec<f64> = (0..500).map(|i| f64::from(1 + i % 3)).collect();
+        let one = FitOptions { components: 1, choose: false, ..FitOptions::default() };
+        let weighted = Mixture::fit(&points, &weights, &one).unwrap();
+        let total: f64 = weights.iter().sum();
+        let mean: f64 = points.iter().zip(&weights).map(|(p, w)| p[0] * w).sum::<f64>() / total;
+        assert!((weighted.mean(0)[0] - mean).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_point_or_a_parameter_without_spread_still_gives_a_density() {
+        let fitted = Mixture::fit(&[vec![3.0, 4.0]], &[1.0], &FitOptions::default()).unwrap();
+        assert!(fitted.log_density(&[3.0, 4.0]).is_finite());
+        let flat: Vec<Vec<f64>> = (0..50).map(|i| vec![f64::from(i), 7.0]).collect();
+        assert!(Mixture::fit(&flat, &[1.0; 50], &FitOptions::default()).is_ok());
+        assert!(Mixture::fit(&flat, &[0.0; 50], &FitOptions::default()).is_err());
+        assert!(Mixture::fit(&[], &[], &FitOptions::default()).is_err());
+    }
+}

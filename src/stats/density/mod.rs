@@ -1,0 +1,44 @@
+//! Densities over scenario parameters.
+//!
+//! Here live the spaces that points of scenarios lie in, kernel density estimation and the Gaussian mixture that
+//! every density and every proposal is with its fit, the share of a density that is physically valid, exposure,
+//! representativeness, and the density file. Here lives nothing about lanes. Scenarios come from
+//! [`crate::traffic::mining`] or a scenario file; points go to cases through [`crate::scenario::parameterization`].
+
+mod bandwidth;
+mod constrained;
+pub(crate) mod covariance;
+mod exposure;
+mod exposure_file;
+mod json_rows;
+mod kde;
+mod mixture;
+mod mixture_fit;
+mod model;
+mod model_file;
+mod normal;
+mod parameters;
+mod quantity;
+mod representativeness;
+mod scaling;
+pub(crate) mod standard_normal;
+mod transport;
+mod valid;
+
+pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd, silverman};
+pub use constrained::ConstrainedKde;
+pub use exposure::{Driven, Exposure, Rate, garwood};
+pub use exposure_file::ExposureFile;
+pub use kde::Kde;
+pub use mixture::{MAX_DIMENSIONS, Mixture};
+pub use mixture_fit::FitOptions as MixtureFitOptions;
+pub use model::{DataFacts, DensityModel, FitOptions, Fitted, Provenance};
+pub use model_file::{LARGEST_FILE_BYTES, read_density, write_density};
+pub(crate) use normal::Draws;
+pub use normal::{normal_cdf, normal_density, normal_quantile};
+pub use parameters::{Invalid, ParameterSpace};
+pub use quantity::{LONGEST_DURATION_S, Parameter, Quantity};
+pub use representativeness::{BETA, LARGEST_SET, REPETITIONS, Representativeness, metric};
+pub use scaling::{quantile, scale_of, standard_deviation};
+pub use transport::wasserstein;
+pub use valid::{VALID_SHARE_DRAWS, VALID_SHARE_PURPOSE, ValidShare};

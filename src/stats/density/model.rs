@@ -1,0 +1,237 @@
+//! The density of one category under one parameterization, with everything that sampling needs from it: valid
+//! region, P_valid, sizes, exposure, and where it comes from.
+
+use serde::{Deserialize, Serialize};
+
+use super::bandwidth::BandwidthRule;
+use super::exposure::{Driven, Exposure};
+use super::kde::Kde;
+use super::mixture::Mixture;
+use super::parameters::ParameterSpace;
+use super::representativeness::Representativeness;
+use super::valid::{VALID_SHARE_DRAWS, ValidShare};
+use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdFit};
+use crate::scenario::{Category, Scenario};
+use crate::{Error, Place, Result};
+
+/// Where a density comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Program and version that fitted it.
+    pub program: String,
+    /// The data in one line; synthetic data say so.
+    pub data: String,
+    /// Nothing here was measured on real traffic.
+    pub synthetic: bool,
+    /// SHA-256 of the scenarios as a scenario file, in hexadecimal.
+    pub scenarios_sha256: String,
+    /// Scenarios of the category that were found.
+    pub found: u64,
+    /// Those that the filters kept.
+    pub kept: u64,
+    /// Kept ones that were left out, because they are no point of the parameter space.
+    pub left_out: u64,
+}
+
+/// How a density is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitOptions {
+    /// Options of the parameterization.
+    pub parameterization: ParameterizationOptions,
+    /// The observed headway is the last parameter.
+    pub with_thw: bool,
+    /// Interval of the bandwidth.
+    pub rule: BandwidthRule,
+    /// Draws of P_valid.
+    pub valid_draws: u64,
+    /// Seed of P_valid and of the splits.
+    pub seed: u64,
+    /// Split, fit and compare; costs five more fits.
+    pub representativeness: bool,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        FitOptions {
+            parameterization: ParameterizationOptions::default(),
+            with_thw: false,
+            rule: BandwidthRule::Reduction,
+            valid_draws: VALID_SHARE_DRAWS,
+            seed: 157,
+            representativeness: true,
+        }
+    }
+}
+
+/// What is known of the data as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataFacts {
+    /// The data in one line.
+    pub data: String,
+    /// Made by the program.
+    pub synthetic: bool,
+    /// SHA-256 of the scenario file.
+    pub scenarios_sha256: String,
+    /// Time and distance driven, where they are known.
+    pub driven: Option<Driven>,
+}
+
+/// A fitted density.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DensityModel {
+    /// Parameters, valid region, point → case.
+    pub space: ParameterSpace,
+    /// f̂, before it is cut off at the valid region.
+    pub kde: Kde,
+    /// Share of f̂ inside the valid region.
+    pub valid: ValidShare,
+    /// Mean sizes of the scenarios it was fitted on: sizes are no parameters.
+    pub sizes: Sizes,
+    /// Events per hour and kilometre, where time or distance is known.
+    pub exposure: Option<Exposure>,
+    /// How well it stands for unseen scenarios, where that was asked for and could be told.
+    pub representativeness: Option<Representativeness>,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+/// A density with the scenarios that it had to leave out, and what could not be told.
+pub struct Fitted {
+    /// The density.
+    pub model: DensityModel,
+    /// One error per kept scenario that is no point of the space.
+    pub left_out: Vec<Error>,
+    /// Why there is no representativeness, where it was asked for.
+    pub not_compared: Option<Error>,
+}
+
+impl DensityModel {
+    /// Fits on the kept scenarios of the parameterization's category among `scenarios`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where there is no kept scenario, fewer than parameters + 1, one parameter is the same in
+    /// all, or no draw is valid; [`Error::Usage`] for options that make no parameter space.
+    pub fn fit(
+        id: ParameterizationId,
+        scenarios: &[Scenario],
+        facts: &DataFacts,
+        options: &FitOptions,
+    ) -> Result<Fitted> {
+        let of_category = || scenarios.iter().filter(|s| s.category == id.category);
+        let kept: Vec<&Scenario> = of_category().filter(|s| s.kept).collect();
+        let name = || format!("{} {}", id.category.label(), id.key);
+        if kept.is_empty() {
+            return Err(Error::input(
+                Place::item(name()),
+                format!("none of {} {} scenarios passed the filters", of_category().count(), id.category.label()),
+                "use more recordings, or relax the filters in the study file (--config)",
+            ));
+        }
+        let reduction = reduction(id, scenarios, &kept, options)?;
+        let space = ParameterSpace::new(id, &options.parameterization, reduction.as_ref(), options.with_thw)?;
+        let (mut used, mut points, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+        for &scenario in &kept {
+            let point = space.point(scenario).and_then(|p| match space.check(&p) {
+                Ok(()) => Ok(p),
+                Err(invalid) => Err(Error::input(
+                    Place::item(format!("scenario {}", scenario.id)),
+                    format!("outside the valid region of {}: {invalid}", name()),
+                    "it is left out of the density",
+                )),
+            });
+            match point {
+                Ok(point) => {
+                    points.push(point);
+                    used.push(scenario);
+                }
+                Err(error @ Error::Input { .. }) => left_out.push(error),
+                Err(error) => return Err(error),
+            }
+        }
+        let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
+        let kde = Kde::fit(points, &names, options.rule).map_err(|error| named(error, &name()))?;
+        let valid =
+            ValidShare::count(&kde, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
+        let Some(sizes) = Sizes::mean(used.iter().copied()) else {
+            return Err(Error::Internal(format!("{}: a density without scenarios", name())));
+        };
+        let mut not_compared = None;
+        let mut representativeness = None;
+        if options.representativeness {
+            match Representativeness::estimate(&space, &used, options.rule, options.seed) {
+                Ok(found) => representativeness = Some(found),
+                Err(error @ Error::Input { .. }) => not_compared = Some(named(error, &name())),
+                Err(error) => return Err(error),
+            }
+        }
+        let provenance = Provenance {
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            data: facts.data.clone(),
+            synthetic: facts.synthetic,
+            scenarios_sha256: facts.scenarios_sha256.clone(),
+            found: of_category().count() as u64,
+            kept: kept.len() as u64,
+            left_out: left_out.len() as u64,
+        };
+        let exposure = facts.driven.map(|driven| Exposure::new(kept.len() as u64, driven));
+        let model = DensityModel { space, kde, valid, sizes, exposure, representativeness, provenance };
+        Ok(Fitted { model, left_out, not_compared })
+    }
+
+    /// Kind of scenario.
+    pub fn category(&self) -> Category {
+        self.space.id().category
+    }
+
+    /// f̂ as a mixture, not cut off.
+    ///
+    /// # Errors
+    /// None for a model that this type made or read.
+    pub fn mixture(&self) -> Result<Mixture> {
+        self.kde.mixture()
+    }
+
+    /// log of f̂/P_valid; −∞ outside the valid region.
+    pub fn log_truncated_density(&self, point: &[f64]) -> f64 {
+        if self.space.is_valid(point) {
+            self.kde.log_density(point) - libm::log(self.valid.estimate)
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+}
+
+/// The decomposition, where the parameterization needs one.
+fn reduction(
+    id: ParameterizationId,
+    scenarios: &[Scenario],
+    kept: &[&Scenario],
+    options: &FitOptions,
+) -> Result<Option<Reduction>> {
+    if id.kind == Kind::Kinematic {
+        return Ok(None);
+    }
+    let fitted: Vec<&Scenario> = match options.parameterization.svd_fit {
+        SvdFit::Kept => kept.to_vec(),
+        SvdFit::All => {
+            let of_category = scenarios.iter().filter(|s| s.category == id.category);
+            of_category.filter(|s| id.category != Category::CutOut || s.lead.is_some()).collect()
+        }
+    };
+    Reduction::fit(id.category, &fitted, &options.parameterization).map(Some)
+}
+
+/// The error with the parameterization's name as its place.
+fn named(error: Error, name: &str) -> Error {
+    match error {
+        Error::Input { mut place, problem, help } => {
+            place.item = Some(match place.item.take() {
+                Some(item) if item != "density" => format!("{name}, {item}"),
+                _ => name.to_owned(),
+            });
+            Error::Input { place, problem, help }
+        }
+        other => other,
+    }
+}

@@ -1,0 +1,179 @@
+//! Cross-entropy (Rubinstein and Kroese, "The Cross-Entropy Method", 2004; Kurtz and Song, "Cross-entropy-based
+//! adaptive importance sampling using Gaussian mixture", Structural Safety 42, 2013): a Gaussian mixture is moved
+//! towards the failures level by level, each level's goal being a quantile of the limit state; importance sampling
+//! with the last mixture and a defensive share gives the estimate.
+
+use serde::{Deserialize, Serialize};
+
+use super::draws::judged;
+use super::importance::{Importance, defended, importance, no_valid_point};
+use super::problem::{Density, LimitState, purpose};
+use super::stop::StopRule;
+use super::summary::Estimate;
+use super::trust::Warning;
+use crate::Result;
+use crate::stats::density::covariance::moments;
+use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
+use crate::stats::random::Stream;
+
+/// Share of the density's covariance added to the widened copies of a fit's components, and their share of the
+/// mixture. Beyond the limit the failures thin out exponentially, a Gaussian fitted to them faster: without wider
+/// copies the weights have no variance, and intervals do not hold.
+const WIDENING: f64 = 0.25;
+const WIDENED_SHARE: f64 = 0.5;
+
+/// Components whose weight in the smoothed mixture falls below this are dropped.
+const LEAST_WEIGHT: f64 = 0.02;
+
+/// How to find a proposal and sample it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CrossEntropy {
+    /// Seed.
+    pub seed: u64,
+    /// Level of the interval.
+    pub level: f64,
+    /// Draws of each level.
+    pub samples_per_level: u64,
+    /// ρ: a level's goal is this quantile of the limit state, 0 at the lowest.
+    pub quantile: f64,
+    /// Most components of a level's fit; the number is chosen by the Bayesian information criterion.
+    pub components: usize,
+    /// Share of the new fit in the next mixture; the rest is the previous one.
+    pub smoothing: f64,
+    /// Most levels.
+    pub levels: usize,
+    /// Share of the density in the final proposal.
+    pub defence: f64,
+    /// When the final sample ends.
+    pub stop: StopRule,
+}
+
+impl CrossEntropy {
+    /// ρ = 0.1, up to four components, smoothing 0.7, a defensive share of 0.1; the runs are those of the final
+    /// sample.
+    pub fn new(seed: u64, samples_per_level: u64, final_samples: u64) -> CrossEntropy {
+        CrossEntropy {
+            seed,
+            level: 0.95,
+            samples_per_level,
+            quantile: 0.1,
+            components: 4,
+            smoothing: 0.7,
+            levels: 20,
+            defence: 0.1,
+            stop: StopRule::samples(final_samples),
+        }
+    }
+}
+
+/// One level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CrossEntropyStep {
+    /// Limit state that the fitted draws reach.
+    pub threshold: f64,
+    /// Draws that reach it.
+    pub elite: usize,
+    /// Failures among the level's draws.
+    pub failures: usize,
+    /// Components of the mixture after the level.
+    pub components: usize,
+}
+
+/// The estimate, the way to it, and the proposal, which other seeds or parts of a sample can use again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossEntropyRun {
+    /// The estimate; its runs include those of the levels.
+    pub estimate: Estimate,
+    /// The levels.
+    pub steps: Vec<CrossEntropyStep>,
+    /// The last mixture, without the defensive share.
+    pub proposal: Mixture,
+}
+
+/// Finds a proposal and samples it.
+///
+/// # Errors
+/// The limit state's; [`crate::Error::Usage`] where the density has no valid point.
+pub fn cross_entropy(
+    nominal: &dyn Density,
+    limit_state: &dyn LimitState,
+    options: &CrossEntropy,
+) -> Result<CrossEntropyRun> {
+    let mut steps: Vec<CrossEntropyStep> = Vec::new();
+    let mut proposal: Option<Mixture> = None;
+    let mut runs = 0;
+    let mut reached = f64::INFINITY;
+    let mut nominal_covariance = Vec::new();
+    for level in 0..options.levels.max(1) {
+        let stream = Stream { seed: options.seed, purpose: purpose::CROSS_ENTROPY + level as u32 };
+        let indices = 0..options.samples_per_level;
+        let guarded = proposal.as_ref().map(|p| defended(p.clone(), nominal, 0.0)).transpose()?;
+        let source: &dyn Density = guarded.as_ref().map_or(nominal, |g| g);
+        let sample = judged(source, limit_state, stream, indices)?;
+        if sample.points.is_empty() {
+            return Err(no_valid_point("level of cross-entropy"));
+        }
+        runs += sample.points.len() as u64;
+        if level == 0 {
+            let equal = sample.points.iter().map(|p| (p.as_slice(), 1.0));
+            nominal_covariance = moments(equal, nominal.dimensions()).1;
+        }
+        let mut sorted = sample.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let at = ((options.quantile * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1;
+        reached = sorted[at].max(0.0);
+        let (mut points, mut logs) = (Vec::new(), Vec::new());
+        for (point, _) in sample.points.into_iter().zip(&sample.values).filter(|(_, v)| **v <= reached) {
+            logs.push(
+                nominal.log_density(&point)
+                    - guarded.as_ref().map_or_else(|| nominal.log_density(&point), |g| g.log_density(&point)),
+            );
+            points.push(point);
+        }
+        let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = logs.iter().map(|l| libm::exp(l - top)).collect();
+        let fit = FitOptions { components: options.components, seed: options.seed, ..FitOptions::default() };
+        let narrow = Mixture::fit(&points, &weights, &fit)?;
+        let wide = narrow.widened(&nominal_covariance, WIDENING)?;
+        let fitted = Mixture::join(&[(1.0 - WIDENED_SHARE, &narrow), (WIDENED_SHARE, &wide)])?;
+        let next = match &proposal {
+            Some(last) => smoothed(&fitted, last, options.smoothing)?,
+            None => fitted,
+        };
+        steps.push(CrossEntropyStep {
+            threshold: reached,
+            elite: points.len(),
+            failures: sorted.partition_point(|v| *v <= 0.0),
+            components: next.weights().len(),
+        });
+        proposal = Some(next);
+        if reached <= 0.0 {
+            break;
+        }
+    }
+    let Some(proposal) = proposal else { return Err(no_valid_point("level of cross-entropy")) };
+    let sampled = defended(proposal, nominal, options.defence)?;
+    let last = Importance { seed: options.seed, level: options.level, stop: options.stop, self_normalised: false };
+    let mut estimate = importance(nominal, &sampled, limit_state, &last)?;
+    estimate.method = "cross_entropy".to_owned();
+    estimate.set_runs(estimate.runs + runs);
+    let not_reached = Warning::LevelsNotReached { levels: steps.len(), threshold: reached };
+    estimate.trust.warn_if(reached > 0.0, not_reached);
+    Ok(CrossEntropyRun { estimate, steps, proposal: sampled.proposal().clone() })
+}
+
+/// `share` of the new mixture and the rest of the old one, without what has become negligible. Mixing the densities
+/// stands for smoothing the parameters, which has no meaning where the numbers of components differ.
+fn smoothed(new: &Mixture, old: &Mixture, share: f64) -> Result<Mixture> {
+    let both = Mixture::join(&[(share, new), (1.0 - share, old)])?;
+    let kept: Vec<usize> = (0..both.weights().len()).filter(|k| both.weights()[*k] >= LEAST_WEIGHT).collect();
+    if kept.is_empty() {
+        return Ok(both);
+    }
+    Mixture::new(
+        kept.iter().map(|k| both.weights()[*k]).collect(),
+        kept.iter().map(|k| both.mean(*k).to_vec()).collect(),
+        kept.iter().map(|k| both.factor(*k).to_vec()).collect(),
+        (0..kept.len()).collect(),
+    )
+}

@@ -1,0 +1,199 @@
+//! Intervals for a probability.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::function::beta::beta_reg;
+
+use crate::stats::density::standard_normal::quantile;
+
+/// How an interval was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IntervalKind {
+    /// Wilson's score interval.
+    Wilson,
+    /// The exact interval of Clopper and Pearson.
+    ClopperPearson,
+    /// Zero failures: one-sided, from 0.
+    RuleOfThree,
+    /// Student's t on ln P.
+    LogStudent,
+    /// Wilson's with the effective number of runs of clusters.
+    Clusters,
+    /// Nothing was found and nothing bounds the probability from above but 1.
+    Nothing,
+}
+
+/// An interval that is to hold the probability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Lower end, ≥ 0.
+    pub low: f64,
+    /// Upper end, ≤ 1.
+    pub high: f64,
+    /// Nominal share of repeats whose interval holds the truth, in (0, 1).
+    pub level: f64,
+    /// How it was made.
+    pub kind: IntervalKind,
+}
+
+impl Interval {
+    /// Half the interval's width over the estimate; ∞ at zero.
+    pub fn relative_half_width(&self, probability: f64) -> f64 {
+        if probability > 0.0 { 0.5 * (self.high - self.low) / probability } else { f64::INFINITY }
+    }
+
+    /// Whether a probability lies inside, ends included.
+    pub fn holds(&self, probability: f64) -> bool {
+        self.low <= probability && probability <= self.high
+    }
+
+    /// [0, 1].
+    pub(crate) fn nothing(level: f64) -> Interval {
+        Interval { low: 0.0, high: 1.0, level, kind: IntervalKind::Nothing }
+    }
+}
+
+/// Wilson's score interval ("Probable inference", JASA 22, 1927). `failures` and `runs` may be effective numbers.
+///
+/// ```
+/// // Nothing failed in 1,000 runs: that bounds the probability, it does not make it 0.
+/// let interval = lanesweep::stats::estimate::wilson(0.0, 1000.0, 0.95);
+/// assert!(interval.low == 0.0 && (0.003..0.004).contains(&interval.high));
+/// ```
+pub fn wilson(failures: f64, runs: f64, level: f64) -> Interval {
+    if runs <= 0.0 {
+        return Interval::nothing(level);
+    }
+    let z = quantile(0.5 + 0.5 * level);
+    let p = failures / runs;
+    let z2 = z * z / runs;
+    let middle = (p + 0.5 * z2) / (1.0 + z2);
+    let half = z / (1.0 + z2) * (p * (1.0 - p) / runs + 0.25 * z2 / runs).sqrt();
+    // At 0 and at all failures the ends are 0 and 1 exactly; the difference of equals is not.
+    let low = if failures <= 0.0 { 0.0 } else { (middle - half).max(0.0) };
+    let high = if failures >= runs { 1.0 } else { (middle + half).min(1.0) };
+    Interval { low, high, level, kind: IntervalKind::Wilson }
+}
+
+/// The exact interval of Clopper and Pearson (Biometrika 26, 1934): it holds the truth in at least `level` of
+/// repeats, whatever the truth.
+pub fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
+    if runs == 0 {
+        return Interval::nothing(level);
+    }
+    let (k, n, tail) = (failures as f64, runs as f64, 0.5 * (1.0 - level));
+    let low = if failures == 0 { 0.0 } else { beta_quantile(k, n - k + 1.0, tail) };
+    let high = if failures == runs { 1.0 } else { beta_quantile(k + 1.0, n - k, 1.0 - tail) };
+    Interval { low, high, level, kind: IntervalKind::ClopperPearson }
+}
+
+/// The upper limit after `runs` runs without a failure, 1 − (1 − level)^{1/runs}: about 3/runs at 95 %. One-sided,
+/// so below Clopper and Pearson's.
+pub fn rule_of_three(runs: u64, level: f64) -> Interval {
+    if runs == 0 {
+        return Interval::nothing(level);
+    }
+    let high = -libm::expm1(libm::log1p(-level) / runs as f64);
+    Interval { low: 0.0, high, level, kind: IntervalKind::RuleOfThree }
+}
+
+/// P·exp(∓ t·c) for an estimate with the coefficient of variation c: an interval on the scale of ln P, which stays
+/// above 0 and is as lopsided as estimates of small probabilities are. t is Student's for the given degrees of
+/// freedom (≥ 1; ∞ gives the normal one). On the log scale the standard deviation is √ln(1 + c²).
+pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_freedom: f64, level: f64) -> Interval {
+    if probability.is_nan() || probability <= 0.0 || !coefficient_of_variation.is_finite() {
+        return Interval::nothing(level);
+    }
+    let t = student_quantile(0.5 + 0.5 * level, degrees_of_freedom);
+    let sigma = libm::log1p(coefficient_of_variation * coefficient_of_variation).sqrt();
+    let ratio = libm::exp(t * sigma);
+    Interval { low: probability / ratio, high: (probability * ratio).min(1.0), level, kind: IntervalKind::LogStudent }
+}
+
+/// Quantile of Student's t. Above 1,000 degrees of freedom it is the normal one to 0.2 %.
+pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
+    if degrees_of_freedom > 1000.0 {
+        return quantile(p);
+    }
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or_else(|_| quantile(p), |t| t.inverse_cdf(p))
+}
+
+/// The normal quantile over Student's at a level: at most 1.
+pub(super) fn student_factor(degrees_of_freedom: f64, level: f64) -> f64 {
+    let p = 0.5 + 0.5 * level;
+    quantile(p) / student_quantile(p, degrees_of_freedom)
+}
+
+/// x with I_x(a, b) = p, to the last digits that the regularised incomplete beta function has. Bisection of ln x:
+/// quantiles of rare events lie many decades below 1, and the library's own inversion does not end for some of them.
+fn beta_quantile(a: f64, b: f64, p: f64) -> f64 {
+    let (mut low, mut high) = (-745.0, 0.0);
+    for _ in 0..70 {
+        let middle = 0.5 * (low + high);
+        if beta_reg(a, b, libm::exp(middle)) < p {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    libm::exp(0.5 * (low + high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: f64, b: f64, relative: f64) -> bool {
+        (a - b).abs() <= relative * b.abs()
+    }
+
+    #[test]
+    fn intervals_agree_with_published_ones() {
+        // Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263, 15 of 148, 1 of 29.
+        for (k, n, w, c) in [
+            (81, 263, (0.2553, 0.3662), (0.2527, 0.3676)),
+            (15, 148, (0.0624, 0.1605), (0.0578, 0.1617)),
+            (1, 29, (0.0061, 0.1718), (0.0009, 0.1776)),
+        ] {
+            let (score, exact) = (wilson(f64::from(k), f64::from(n), 0.95), clopper_pearson(k as u64, n as u64, 0.95));
+            for (got, published) in [(score.low, w.0), (score.high, w.1), (exact.low, c.0), (exact.high, c.1)] {
+                assert!((got - published).abs() < 5e-5, "{k} of {n}: {got}, published {published}");
+            }
+        }
+    }
+
+    #[test]
+    fn zero_failures_are_bounded_by_three_over_n() {
+        assert!(close(rule_of_three(1_000_000, 0.95).high, 2.995_732_e-6, 1e-5));
+        assert!(close(clopper_pearson(0, 1000, 0.95).high, 1.0 - 0.025_f64.powf(1e-3), 1e-9));
+        assert_eq!(clopper_pearson(10, 10, 0.95).high, 1.0);
+        assert_eq!(wilson(0.0, 10.0, 0.95).low, 0.0);
+    }
+
+    #[test]
+    fn the_exact_interval_stands_where_tails_meet_the_level_up_to_billions_of_runs() {
+        for n in [1, 2, 10, 1000, 1_000_000, 10_000_000_000_u64] {
+            for k in [0, 1, 2, 9, 500, 900_000, 20_000_000].into_iter().filter(|k| *k <= n) {
+                let i = clopper_pearson(k, n, 0.95);
+                let p = k as f64 / n as f64;
+                assert!(i.low <= p && p <= i.high, "{k} of {n}: {i:?}");
+                if k > 0 {
+                    assert!(close(beta_reg(k as f64, (n - k) as f64 + 1.0, i.low), 0.025, 1e-6), "{k} of {n}");
+                }
+                if k < n {
+                    assert!(close(beta_reg(k as f64 + 1.0, (n - k) as f64, i.high), 0.975, 1e-6), "{k} of {n}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_interval_on_the_log_scale_is_lopsided_and_widens_with_few_degrees_of_freedom() {
+        let normal = log_normal(1e-6, 0.3, f64::INFINITY, 0.95);
+        assert!(normal.low > 0.0 && normal.high - 1e-6 > 1e-6 - normal.low);
+        assert!(log_normal(1e-6, 0.3, 4.0, 0.95).high > normal.high);
+        assert!(close(log_normal(1.0e-3, 1.0, 4.0, 0.95).high, 1e-3 * (2.776_445 * 0.832_554_6_f64).exp(), 1e-4));
+        assert_eq!(log_normal(0.0, 0.3, 4.0, 0.95).kind, IntervalKind::Nothing);
+    }
+}

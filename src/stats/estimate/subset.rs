@@ -1,0 +1,361 @@
+//! Subset simulation (Au and Beck, "Estimation of small failure probabilities in high dimensions by subset
+//! simulation", Probabilistic Engineering Mechanics 16, 2001): the probability as a product of shares of about p0,
+//! each the share of one level's samples that reach the next. From the second level on the samples are states of
+//! Markov chains that started at the samples which reached the level.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::draws::judged;
+use super::importance::no_valid_point;
+use super::interval::{Interval, log_normal};
+use super::problem::{Density, LimitState, judge, normals, purpose};
+use super::stop::StopReason;
+use super::summary::Estimate;
+use super::trust::Warning;
+use crate::Result;
+use crate::stats::density::covariance::{cholesky, colour, moments, whiten};
+use crate::stats::density::standard_normal::uniform;
+use crate::stats::random::Stream;
+
+/// Acceptance that the step size is steered towards between levels.
+const GOAL_ACCEPTANCE: f64 = 0.4;
+
+/// How to go down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Subset {
+    /// Seed.
+    pub seed: u64,
+    /// Level of the interval.
+    pub level: f64,
+    /// Samples of each level, ≥ 20.
+    pub samples_per_level: u64,
+    /// p0: share of a level that starts the next, in (0, 1).
+    pub share: f64,
+    /// Most levels.
+    pub levels: usize,
+}
+
+impl Subset {
+    /// p0 = 0.1, at most 12 levels, 95 %.
+    pub fn new(seed: u64, samples_per_level: u64) -> Subset {
+        Subset { seed, level: 0.95, samples_per_level, share: 0.1, levels: 12 }
+    }
+}
+
+/// One level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SubsetLevel {
+    /// Limit state that starts the next level; 0 at the last.
+    pub threshold: f64,
+    /// Share of the level's samples that reach it.
+    pub share: f64,
+    /// Share of the chains' steps that moved; 1 at the first level, which has no chains.
+    pub acceptance: f64,
+    /// Coefficient of variation of the share.
+    pub coefficient_of_variation: f64,
+}
+
+/// The estimate and the way to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SubsetRun {
+    /// The estimate.
+    pub estimate: Estimate,
+    /// The levels.
+    pub levels: Vec<SubsetLevel>,
+    /// Points of the last level that fail: where failures lie.
+    pub failures: Vec<Vec<f64>>,
+}
+
+/// A sample of a level: a state of a chain.
+#[derive(Clone)]
+struct State {
+    point: Vec<f64>,
+    log_density: f64,
+    value: f64,
+    /// Chain within the level.
+    chain: u32,
+    /// The first level's sample that it descends from.
+    root: u32,
+}
+
+/// Goes down level by level until enough of a level fails.
+///
+/// # Errors
+/// The limit state's; [`crate::Error::Usage`] where the density has no valid point.
+pub fn subset(density: &dyn Density, limit_state: &dyn LimitState, options: &Subset) -> Result<SubsetRun> {
+    let stream = Stream { seed: options.seed, purpose: purpose::NOMINAL };
+    let first = judged(density, limit_state, stream, 0..options.samples_per_level.max(20))?;
+    if first.points.is_empty() {
+        return Err(no_valid_point("subset simulation"));
+    }
+    let mut states: Vec<State> = Vec::with_capacity(first.points.len());
+    for (i, (point, value)) in first.points.into_iter().zip(first.values).enumerate() {
+        let log_density = density.log_density(&point);
+        states.push(State { point, log_density, value, chain: i as u32, root: i as u32 });
+    }
+    let mut walk = Walk::new(density, options.seed, &states);
+    let mut runs = states.len() as u64;
+    let mut levels: Vec<SubsetLevel> = Vec::new();
+    let mut influence: BTreeMap<u32, f64> = BTreeMap::new();
+    let mut probability = 1.0;
+    let mut acceptance = 1.0;
+    let mut reached = false;
+    for level in 1..=options.levels.max(1) {
+        let Some(threshold) = threshold_of(&states, options.share) else { break };
+        let share = states.iter().filter(|s| s.value <= threshold).count() as f64 / states.len() as f64;
+        let coefficient_of_variation = chain_variation(&states, threshold, share);
+        for state in &states {
+            let deviation = f64::from(u8::from(state.value <= threshold)) - share;
+            *influence.entry(state.root).or_default() += deviation / (states.len() as f64 * share);
+        }
+        probability *= share;
+        levels.push(SubsetLevel { threshold, share, acceptance, coefficient_of_variation });
+        if threshold <= 0.0 {
+            reached = true;
+            break;
+        }
+        if level == options.levels.max(1) {
+            break;
+        }
+        let (next, new_runs, accepted) = walk.level(limit_state, &states, threshold, level as u32)?;
+        states = next;
+        runs += new_runs;
+        acceptance = accepted;
+    }
+    let failures: Vec<Vec<f64>> = states.iter().filter(|s| s.value <= 0.0).map(|s| s.point.clone()).collect();
+    let estimate =
+        conclude(options, &levels, &influence, probability, reached, runs, failures.len() as u64, &states, first.voids);
+    Ok(SubsetRun { estimate, levels, failures })
+}
+
+/// The estimate from the levels.
+#[allow(clippy::too_many_arguments)]
+fn conclude(
+    options: &Subset,
+    levels: &[SubsetLevel],
+    influence: &BTreeMap<u32, f64>,
+    probability: f64,
+    reached: bool,
+    runs: u64,
+    failures: u64,
+    states: &[State],
+    voids: u64,
+) -> Estimate {
+    // ln P = Σ ln p_l; a root's influence is the sum of its descendants' deviations in all levels, so correlations
+    // within chains, between chains of one ancestor and between levels are all in the sum of squares.
+    let squares = influence.values().map(|d| d * d).sum::<f64>();
+    let fourths = influence.values().map(|d| d.powi(4)).sum::<f64>();
+    let by_levels: f64 = levels.iter().map(|l| l.coefficient_of_variation.powi(2)).sum();
+    let coefficient_of_variation = squares.max(by_levels).sqrt();
+    let degrees_of_freedom = if fourths > 0.0 { squares * squares / fourths } else { 1.0 };
+    let interval = log_normal(probability, coefficient_of_variation, degrees_of_freedom, options.level);
+    let mut lineages: BTreeMap<u32, f64> = BTreeMap::new();
+    for state in states.iter().filter(|s| s.value <= 0.0) {
+        *lineages.entry(state.root).or_default() += 1.0;
+    }
+    let sum: f64 = lineages.values().sum();
+    let lineages = sum * sum / lineages.values().map(|n| n * n).sum::<f64>().max(1.0);
+    let (estimated, variance, interval) = if reached {
+        (probability, (probability * coefficient_of_variation).powi(2), interval)
+    } else {
+        // Chains that do not come nearer to failure say nothing of what lies beyond: no bound but 1.
+        (0.0, 0.0, Interval::nothing(options.level))
+    };
+    let mut estimate =
+        Estimate::new("subset", estimated, variance, interval, runs, failures, voids, StopReason::Samples);
+    estimate.trust.about_voids(voids, options.samples_per_level);
+    for (i, level) in levels.iter().enumerate().skip(1) {
+        let stuck = Warning::ChainsStuck { level: i + 1, acceptance: level.acceptance };
+        estimate.trust.warn_if(level.acceptance < Warning::LEAST_ACCEPTANCE, stuck);
+    }
+    estimate.trust.warn_if(reached && lineages < Warning::LEAST_LINEAGES, Warning::FewLineages { lineages });
+    let threshold = levels.last().map_or(f64::INFINITY, |l| l.threshold);
+    estimate.trust.warn_if(!reached, Warning::LevelsNotReached { levels: levels.len(), threshold });
+    estimate
+}
+
+/// The value that about `share` of the states reach, 0 at the lowest. On a plateau, where many share one value, the
+/// next lower value; `None` where all states have one value above 0.
+fn threshold_of(states: &[State], share: f64) -> Option<f64> {
+    let mut values: Vec<f64> = states.iter().map(|s| s.value).collect();
+    values.sort_by(f64::total_cmp);
+    let wanted = ((share * values.len() as f64).round() as usize).clamp(1, values.len());
+    let threshold = values[wanted - 1];
+    if threshold <= 0.0 {
+        return Some(0.0);
+    }
+    let reaching = values.partition_point(|v| *v <= threshold);
+    let below = values.partition_point(|v| *v < threshold);
+    if reaching > 2 * wanted && below > 0 {
+        return Some(values[below - 1].max(0.0));
+    }
+    (reaching < values.len()).then_some(threshold)
+}
+
+/// Coefficient of variation of a level's share from the correlation within its chains: √(Σ over chains of the
+/// squared sum of deviations)/(n p), which is Au and Beck's √((1 − p)/(p n) (1 + γ)) with all lags of γ.
+fn chain_variation(states: &[State], threshold: f64, share: f64) -> f64 {
+    let mut chains: BTreeMap<u32, f64> = BTreeMap::new();
+    for state in states {
+        *chains.entry(state.chain).or_default() += f64::from(u8::from(state.value <= threshold)) - share;
+    }
+    chains.values().map(|d| d * d).sum::<f64>().sqrt() / (states.len() as f64 * share)
+}
+
+/// The moves of the chains. Two kinds take turns, each exact by itself: two steps of the autoregressive move
+/// x' = m + √(1 − s²)(x − m) + s L z, reversible for the Gaussian with the density's own mean and covariance and
+/// corrected by Metropolis and Hastings to the density (preconditioned Crank-Nicolson with a reference), which crosses
+/// a level in few steps however many parameters there are; then one random walk with the seeds' spread, which does
+/// not stick where the density is far from that Gaussian. For the standard normal density the first kind needs no
+/// correction and is used alone.
+struct Walk<'a> {
+    density: &'a dyn Density,
+    seed: u64,
+    /// Mean of the reference.
+    mean: Vec<f64>,
+    /// L of the reference.
+    factor: Vec<f64>,
+    /// Share s of the new direction in an autoregressive move.
+    turn: f64,
+    /// Step of the random walk in units of the seeds' spread.
+    stride: f64,
+}
+
+/// Every third step is a random walk.
+const KINDS: u64 = 3;
+
+impl<'a> Walk<'a> {
+    /// The reference is taken from draws of the density.
+    fn new(density: &'a dyn Density, seed: u64, draws: &[State]) -> Self {
+        let d = density.dimensions();
+        let stride = 2.0 / (d as f64).sqrt();
+        let (mean, factor) = spread(draws, d);
+        Walk { density, seed, mean, factor, turn: 0.6, stride }
+    }
+
+    /// The next level: chains from the states at or below the threshold, as many states as before, the seeds being
+    /// the first of each chain. All chains take a step together, one batch per step. Gives also the runs and the
+    /// share of steps that moved.
+    ///
+    /// A move is accepted by the density ratio first and then by the limit state, both of which keep the density
+    /// restricted to the level invariant. The step size is one for the whole level.
+    fn level(
+        &mut self,
+        limit_state: &dyn LimitState,
+        states: &[State],
+        threshold: f64,
+        level: u32,
+    ) -> Result<(Vec<State>, u64, f64)> {
+        let mut chains: Vec<State> = states.iter().filter(|s| s.value <= threshold).cloned().collect();
+        chains.iter_mut().enumerate().for_each(|(i, state)| state.chain = i as u32);
+        let (_, seeds) = spread(&chains, self.density.dimensions());
+        let stream = Stream { seed: self.seed, purpose: purpose::CHAIN + level };
+        let mut next = chains.clone();
+        let mut runs = 0_u64;
+        // Per kind of move: autoregressive, random walk.
+        let (mut moves, mut steps) = ([0_u64; 2], [0_u64; 2]);
+        let mut step = 0_u64;
+        while next.len() < states.len() {
+            step += 1;
+            let walks = !self.density.is_standard_normal() && step.is_multiple_of(KINDS);
+            let kind = usize::from(walks);
+            chains.truncate(states.len() - next.len());
+            let candidates: Vec<Option<(Vec<f64>, f64)>> = chains
+                .par_iter()
+                .map(|state| {
+                    let index = (step << 32) | u64::from(state.chain);
+                    if walks { self.walked(state, &seeds, &stream, index) } else { self.turned(state, &stream, index) }
+                })
+                .collect();
+            let points: Vec<Vec<f64>> = candidates.iter().flatten().map(|(point, _)| point.clone()).collect();
+            let mut values = judge(limit_state, &points)?.into_iter();
+            runs += points.len() as u64;
+            steps[kind] += chains.len() as u64;
+            for (state, candidate) in chains.iter_mut().zip(candidates) {
+                let Some((point, log_density)) = candidate else { continue };
+                let Some(value) = values.next() else { continue };
+                if value <= threshold {
+                    (state.point, state.log_density, state.value) = (point, log_density, value);
+                    moves[kind] += 1;
+                }
+            }
+            next.extend(chains.iter().cloned());
+        }
+        let share = |moves: u64, steps: u64| if steps > 0 { moves as f64 / steps as f64 } else { GOAL_ACCEPTANCE };
+        let steer = |kind: usize| libm::exp(1.5 * (share(moves[kind], steps[kind]) - GOAL_ACCEPTANCE));
+        self.turn = (self.turn * steer(0)).clamp(0.05, 0.95);
+        self.stride *= steer(1);
+        Ok((next, runs, share(moves[0] + moves[1], steps[0] + steps[1])))
+    }
+
+    /// An autoregressive move, or `None` where the density refuses it: no run is spent on it.
+    fn turned(&self, state: &State, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
+        let d = self.density.dimensions();
+        let z = normals(stream, index, 1, d);
+        let keep = (1.0 - self.turn * self.turn).sqrt();
+        if self.density.is_standard_normal() {
+            let point: Vec<f64> = state.point.iter().zip(&z).map(|(x, z)| keep * x + self.turn * z).collect();
+            let log_density = self.density.log_density(&point);
+            return Some((point, log_density));
+        }
+        let step = colour(&self.factor, &z);
+        let point: Vec<f64> =
+            (0..d).map(|j| self.mean[j] + keep * (state.point[j] - self.mean[j]) + self.turn * step[j]).collect();
+        // The correction: ln reference, up to its constant, at the point left and at the point proposed.
+        let gain = self.log_reference(&state.point) - self.log_reference(&point);
+        self.judged_by_density(state, point, gain, stream, index)
+    }
+
+    /// A step of a random walk, or `None` where the density refuses it.
+    fn walked(&self, state: &State, seeds: &[f64], stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
+        let step = colour(seeds, &normals(stream, index, 1, self.density.dimensions()));
+        let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.stride * s).collect();
+        self.judged_by_density(state, point, 0.0, stream, index)
+    }
+
+    fn log_reference(&self, point: &[f64]) -> f64 {
+        let from_mean: Vec<f64> = point.iter().zip(&self.mean).map(|(x, m)| x - m).collect();
+        let mut z = vec![0.0; from_mean.len()];
+        whiten(&self.factor, &from_mean, &mut z);
+        -0.5 * z.iter().map(|z| z * z).sum::<f64>()
+    }
+
+    fn judged_by_density(
+        &self,
+        state: &State,
+        point: Vec<f64>,
+        gain: f64,
+        stream: &Stream,
+        index: u64,
+    ) -> Option<(Vec<f64>, f64)> {
+        if !self.density.is_valid(&point) {
+            return None;
+        }
+        let log_density = self.density.log_density(&point);
+        let chance = libm::log(uniform(stream.words(index, 0)[0]));
+        (chance <= log_density - state.log_density + gain).then_some((point, log_density))
+    }
+}
+
+/// Mean of states and L of their covariance, drawn a little towards its diagonal.
+fn spread(states: &[State], d: usize) -> (Vec<f64>, Vec<f64>) {
+    let (mean, mut covariance) = moments(states.iter().map(|s| (s.point.as_slice(), 1.0)), d);
+    let keep = states.len() as f64 / (states.len() as f64 + d as f64 + 1.0);
+    for i in 0..d {
+        for j in 0..d {
+            if i != j {
+                covariance[i * d + j] *= keep;
+            }
+        }
+        covariance[i * d + i] += (1e-9 * (1.0 + mean[i].abs())).powi(2);
+    }
+    let factor = cholesky(&covariance, d).unwrap_or_else(|| {
+        let mut diagonal = vec![0.0; d * d];
+        (0..d).for_each(|j| diagonal[j * d + j] = covariance[j * d + j].sqrt());
+        diagonal
+    });
+    (mean, factor)
+}

@@ -1,0 +1,201 @@
+//! The library's one error type. Every variant says *where* (file, row, column, scenario or lane),
+//! *what* was found or expected, and *what to do about it*; the command line adds only the drawing.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use crate::support::plain_text::shown_in_line;
+
+/// Result of everything in this library that can fail on a user's input.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Where in a user's input a problem lies. Parts that are unknown stay out of the message.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// File or folder, as the user named it.
+    pub file: Option<PathBuf>,
+    /// Line of the file, counted from 1 and including the header line.
+    pub row: Option<u64>,
+    /// Column name as the header has it.
+    pub column: Option<String>,
+    /// The thing inside the file: a vehicle, a scenario key, a lane key.
+    pub item: Option<String>,
+}
+
+impl Place {
+    /// A whole file or folder.
+    pub fn file(path: impl AsRef<Path>) -> Self {
+        Place { file: Some(path.as_ref().to_path_buf()), ..Place::default() }
+    }
+
+    /// Something that is in no file: a scenario, a lane, a flag.
+    pub fn item(item: impl Into<String>) -> Self {
+        Place { item: Some(item.into()), ..Place::default() }
+    }
+
+    /// Adds the line, counted from 1 and including the header.
+    pub fn row(mut self, row: u64) -> Self {
+        self.row = Some(row);
+        self
+    }
+
+    /// Adds the column.
+    pub fn column(mut self, column: impl Into<String>) -> Self {
+        self.column = Some(column.into());
+        self
+    }
+
+    /// Adds the thing inside the file.
+    pub fn of(mut self, item: impl Into<String>) -> Self {
+        self.item = Some(item.into());
+        self
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts = Vec::new();
+        if let Some(file) = &self.file {
+            parts.push(shown_in_line(&file.display().to_string()));
+        }
+        if let Some(row) = self.row {
+            parts.push(format!("line {row}"));
+        }
+        if let Some(column) = &self.column {
+            parts.push(format!("column `{}`", shown_in_line(column)));
+        }
+        if let Some(item) = &self.item {
+            parts.push(shown_in_line(item));
+        }
+        f.write_str(&parts.join(", "))
+    }
+}
+
+/// What can go wrong, by whose turn it is to act.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The data is not what it must be: missing file or column, a bad number, a broken order.
+    #[error("{place}: {problem}")]
+    Input {
+        /// Where. Boxed, so that results which carry no error stay small: the reader returns millions.
+        place: Box<Place>,
+        /// What was found and what was expected.
+        problem: String,
+        /// What to do.
+        help: String,
+    },
+    /// A profile, a flag or a combination of options cannot be used.
+    #[error("{place}: {problem}")]
+    Usage {
+        /// Which flag, key or profile.
+        place: Box<Place>,
+        /// What is wrong with it.
+        problem: String,
+        /// What to write instead.
+        help: String,
+    },
+    /// The system refused to read or write, or to start a thread.
+    #[error("{path}: cannot {action}: {source}", path = shown_in_line(&path.display().to_string()))]
+    Io {
+        /// File or folder; for threads, whose they are.
+        path: PathBuf,
+        /// What was tried, as a verb: `read`, `write`, `create the folder`, `start`.
+        action: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// There is no compute device that can be used, or the one in use failed.
+    #[error("{device}: {problem}")]
+    Device {
+        /// Which device, as a user names it: its name, index or PCI bus id; or the flag that asked for one.
+        /// Boxed, as the problem is, so that results which carry no error stay small.
+        device: Box<str>,
+        /// What is wrong with it.
+        problem: Box<str>,
+        /// What to do.
+        help: String,
+    },
+    /// A check that the user asked for did not pass (conformance, verification).
+    #[error("{0}")]
+    Verification(String),
+    /// Another process is at work on the same run or part: the same command can do it later.
+    #[error("{place}: {problem}")]
+    Busy {
+        /// The lock.
+        place: Box<Place>,
+        /// Who holds it.
+        problem: String,
+    },
+    /// A defect of this program, caught before it could become a wrong number.
+    #[error("internal error: {0}")]
+    Internal(String),
+    /// The run was asked to end early, by a signal or a time limit; what is done is kept.
+    #[error("interrupted: {done}")]
+    Interrupted {
+        /// How far it came, and where that is kept.
+        done: String,
+    },
+}
+
+impl Error {
+    /// Bad data at `place`.
+    pub fn input(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        Error::Input { place: Box::new(place), problem: problem.into(), help: help.into() }
+    }
+
+    /// A flag, key or profile that cannot be used.
+    pub fn usage(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        Error::Usage { place: Box::new(place), problem: problem.into(), help: help.into() }
+    }
+
+    /// A compute device that is missing or failed.
+    pub fn device(device: impl Into<String>, problem: impl Into<String>, help: impl Into<String>) -> Self {
+        Error::Device { device: device.into().into(), problem: problem.into().into(), help: help.into() }
+    }
+
+    /// The system's refusal, with the path and what was tried.
+    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io { path: path.as_ref().to_path_buf(), action, source }
+    }
+
+    /// What the user can do about it, where there is something to say beyond the message.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => {
+                (!help.is_empty()).then(|| help.clone())
+            }
+            Error::Io { action, source, .. } => Some(match source.kind() {
+                std::io::ErrorKind::NotFound => "check the path for typing errors".to_owned(),
+                std::io::ErrorKind::PermissionDenied => {
+                    format!("you have no permission to {action} here: change the permissions or choose another path")
+                }
+                std::io::ErrorKind::InvalidData => "save the file as UTF-8 text".to_owned(),
+                std::io::ErrorKind::IsADirectory => "this is a folder; give the path of a file".to_owned(),
+                std::io::ErrorKind::NotADirectory | std::io::ErrorKind::AlreadyExists => {
+                    "a file is where a folder is needed: choose another path".to_owned()
+                }
+                std::io::ErrorKind::StorageFull => "the disk is full: free some space and run again".to_owned(),
+                std::io::ErrorKind::QuotaExceeded => "your quota is used up: free some space and run again".to_owned(),
+                std::io::ErrorKind::FileTooLarge => {
+                    "files may not become that large here: raise the limit (`ulimit -f`) and run again".to_owned()
+                }
+                std::io::ErrorKind::WouldBlock | std::io::ErrorKind::OutOfMemory => {
+                    "the limit of processes or of memory \
+                     is reached: use fewer --threads (more than there are cores serve nothing), or raise the limit \
+                     (`ulimit -u`, `ulimit -v`)"
+                        .to_owned()
+                }
+                std::io::ErrorKind::ReadOnlyFilesystem => {
+                    "the disk is mounted read-only: choose another path, or mount it writable and run again".to_owned()
+                }
+                _ => "check that the disk is present and has space, then run again".to_owned(),
+            }),
+            Error::Verification(_) => None,
+            Error::Busy { .. } => Some("wait for it and run this again, or choose another --out".to_owned()),
+            Error::Internal(_) => {
+                Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
+            }
+            Error::Interrupted { .. } => Some("run the same command again: it continues".to_owned()),
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Writing the files of a report: each whole or not at all.
+
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+use crate::support::atomic_file::AtomicFile;
+use crate::{Error, Result};
+
+/// Whether a folder is there, or could be made as far as names tell: what is known before the work.
+///
+/// # Errors
+/// [`Error::Io`] naming the file that is where a folder is needed.
+pub fn check_folder(dir: &Path) -> Result<()> {
+    for above in dir.ancestors().filter(|above| !above.as_os_str().is_empty()) {
+        match std::fs::metadata(above) {
+            Ok(about) if about.is_dir() => return Ok(()),
+            Ok(_) => {
+                let why =
+                    if above == dir { "it is a file".to_owned() } else { format!("{} is a file", above.display()) };
+                return Err(Error::io(dir, "create the folder", std::io::Error::new(ErrorKind::NotADirectory, why)));
+            }
+            Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
+            Err(e) => return Err(Error::io(dir, "create the folder", e)),
+        }
+    }
+    Ok(())
+}
+
+/// The same for the folder that a file is to be written to.
+///
+/// # Errors
+/// As [`check_folder`].
+pub fn check_folder_of(file: &Path) -> Result<()> {
+    file.parent().map_or(Ok(()), check_folder)
+}
+
+/// Makes a folder and those above it, where they do not exist.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn make_folder(dir: &Path) -> Result<()> {
+    check_folder(dir)?;
+    std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create the folder", e))
+}
+
+/// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old content or the
+/// new one, never a part.
+pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
+    write_atomically_with(path, |file| file.write_all(content))
+}
+
+/// The same for content that is produced on the way.
+pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
+    file.stage()?.publish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("result.csv");
+        write_atomically(&path, b"old").unwrap();
+        let error = write_atomically_with(&path, |file| {
+            file.write_all(b"half")?;
+            Err(std::io::Error::other("disk gone"))
+        });
+        assert!(error.is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+}

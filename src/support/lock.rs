@@ -1,0 +1,223 @@
+//! One writer per folder or part: an advisory lock on a file, which the system releases with the process
+//! however that ends. A lock file that a killed process left behind is therefore free, and is taken over.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use crate::support::atomic_file::{is_named, refuse_link};
+use crate::{Error, Place, Result};
+
+/// The right to write what a lock file stands for; dropping it removes the file and releases the lock.
+#[derive(Debug)]
+pub(crate) struct FolderLock {
+    path: PathBuf,
+    /// Holds the lock as long as it is open.
+    file: File,
+}
+
+impl FolderLock {
+    /// Takes the lock `path`, whose folder must exist, without waiting.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] if another process holds it, named by its process id where that can be read;
+    /// [`Error::Io`] if the file cannot be made or the file system knows no locks.
+    pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
+        FolderLock::take(path, File::try_lock, true)
+    }
+
+    /// The same lock together with others who share it; who has it alone keeps them out, and they keep him out.
+    ///
+    /// # Errors
+    /// As [`FolderLock::acquire`].
+    pub(crate) fn share(path: &Path) -> Result<FolderLock> {
+        FolderLock::take(path, File::try_lock_shared, false)
+    }
+
+    fn take(
+        path: &Path,
+        try_lock: impl Fn(&File) -> std::result::Result<(), TryLockError>,
+        is_alone: bool,
+    ) -> Result<FolderLock> {
+        loop {
+            let Some(mut file) = open(path)? else { continue };
+            match try_lock(&file) {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(held(path, &mut file)),
+                Err(TryLockError::Error(source)) => return Err(Error::io(path, "lock", source)),
+            }
+            // The former holder removes its file before it lets go: between opening and locking the name may
+            // have gone, and a lock on a file without a name keeps nobody out.
+            if !is_named(path, &file) {
+                continue;
+            }
+            // Those who share it are many: no number is written.
+            if is_alone { write_pid(&mut file) } else { file.set_len(0) }
+                .map_err(|source| Error::io(path, "write", source))?;
+            return Ok(FolderLock { path: path.to_path_buf(), file });
+        }
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // While the lock is still held alone, so that nobody else's file can be under that name, unless the folder was
+        // taken away and made again. A file that stays is harmless.
+        let is_alone = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
+        if is_alone && is_named(&self.path, &self.file) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Opens the lock file or makes it, never through a link; `None` where it was taken away meanwhile.
+fn open(path: &Path) -> Result<Option<File>> {
+    let options = || OpenOptions::new().read(true).write(true).clone();
+    let result = match options().create_new(true).open(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            refuse_link(path)?;
+            options().open(path)
+        }
+        result => result,
+    };
+    match result {
+        Ok(file) => Ok(Some(file)),
+        // Between the two: the folder itself is there, or the first would have said so.
+        Err(error) if error.kind() == ErrorKind::NotFound && path.parent().is_some_and(is_folder) => Ok(None),
+        Err(error) => Err(Error::io(path, "lock", error)),
+    }
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.as_os_str().is_empty() || path.is_dir()
+}
+
+/// For the message to those who come too late.
+fn write_pid(file: &mut File) -> std::io::Result<()> {
+    file.set_len(0)?;
+    file.rewind()?;
+    writeln!(file, "{}", std::process::id())
+}
+
+fn held(path: &Path, file: &mut File) -> Error {
+    let mut text = String::new();
+    // Where locks are mandatory the holder's file cannot be read: then it stays without a number.
+    let pid = file.take(32).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
+    let who = pid.map_or(String::new(), |pid| format!(" (pid {pid})"));
+    Error::Busy {
+        place: Box::new(Place::file(path)),
+        problem: format!("another lanesweep process is writing this part or run{who}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn one_holder_at_a_time_and_the_other_is_told_who() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let lock = FolderLock::acquire(&path).unwrap();
+        let error = FolderLock::acquire(&path).unwrap_err();
+        assert!(matches!(error, Error::Busy { .. }), "{error}");
+        assert!(error.to_string().contains("run.lock: another lanesweep process"), "{error}");
+        if cfg!(unix) {
+            assert!(error.to_string().contains(&format!("(pid {})", std::process::id())), "{error}");
+        }
+        assert!(error.help().unwrap().contains("--out"));
+        drop(lock);
+        assert!(!path.exists(), "a lock that was given back leaves no file");
+        drop(FolderLock::acquire(&path).unwrap());
+    }
+
+    #[test]
+    fn the_lock_file_of_a_killed_process_is_taken_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        fs::write(&path, "4000000000 and a longer text than any number\n").unwrap();
+        let lock = FolderLock::acquire(&path).unwrap();
+        if cfg!(unix) {
+            assert_eq!(fs::read_to_string(&path).unwrap().trim(), std::process::id().to_string());
+        }
+        drop(lock);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn many_share_a_lock_that_one_cannot_have_alone_meanwhile() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let (first, second) = (FolderLock::share(&path).unwrap(), FolderLock::share(&path).unwrap());
+        assert!(matches!(FolderLock::acquire(&path), Err(Error::Busy { .. })));
+        drop(first);
+        assert!(FolderLock::acquire(&path).is_err(), "one of two still holds it");
+        drop(second);
+        assert!(!path.exists());
+        let alone = FolderLock::acquire(&path).unwrap();
+        assert!(matches!(FolderLock::share(&path), Err(Error::Busy { .. })));
+        drop(alone);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_that_is_a_link_is_refused_and_what_it_leads_to_stays_as_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        let (precious, path) = (dir.path().join("precious"), dir.path().join("run.lock"));
+        fs::write(&precious, "mine").unwrap();
+        for target in [&precious, &dir.path().join("nowhere")] {
+            std::os::unix::fs::symlink(target, &path).unwrap();
+            let error = FolderLock::acquire(&path).unwrap_err();
+            assert!(error.to_string().contains("this is a link"), "{error}");
+            fs::remove_file(&path).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&precious).unwrap(), "mine");
+        assert!(!dir.path().join("nowhere").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_whose_folder_was_made_anew_does_not_take_the_next_holders_away() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        let path = out.join("run.lock");
+        let first = FolderLock::acquire(&path).unwrap();
+        fs::remove_dir_all(&out).unwrap();
+        fs::create_dir(&out).unwrap();
+        let second = FolderLock::acquire(&path).unwrap();
+        drop(first);
+        assert!(FolderLock::acquire(&path).is_err(), "the second still holds it");
+        drop(second);
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_an_io_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = FolderLock::acquire(&dir.path().join("gone/run.lock")).unwrap_err();
+        assert!(matches!(error, Error::Io { .. }), "{error}");
+    }
+
+    #[test]
+    fn many_that_come_and_go_never_hold_it_together() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.lock");
+        let (inside, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        let Ok(lock) = FolderLock::acquire(&path) else { continue };
+                        assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0, "two hold the lock");
+                        taken.fetch_add(1, Ordering::SeqCst);
+                        inside.fetch_sub(1, Ordering::SeqCst);
+                        drop(lock);
+                    }
+                });
+            }
+        });
+        assert!(taken.into_inner() > 0);
+    }
+}

@@ -1,0 +1,20 @@
+//! Support that knows nothing of traffic: errors, files, tables, locks, words and numbers for people.
+//!
+//! Here live the error type, files that are never half-written, run directories and their locks, tables in three formats,
+//! and the ranges of plausible input. Every room uses it; it uses none.
+
+pub(crate) mod atomic_file;
+pub mod error;
+pub mod files;
+pub(crate) mod hex;
+pub(crate) mod input_file;
+pub mod interrupt;
+pub(crate) mod lock;
+pub(crate) mod near_name;
+pub(crate) mod plain_text;
+pub mod plausibility;
+pub(crate) mod readable;
+pub mod run_dir;
+pub mod table;
+pub(crate) mod toml_file;
+pub(crate) mod vector_state;

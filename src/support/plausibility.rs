@@ -1,0 +1,248 @@
+//! What is plausible on a road, what is beyond physics, and which unit was probably meant: one table for every reader
+//! and every flag. `docs/src/tables.md` shows it to users; a test compares the two.
+//!
+//! A value outside the plausible range is used and reported. One beyond the physical range is refused, unless the user
+//! accepts implausible input; then it is reported too. What no arithmetic can hold is refused by the readers themselves.
+
+/// What a value is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the table below
+pub enum Quantity {
+    Speed,
+    LateralSpeed,
+    Acceleration,
+    Gap,
+    Headway,
+    LateralPosition,
+    Length,
+    Width,
+    LaneWidth,
+    Rate,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// What it is of.
+    pub quantity: Quantity,
+    /// Its name in messages.
+    pub name: &'static str,
+    /// Unit of the ranges.
+    pub unit: &'static str,
+    /// Least and largest value that needs no second look.
+    pub plausible: (f64, f64),
+    /// Least and largest value that a vehicle or a road can have.
+    pub physical: (f64, f64),
+    /// Units that are taken for it by mistake, and how many of them one of its own is.
+    pub mistaken: &'static [(&'static str, f64)],
+}
+
+const LENGTHS: &[(&str, f64)] = &[("feet", 3.280_839_895), ("cm", 100.0), ("mm", 1000.0)];
+
+type Range = (f64, f64);
+
+const fn of(
+    quantity: Quantity,
+    name: &'static str,
+    unit: &'static str,
+    plausible: Range,
+    physical: Range,
+    mistaken: &'static [(&'static str, f64)],
+) -> Limits {
+    Limits { quantity, name, unit, plausible, physical, mistaken }
+}
+
+#[rustfmt::skip] // a table: one line per quantity
+/// The table, in the order of [`Quantity`].
+pub const LIMITS: [Limits; 10] = [
+    of(Quantity::Speed, "speed", "m/s", (0.0, 70.0), (0.0, 100.0), &[("km/h", 3.6)]),
+    of(Quantity::LateralSpeed, "lateral speed", "m/s", (-5.0, 5.0), (-10.0, 10.0), &[]),
+    of(Quantity::Acceleration, "acceleration", "m/s²", (-12.0, 8.0), (-30.0, 30.0), &[]),
+    of(Quantity::Gap, "gap", "m", (-50.0, 1000.0), (-1e4, 1e4), &[("cm", 100.0), ("mm", 1000.0)]),
+    of(Quantity::Headway, "time headway", "s", (-60.0, 60.0), (-1e5, 1e5), &[("ms", 1000.0)]),
+    of(Quantity::LateralPosition, "lateral position", "m", (-15.0, 15.0), (-100.0, 100.0), LENGTHS),
+    of(Quantity::Length, "vehicle length", "m", (1.0, 30.0), (0.1, 100.0), LENGTHS),
+    of(Quantity::Width, "vehicle width", "m", (0.4, 4.0), (0.1, 10.0), LENGTHS),
+    of(Quantity::LaneWidth, "lane width", "m", (2.0, 6.0), (0.5, 50.0), LENGTHS),
+    of(Quantity::Rate, "sample rate", "Hz", (2.0, 200.0), (1.0, 1e4), &[]),
+];
+
+/// Speeds above this and below 0 are noise of a vehicle that stands, m/s.
+pub const NOISE_MPS: f64 = -0.5;
+
+/// What a user can do about a value that is refused here.
+pub const HELP: &str = "correct the value or its unit; --accept-implausible uses it as it is";
+
+/// What is done about values beyond the physical range.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Implausible {
+    /// They are errors.
+    #[default]
+    Refused,
+    /// They are used and reported.
+    Accepted,
+}
+
+impl Quantity {
+    /// Its row.
+    #[inline]
+    pub fn limits(self) -> &'static Limits {
+        &LIMITS[self as usize]
+    }
+
+    /// Is the value within the range that needs no second look?
+    #[inline]
+    pub fn is_plausible(self, value: f64) -> bool {
+        contains(self.limits().plausible, value)
+    }
+
+    fn told(self, value: f64) -> String {
+        let of = self.limits();
+        let ((least, most), words) = match contains(of.physical, value) {
+            true => (of.plausible, "is not plausible"),
+            false => (of.physical, "is beyond what is physical"),
+        };
+        let hint = of.mistaken.iter().find(|(_, per_own)| contains(of.plausible, value / per_own));
+        let hint = hint.map_or(String::new(), |(unit, per_own)| {
+            format!(
+                "; {} looks like {unit}: {} {}",
+                crate::support::readable::value(value),
+                crate::support::readable::value(value / per_own),
+                of.unit
+            )
+        });
+        format!(
+            "{} {} {words} for a {} ({least} to {most} {}){hint}",
+            crate::support::readable::value(value),
+            of.unit,
+            of.name,
+            of.unit
+        )
+    }
+}
+
+#[inline]
+fn contains((least, most): (f64, f64), value: f64) -> bool {
+    least <= value && value <= most
+}
+
+/// How often something was found, and where first.
+#[derive(Debug, Clone, Default)]
+struct Finding {
+    count: u64,
+    first: String,
+}
+
+impl Finding {
+    fn add(&mut self, other: Finding) {
+        if self.count == 0 {
+            self.first = other.first;
+        }
+        self.count += other.count;
+    }
+}
+
+/// What was implausible in some input, counted.
+#[derive(Debug, Clone, Default)]
+pub struct Doubts {
+    policy: Implausible,
+    found: [Finding; LIMITS.len()],
+    still: Finding,
+}
+
+impl Doubts {
+    /// None yet.
+    pub fn new(policy: Implausible) -> Doubts {
+        Doubts { policy, ..Doubts::default() }
+    }
+
+    /// None yet, of the same policy.
+    pub fn another(&self) -> Doubts {
+        Doubts::new(self.policy)
+    }
+
+    /// Looks at a value; `place` says where it stands.
+    ///
+    /// # Errors
+    /// What is wrong with one beyond the physical range, unless such are accepted.
+    #[inline]
+    pub fn judge(&mut self, quantity: Quantity, value: f64, place: impl FnOnce() -> String) -> Result<(), String> {
+        if quantity.is_plausible(value) { Ok(()) } else { self.doubt(quantity, value, place()) }
+    }
+
+    #[cold]
+    fn doubt(&mut self, quantity: Quantity, value: f64, place: String) -> Result<(), String> {
+        let text = quantity.told(value);
+        if self.policy == Implausible::Refused && !contains(quantity.limits().physical, value) {
+            return Err(text);
+        }
+        self.found[quantity as usize].add(Finding { count: 1, first: format!("{place}: {text}") });
+        Ok(())
+    }
+
+    /// A speed as everything here takes it: what is noise of a standing vehicle is 0, and counted.
+    #[inline]
+    pub fn speed(&mut self, value_mps: f64, place: impl FnOnce() -> String) -> f64 {
+        if value_mps >= 0.0 || value_mps <= NOISE_MPS || value_mps.is_nan() {
+            return value_mps;
+        }
+        self.still.add(Finding { count: 1, first: place() });
+        0.0
+    }
+
+    /// Takes over what was found elsewhere.
+    pub fn add(&mut self, other: Doubts) {
+        self.still.add(other.still);
+        for (own, theirs) in self.found.iter_mut().zip(other.found) {
+            own.add(theirs);
+        }
+    }
+
+    /// What a user should hear, one sentence per kind.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut list = Vec::new();
+        let times = |count: u64| if count == 1 { "once".to_owned() } else { format!("{count} times, first") };
+        if self.still.count > 0 {
+            let Finding { count, first } = &self.still;
+            list.push(format!("a speed between {NOISE_MPS} and 0 m/s is taken as 0, {}: {first}", times(*count)));
+        }
+        for (of, Finding { count, first }) in LIMITS.iter().zip(&self.found).filter(|(_, found)| found.count > 0) {
+            list.push(format!("an implausible {} is used as it is, {}: {first}", of.name, times(*count)));
+        }
+        list
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kilometres_per_hour_for_metres_per_second_are_refused_by_name_and_accepted_on_request() {
+        let mut doubts = Doubts::default();
+        let text = doubts.judge(Quantity::Speed, 108.0, String::new).unwrap_err();
+        assert_eq!(text, "108 m/s is beyond what is physical for a speed (0 to 100 m/s); 108 looks like km/h: 30 m/s");
+        assert!(doubts.sentences().is_empty());
+        let mut doubts = Doubts::new(Implausible::Accepted);
+        doubts.judge(Quantity::Speed, 108.0, || "line 2".to_owned()).unwrap();
+        doubts.judge(Quantity::Speed, 90.0, || "line 3".to_owned()).unwrap();
+        let [said] = &doubts.sentences()[..] else { panic!("one sentence") };
+        assert!(said.contains("2 times, first: line 2: 108 m/s"), "{said}");
+    }
+
+    #[test]
+    fn noise_of_a_standing_vehicle_is_0_and_a_vehicle_that_reverses_is_not() {
+        let mut doubts = Doubts::default();
+        let speeds = [-0.499, -0.01, -0.0, 0.0, -0.5, -3.0].map(|v| doubts.speed(v, || "here".to_owned()));
+        assert_eq!(speeds, [0.0, 0.0, 0.0, 0.0, -0.5, -3.0]);
+        assert_eq!(doubts.sentences(), ["a speed between -0.5 and 0 m/s is taken as 0, 2 times, first: here"]);
+    }
+
+    #[test]
+    fn the_table_is_in_the_order_of_the_quantities_and_every_plausible_value_is_physical() {
+        for (at, of) in LIMITS.iter().enumerate() {
+            assert_eq!(of.quantity as usize, at);
+            assert!(of.physical.0 <= of.plausible.0 && of.plausible.1 <= of.physical.1, "{}", of.name);
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Which field a column of a user's table is: by its name, with or without its unit at the end.
+
+use crate::support::near_name;
+
+/// A field that a table can have.
+#[derive(Debug, Clone)]
+pub(crate) struct Named {
+    /// Its name, without a unit.
+    pub name: String,
+    /// Its unit; empty for what is no number, `1` for a number without one.
+    pub unit: &'static str,
+}
+
+/// What a column's values are divided by to be in the field's unit.
+pub(crate) type Divisor = f64;
+
+/// Units as names end in them.
+const SUFFIXES: [(&str, &str); 17] = [
+    ("mps", "m/s"),
+    ("kmh", "km/h"),
+    ("mps2", "m/s²"),
+    ("m", "m"),
+    ("s", "s"),
+    ("hz", "Hz"),
+    ("mph", "miles per hour"),
+    ("kph", "km/h"),
+    ("km", "km"),
+    ("cm", "cm"),
+    ("mm", "mm"),
+    ("ft", "feet"),
+    ("ms", "milliseconds"),
+    ("min", "minutes"),
+    ("g", "g"),
+    ("deg", "degrees"),
+    ("rad", "radians"),
+];
+
+/// Where a column belongs.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Resolved {
+    /// To the field of this index.
+    Field(usize, Divisor),
+    /// To a field, but in a unit that cannot be used: the problem and what to do.
+    WrongUnit(String, String),
+    /// To none.
+    Unknown,
+}
+
+/// The field of a column. Dots count as underscores, so that the names of JSON (`ego.v0`) are understood.
+pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
+    let folded = column.trim().replace('.', "_").to_ascii_lowercase();
+    let is = |field: &Named| field.name.eq_ignore_ascii_case(&folded);
+    if let Some(at) = fields.iter().position(is) {
+        return Resolved::Field(at, 1.0);
+    }
+    for (at, field) in fields.iter().enumerate() {
+        let Some(rest) = folded.strip_prefix(&field.name.to_ascii_lowercase()).and_then(|rest| rest.strip_prefix('_'))
+        else {
+            continue;
+        };
+        let Some((_, unit)) = SUFFIXES.iter().find(|(suffix, _)| *suffix == rest) else { continue };
+        if *unit == field.unit {
+            return Resolved::Field(at, 1.0);
+        }
+        if *unit == "km/h" && field.unit == "m/s" {
+            return Resolved::Field(at, 3.6);
+        }
+        let suffix = SUFFIXES.iter().find(|(_, unit)| *unit == field.unit).map_or("", |(suffix, _)| suffix);
+        let wanted = match field.unit {
+            "" => format!("`{}` is no number and has no unit", field.name),
+            "m/s" => format!("convert it and call it `{0}_mps` (m/s) or `{0}_kmh` (km/h)", field.name),
+            unit => format!("convert it to {unit} and call it `{}_{suffix}`", field.name),
+        };
+        return Resolved::WrongUnit(format!("its name says {unit}, which cannot be used here"), wanted);
+    }
+    Resolved::Unknown
+}
+
+/// The name that is most like one that is not known, if one is.
+pub(crate) fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    near_name::nearest(column, names, 0.8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fields() -> Vec<Named> {
+        [("id", ""), ("ego_v0", "m/s"), ("target_y", "m"), ("D", "m"), ("fps", "Hz")]
+            .map(|(name, unit)| Named { name: name.to_owned(), unit })
+            .into()
+    }
+
+    #[test]
+    fn a_name_may_have_its_unit_and_kilometres_per_hour_are_converted() {
+        let of = |name: &str| resolve(name, &fields());
+        assert_eq!(of("ego.v0"), Resolved::Field(1, 1.0));
+        assert_eq!(of("ego_v0_mps"), Resolved::Field(1, 1.0));
+        assert_eq!(of(" ego_v0_kmh"), Resolved::Field(1, 3.6));
+        assert_eq!(of("d_m"), Resolved::Field(3, 1.0));
+        assert_eq!(of("weather"), Resolved::Unknown);
+    }
+
+    #[test]
+    fn another_unit_is_named_with_what_to_write_instead() {
+        let Resolved::WrongUnit(problem, help) = resolve("ego_v0_mph", &fields()) else { panic!("accepted") };
+        assert!(problem.contains("miles per hour") && help.contains("`ego_v0_kmh`"), "{problem}; {help}");
+        let Resolved::WrongUnit(problem, help) = resolve("target_y_kmh", &fields()) else { panic!("accepted") };
+        assert!(problem.contains("km/h") && help.contains("`target_y_m`"), "{problem}; {help}");
+    }
+
+    #[test]
+    fn a_misspelt_name_finds_its_neighbour_and_a_foreign_one_none() {
+        let names = || ["ego_v0", "target_y", "lane_width"].into_iter();
+        assert_eq!(nearest("lane_widht", names()), Some("lane_width"));
+        assert_eq!(nearest("weather", names()), None);
+    }
+}

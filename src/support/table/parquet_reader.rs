@@ -1,0 +1,260 @@
+//! Rows of a Parquet file that any program may have written, or spoilt.
+//!
+//! A few rows at a time are in memory. What the decoder would believe is checked before ([`super::parquet_pages`]); its
+//! panics on what is damaged end here, as an error about the file.
+
+use std::cell::Cell;
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use arrow::array::{Array, ArrayRef, AsArray, StructArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Float64Type, Int64Type};
+use arrow::record_batch::RecordBatch;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+};
+use parquet::basic::Compression;
+use serde_json::Value;
+
+use super::Row;
+use super::parquet_pages::{check_footer, check_pages};
+use crate::support::input_file;
+use crate::{Error, Place, Result};
+
+/// Rows that are decoded together, and fewer where pages are large: each row may repeat the longest text of a page.
+const BATCH_ROWS: u64 = 64;
+const BATCH_BYTES: u64 = 8 << 20;
+/// Longest series: eleven hours at 25 Hz.
+const LONGEST_SERIES: usize = 1 << 20;
+/// Longest text, bytes: every row may repeat it.
+const LONGEST_TEXT: usize = 1 << 16;
+
+pub(super) struct ParquetRows {
+    path: PathBuf,
+    file: File,
+    size: u64,
+    metadata: ArrowReaderMetadata,
+    /// Where each column is: field of the root, and field of the record there.
+    leaves: Vec<(usize, Option<usize>)>,
+    /// Names as in the file's header, for messages.
+    names: Vec<String>,
+    wanted: Vec<usize>,
+    reader: Option<ParquetRecordBatchReader>,
+    batch: Vec<Leaf>,
+    batch_rows: usize,
+    at: usize,
+    number: u64,
+}
+
+/// A column of a batch; a value is null too where its record is.
+struct Leaf {
+    record: Option<ArrayRef>,
+    values: ArrayRef,
+}
+
+thread_local! {
+    /// A panic of this thread is going to be caught here.
+    static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a panic of this thread, which works on a damaged Parquet file, is going to be an error about that file: a
+/// program's panic hook (`std::panic::set_hook`) need not tell it. The library sets no hook.
+pub fn is_panic_caught() -> bool {
+    IS_CAUGHT.get()
+}
+
+/// The decoder's work. Damage that makes it panic is an error about the file.
+fn guarded<T>(path: &Path, work: impl FnOnce() -> std::result::Result<T, String>) -> Result<T> {
+    IS_CAUGHT.set(true);
+    let result = catch_unwind(AssertUnwindSafe(work));
+    IS_CAUGHT.set(false);
+    match result {
+        Ok(result) => result.map_err(|problem| damaged(path, &problem)),
+        Err(_) => Err(damaged(path, "its content contradicts itself")),
+    }
+}
+
+fn damaged(path: &Path, problem: &str) -> Error {
+    let problem = format!("not a Parquet file that can be read: {problem}");
+    Error::input(Place::file(path), problem, "write the file again, or use JSON Lines or CSV")
+}
+
+impl ParquetRows {
+    pub(super) fn open(path: &Path) -> Result<(Vec<String>, ParquetRows)> {
+        let mut file = input_file::open(path)?;
+        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
+        check_footer(&mut file, size).map_err(|problem| damaged(path, problem))?;
+        // The types are Parquet's own: what another program's Arrow made of them is of no interest.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options).map_err(|e| e.to_string()))?;
+        let (mut names, mut leaves) = (Vec::new(), Vec::new());
+        for (root, field) in metadata.schema().fields().iter().enumerate() {
+            match field.data_type() {
+                DataType::Struct(fields) => {
+                    for (at, inner) in fields.iter().enumerate() {
+                        names.push(format!("{}.{}", field.name(), inner.name()));
+                        leaves.push((root, Some(at)));
+                    }
+                }
+                _ => {
+                    names.push(field.name().clone());
+                    leaves.push((root, None));
+                }
+            }
+        }
+        let rows = ParquetRows {
+            path: path.to_path_buf(),
+            file,
+            size,
+            metadata,
+            leaves,
+            names: names.clone(),
+            wanted: Vec::new(),
+            reader: None,
+            batch: Vec::new(),
+            batch_rows: 0,
+            at: 0,
+            number: 0,
+        };
+        Ok((names, rows))
+    }
+
+    pub(super) fn want(&mut self, columns: &[usize]) -> Result<()> {
+        for &column in columns {
+            let data_type = self.data_type(column);
+            if canonical(&data_type).is_none() {
+                let place = Place::file(&self.path).column(&self.names[column]);
+                let problem = format!("holds values of the type {data_type}");
+                return Err(Error::input(place, problem, "expected numbers, texts, truth values or lists of numbers"));
+            }
+        }
+        self.wanted = columns.to_vec();
+        let parquet = self.metadata.metadata();
+        let roots: Vec<usize> = columns.iter().map(|&column| self.leaves[column].0).collect();
+        let mask = ProjectionMask::roots(self.metadata.parquet_schema(), roots);
+        let chunks = || {
+            let included = |(at, chunk)| mask.leaf_included(at).then_some(chunk);
+            parquet.row_groups().iter().flat_map(move |group| group.columns().iter().enumerate().filter_map(included))
+        };
+        let codec = |chunk: &&parquet::file::metadata::ColumnChunkMetaData| {
+            !matches!(chunk.compression(), Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_))
+        };
+        if let Some(chunk) = chunks().find(codec) {
+            let problem = format!("compressed with {}; expected zstd, snappy or none", chunk.compression());
+            return Err(Error::input(Place::file(&self.path), problem, "write it again with compression=\"zstd\""));
+        }
+        let mut pages = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
+        let size = self.size;
+        let largest = guarded(&self.path, || check_pages(&mut pages, size, chunks()).map_err(str::to_owned))?;
+        let batch_rows = (BATCH_BYTES / largest.max(1)).clamp(1, BATCH_ROWS) as usize;
+        let file = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let builder = builder.with_projection(mask.clone()).with_batch_size(batch_rows);
+        self.reader = Some(guarded(&self.path, || builder.build().map_err(|e| e.to_string()))?);
+        Ok(())
+    }
+
+    fn data_type(&self, column: usize) -> DataType {
+        let (root, inner) = self.leaves[column];
+        let field: &Field = self.metadata.schema().field(root);
+        match (field.data_type(), inner) {
+            (DataType::Struct(fields), Some(at)) => fields[at].data_type().clone(),
+            (other, _) => other.clone(),
+        }
+    }
+
+    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+        while self.at == self.batch_rows {
+            let Some(reader) = &mut self.reader else { return Ok(None) };
+            let next = guarded(&self.path, || reader.next().transpose().map_err(|e| e.to_string()))?;
+            let Some(batch) = next else { return Ok(None) };
+            self.batch = guarded(&self.path, || self.leaves_of(&batch))?;
+            (self.batch_rows, self.at) = (batch.num_rows(), 0);
+        }
+        let at = self.at;
+        let batch = &self.batch;
+        let values = guarded(&self.path, || batch.iter().map(|leaf| value(leaf, at)).collect())?;
+        self.at += 1;
+        self.number += 1;
+        Ok(Some(Row { number: self.number, values }))
+    }
+
+    /// The wanted columns of a batch, each in one of a few types.
+    fn leaves_of(&self, batch: &RecordBatch) -> std::result::Result<Vec<Leaf>, String> {
+        let leaf = |&column: &usize| {
+            let (root, inner) = self.leaves[column];
+            // The batch has the wanted fields of the root, in their order in the file.
+            let before = |&&other: &&usize| self.leaves[other].0 < root;
+            let mut roots: Vec<usize> = self.wanted.iter().filter(before).map(|&other| self.leaves[other].0).collect();
+            roots.sort_unstable();
+            roots.dedup();
+            let array = batch.columns().get(roots.len()).ok_or("a column is missing")?;
+            let (record, values) = match inner {
+                None => (None, array.clone()),
+                Some(at) => {
+                    let record = array.as_any().downcast_ref::<StructArray>().ok_or("a record is none")?;
+                    (Some(array.clone()), record.column(at).clone())
+                }
+            };
+            let to = canonical(values.data_type()).ok_or("a column changes its type")?;
+            let values = cast(&values, &to).map_err(|e| e.to_string())?;
+            Ok(Leaf { record, values })
+        };
+        self.wanted.iter().map(leaf).collect()
+    }
+}
+
+/// The type that values are read as; `None` for what no table here has.
+fn canonical(of: &DataType) -> Option<DataType> {
+    let number = |of: &DataType| match of {
+        of if of.is_integer() => Some(DataType::Int64),
+        of if of.is_floating() || matches!(of, DataType::Decimal128(..) | DataType::Decimal256(..)) => {
+            Some(DataType::Float64)
+        }
+        _ => None,
+    };
+    match of {
+        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => Some(DataType::Utf8),
+        DataType::Dictionary(_, inner) => canonical(inner),
+        DataType::Boolean | DataType::Null => Some(of.clone()),
+        DataType::List(item) | DataType::LargeList(item) | DataType::FixedSizeList(item, _) => {
+            let item = match item.data_type() {
+                DataType::Null => DataType::Float64,
+                other => number(other)?,
+            };
+            Some(DataType::List(std::sync::Arc::new(Field::new_list_field(item, true))))
+        }
+        other => number(other),
+    }
+}
+
+/// A value of a leaf; NaN and infinity, which JSON has not, are null.
+fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
+    let array = &leaf.values;
+    if leaf.record.as_ref().is_some_and(|record| record.is_null(at)) || array.is_null(at) {
+        return Ok(Value::Null);
+    }
+    Ok(match array.data_type() {
+        DataType::Utf8 => match array.as_string::<i32>().value(at) {
+            text if text.len() > LONGEST_TEXT => {
+                return Err(format!("a text has {} bytes; at most {LONGEST_TEXT} can be read", text.len()));
+            }
+            text => Value::from(text),
+        },
+        DataType::Boolean => Value::from(array.as_boolean().value(at)),
+        DataType::Int64 => Value::from(array.as_primitive::<Int64Type>().value(at)),
+        DataType::Float64 => Value::from(array.as_primitive::<Float64Type>().value(at)),
+        DataType::List(_) => {
+            let items = array.as_list::<i32>().value(at);
+            if items.len() > LONGEST_SERIES {
+                return Err(format!("a series has {} values; at most {LONGEST_SERIES} can be read", items.len()));
+            }
+            let items = Leaf { record: None, values: items };
+            Value::Array((0..items.values.len()).map(|at| value(&items, at)).collect::<std::result::Result<_, _>>()?)
+        }
+        _ => Value::Null,
+    })
+}

@@ -1,0 +1,172 @@
+//! Many recordings at once: read and mined in parallel, one recording per thread in memory at a time, the
+//! result in the recordings' order. A recording that cannot be read is reported; the others are used.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::miner::{CategoryCount, Mined, mine};
+use super::options::MiningOptions;
+use crate::scenario::{Category, Scenario};
+use crate::support::plausibility::Implausible;
+use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use crate::traffic::trajectory::highd::{self, FileChecksum};
+use crate::traffic::trajectory::{EgoView, Recording};
+use crate::{Error, Result};
+
+/// What one recording gave.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct RecordingSummary {
+    /// Its id.
+    pub id: String,
+    /// Vehicles in it.
+    pub vehicles: u64,
+    /// Samples of all vehicles.
+    pub samples: u64,
+    /// Ego-centric data sets.
+    pub data_sets: u64,
+    /// Time that all egos together drive in their data sets, s.
+    pub driven_s: f64,
+    /// Way that they drive in them, m.
+    pub driven_m: f64,
+    /// Samples per second.
+    pub frame_rate_hz: f64,
+    /// Its files with their content's SHA-256; empty for generated recordings.
+    pub files: Vec<FileChecksum>,
+}
+
+/// Scenarios of many recordings.
+#[derive(Debug, Default)]
+pub struct Collection {
+    /// Every scenario found, recording by recording.
+    pub scenarios: Vec<Scenario>,
+    /// The recordings that were used.
+    pub recordings: Vec<RecordingSummary>,
+    /// Recordings that were not, and why.
+    pub problems: Vec<Error>,
+    /// What the data leaves open or what looks wrong, as sentences.
+    pub notes: Vec<String>,
+    /// Made up by the program, in whole or in part: nothing that follows is a statement about real traffic.
+    pub synthetic: bool,
+}
+
+impl Collection {
+    fn add(&mut self, part: Part) {
+        self.notes.extend(part.notes);
+        self.synthetic |= part.synthetic;
+        self.scenarios.extend(part.mined.scenarios);
+        self.recordings.push(part.summary);
+    }
+}
+
+/// Found and kept scenarios of a category.
+pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
+    let of = scenarios.iter().filter(|s| s.category == category);
+    of.fold(CategoryCount::default(), |sum, s| CategoryCount {
+        found: sum.found + 1,
+        kept: sum.kept + u64::from(s.kept),
+    })
+}
+
+struct Part {
+    mined: Mined,
+    summary: RecordingSummary,
+    notes: Vec<String>,
+    synthetic: bool,
+}
+
+/// Reads and mines every recording of a folder. `done` is called after each one, from any thread.
+///
+/// # Errors
+/// If the folder holds no recording, or none of them can be read: the first recording's error.
+pub fn mine_folder(
+    dir: &Path,
+    options: &MiningOptions,
+    implausible: Implausible,
+    done: impl Fn() + Sync,
+) -> Result<Collection> {
+    options.validate()?;
+    let inventory = highd::inventory(dir)?;
+    let parts: Vec<Result<Part>> = inventory
+        .recordings
+        .par_iter()
+        .with_max_len(1)
+        .map(|files| {
+            let part = highd::read_judged(files, implausible).map(|loaded| {
+                let mined = mine(&loaded.recording, options);
+                let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
+                Part { mined, summary, notes: loaded.notes, synthetic: loaded.recording.synthetic }
+            });
+            done();
+            part
+        })
+        .collect();
+    let mut collection = Collection { problems: inventory.problems, ..Collection::default() };
+    for part in parts {
+        match part {
+            Ok(part) => collection.add(part),
+            Err(error) => collection.problems.push(error),
+        }
+    }
+    if collection.recordings.is_empty() && !collection.problems.is_empty() {
+        return Err(collection.problems.swap_remove(0));
+    }
+    Ok(collection)
+}
+
+/// Generates and mines synthetic recordings.
+pub fn mine_generated(
+    generator: &GeneratorOptions,
+    options: &MiningOptions,
+    done: impl Fn() + Sync,
+) -> Result<Collection> {
+    options.validate()?;
+    let parts: Vec<Part> = (0..generator.recordings)
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|index| {
+            let recording = generate_one(generator, index)?;
+            let mined = mine(&recording, options);
+            let summary = summary(&recording, &mined, options, Vec::new());
+            done();
+            Ok(Part { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
+        })
+        .collect::<Result<_>>()?;
+    let mut collection = Collection::default();
+    for part in parts {
+        collection.add(part);
+    }
+    Ok(collection)
+}
+
+fn summary(
+    recording: &Recording,
+    mined: &Mined,
+    options: &MiningOptions,
+    files: Vec<FileChecksum>,
+) -> RecordingSummary {
+    let [driven_s, driven_m] = driven(recording, options);
+    RecordingSummary {
+        id: recording.id.clone(),
+        vehicles: recording.tracks.len() as u64,
+        samples: recording.tracks.iter().map(|t| t.len() as u64).sum(),
+        data_sets: mined.data_sets,
+        driven_s,
+        driven_m,
+        frame_rate_hz: recording.frame_rate_hz,
+        files,
+    }
+}
+
+/// Time and way of all ego data sets, from each ego's first sample to its last with tags: the exposure in which
+/// scenarios were looked for.
+fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (index, ego) in recording.tracks.iter().enumerate() {
+        let Some(view) = EgoView::of(recording, index, &options.ego_view) else { continue };
+        sum[0] += view.last_sample() as f64 / recording.frame_rate_hz;
+        sum[1] += ego.s_m[view.last_sample()] - ego.s_m[0];
+    }
+    sum
+}

@@ -1,0 +1,83 @@
+//! Cut-out: the leader leaves the ego's lane and uncovers a slower vehicle (method.md §3; the mirror of
+//! the cut-in).
+//!
+//! | item | target | ego |
+//! |---|---|---|
+//! | 1 | changes out of the ego's lane (`lo`, `ro`), is the leader | keeps its lane |
+//! | 2 | changes out of the ego's lane, is not the leader | keeps its lane |
+//!
+//! That is *found*. *Kept* besides if the nearest vehicle ahead of the target in the ego's lane at t = 0
+//! stays in that lane and in range until the end, and is slower than the ego at t = 0.
+
+use super::cut_in::{describe, end_cause, lane_change_of};
+use super::data_set::DataSet;
+use super::found::{Found, micrometres};
+use super::lateral::LaneChangeKind;
+use super::options::{CutOutOptions, TOLERANCE};
+use super::search::{Item, Match};
+use super::tags::Tags;
+use crate::scenario::{Category, Scenario, Side};
+use crate::traffic::trajectory::Track;
+
+/// The items, in order.
+pub const ITEMS: [Item<'static, Tags>; 2] =
+    [&|t: &Tags| t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE | Tags::LEADER), &|t: &Tags| {
+        t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE) && !t.has(Tags::LEADER)
+    }];
+
+/// The scenario of one match, with the verdict of the filters. `tags` are those of the match's stretch,
+/// `first` the ego's sample of the first of them.
+pub(super) fn scenario(
+    set: &DataSet,
+    target_index: usize,
+    matched: &Match,
+    first: usize,
+    tags: &[Tags],
+) -> Option<Scenario> {
+    let target = &set.scene.recording.tracks[target_index];
+    let (start, end) = (first + matched.start(), first + matched.end);
+    let found = Found { set, target, category: Category::CutOut, start, end };
+    let change = lane_change_of(&found, target_index)?;
+    let side = match change.kind {
+        LaneChangeKind::LeftOut | LaneChangeKind::RightIn => Side::Left,
+        LaneChangeKind::RightOut | LaneChangeKind::LeftIn => Side::Right,
+    };
+    let mut scenario = found.scenario(side)?;
+    describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_OUT, false));
+    match uncovered(&found) {
+        Ok(lead) => {
+            let (j, l) = (found.sample_of(target, start)?, found.sample_of(lead, start)?);
+            let lead_gap = lead.s_m[l] - target.s_m[j] - 0.5 * (lead.length_m + target.length_m);
+            scenario.lead_id = Some(lead.id);
+            scenario.lead = Some(found.other(lead, side)?);
+            scenario.lead_gap = Some(micrometres(lead_gap));
+            (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_out);
+        }
+        Err(reason) => scenario.reason = reason.to_owned(),
+    }
+    Some(scenario)
+}
+
+/// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to
+/// the end; else why there is none.
+fn uncovered<'a>(found: &Found<'a>) -> Result<&'a Track, &'static str> {
+    let set: &'a DataSet<'a> = found.set;
+    let nobody = "no vehicle ahead of the target in the ego's lane";
+    let j = found.sample_of(found.target, found.start).ok_or(nobody)?;
+    let lane = set.ego.lane[found.start];
+    let (index, _) = set.ahead_in_lane(found.start, found.target.s_m[j]).next().ok_or(nobody)?;
+    let lead = &set.scene.recording.tracks[index];
+    let stays = (found.start..=found.end)
+        .all(|k| found.sample_of(lead, k).is_some_and(|l| set.in_lane(lane, lead.d_m[l]) && set.in_range(k, lead, l)));
+    if stays { Ok(lead) } else { Err("vehicle ahead does not stay in the lane and in range") }
+}
+
+/// The filter of the paper, at t = 0.
+fn verdict(scenario: &Scenario, options: &CutOutOptions) -> (bool, String) {
+    let slower = scenario.lead.as_ref().is_some_and(|lead| lead.v[0] < scenario.ego.v0 - TOLERANCE);
+    match (slower, options.require_slower_lead) {
+        (true, _) => (true, "lead slower than ego".to_owned()),
+        (false, false) => (true, "lead stays ahead".to_owned()),
+        (false, true) => (false, "lead not slower than ego".to_owned()),
+    }
+}

@@ -1,0 +1,127 @@
+//! The run over a recording: every vehicle once as ego, every category, every target that leads it.
+
+use super::data_set::{DataSet, Scene, Stretch};
+use super::options::{MiningOptions, TOLERANCE, samples};
+use super::search::{self, Item, Match};
+use super::tags::Tags;
+use super::{cut_in, cut_out, lvd};
+use crate::scenario::{Category, Scenario};
+use crate::traffic::trajectory::Recording;
+
+/// What a recording held.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mined {
+    /// Every scenario found, kept or not, ascending by (ego, category, first frame, target).
+    pub scenarios: Vec<Scenario>,
+    /// Number of ego-centric data sets: vehicles that travel at least the end cut.
+    pub data_sets: u64,
+}
+
+/// How many of a category were found, and how many of them passed the filters.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CategoryCount {
+    /// All.
+    pub found: u64,
+    /// Those that the paper's filters keep.
+    pub kept: u64,
+}
+
+impl Mined {
+    /// Found and kept scenarios of a category.
+    pub fn count(&self, category: Category) -> CategoryCount {
+        let of = self.scenarios.iter().filter(|s| s.category == category);
+        of.fold(CategoryCount::default(), |sum, s| CategoryCount {
+            found: sum.found + 1,
+            kept: sum.kept + u64::from(s.kept),
+        })
+    }
+}
+
+/// Finds every cut-in, cut-out and leader deceleration of a recording (method.md §2 and §3). The result
+/// depends on the recording and the options only.
+pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
+    let scene = Scene::new(recording, options);
+    let mut mined = Mined::default();
+    for ego_index in 0..recording.tracks.len() {
+        let Some(set) = DataSet::new(&scene, ego_index) else { continue };
+        mined.data_sets += 1;
+        for target_index in set.leaders() {
+            mine_pair(&set, target_index, &mut mined.scenarios);
+        }
+    }
+    mined.scenarios.sort_by_key(|s| (s.ego_id, s.category, s.frame0, s.target_id));
+    mined
+}
+
+/// All scenarios of one ego with one target. In every category the target leads at some time, so others
+/// need not be looked at.
+fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) {
+    let activities = &set.scene.activities[target_index];
+    if !activities.decelerates() && !activities.changes_lane() {
+        return;
+    }
+    let options = set.scene.options;
+    let rate = set.scene.recording.frame_rate_hz;
+    let stretches = set.stretches(target_index);
+    if activities.changes_lane() {
+        let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - TOLERANCE;
+        let discarded = shorter(options.cut_in.min_duration_s);
+        each_match(&stretches, &cut_in::ITEMS, samples(options.cut_in.pause_s, rate), discarded, |stretch, m| {
+            scenarios.extend(cut_in::scenario(set, target_index, m, stretch.first, &stretch.tags));
+        });
+        let discarded = shorter(options.cut_out.min_duration_s);
+        each_match(&stretches, &cut_out::ITEMS, samples(options.cut_out.pause_s, rate), discarded, |stretch, m| {
+            scenarios.extend(cut_out::scenario(set, target_index, m, stretch.first, &stretch.tags));
+        });
+    }
+    if activities.decelerates() {
+        let discarded = |m: &Match| m.last_item().len() as f64 / rate <= options.lvd.max_discarded_s + TOLERANCE;
+        each_match(&stretches, &lvd::ITEMS, 0, discarded, |stretch, m| {
+            scenarios.extend(lvd::scenario(set, target_index, m, stretch.first));
+        });
+    }
+}
+
+/// Calls `take` for every match that is not discarded; the search goes on `pause` samples after its end.
+/// A discarded match is none: the search goes on at its end.
+fn each_match(
+    stretches: &[Stretch],
+    items: &[Item<Tags>],
+    pause: usize,
+    discarded: impl Fn(&Match) -> bool,
+    mut take: impl FnMut(&Stretch, &Match),
+) {
+    let mut from: usize = 0; // the ego's sample
+    for stretch in stretches {
+        while let Some(matched) = search::find(&stretch.tags, items, from.saturating_sub(stretch.first)) {
+            from = stretch.first + matched.last_item().end;
+            if !discarded(&matched) {
+                from = from.max(stretch.first + matched.end + pause);
+                take(stretch, &matched);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn starts(word: &str, first: usize, pause: usize, shortest: usize) -> Vec<usize> {
+        let tags = word.chars().map(|c| Tags::default().with(Tags::LEADER, c == 'l')).collect();
+        let mut starts = Vec::new();
+        let items: [Item<Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER)];
+        each_match(&[Stretch { first, tags }], &items, pause, |m| m.len() < shortest, |_, m| starts.push(m.start()));
+        starts
+    }
+
+    #[test]
+    fn the_search_pauses_after_a_match_but_not_after_a_discarded_one() {
+        assert_eq!(starts("..ll.ll..ll", 100, 0, 1), [2, 5, 9]);
+        // Ends at 4; goes on at 8 with what begins there or later.
+        assert_eq!(starts("..ll.ll..ll", 100, 4, 1), [2, 9]);
+        // Runs on when the pause is over: begins there.
+        assert_eq!(starts("..ll.lllll.", 100, 4, 1), [2, 8]);
+        assert_eq!(starts("..l.lll", 100, 4, 2), [4]);
+    }
+}

@@ -1,0 +1,300 @@
+//! Every threshold of the mining and every filter of the paper, by name, with its published value as
+//! default (method.md §2 and §3). Serialized into `run.json` and read from a study's TOML.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::support::error::{Error, Place, Result};
+use crate::traffic::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
+
+/// All options of [`mine`](super::mine).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MiningOptions {
+    /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
+    pub ego_view: EgoViewOptions,
+    /// A vehicle ahead in the ego's lane is its leader up to this time headway, s. Default 2.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub leader_max_thw_s: f64,
+    /// Detection of acceleration, deceleration and cruising.
+    pub longitudinal: LongitudinalOptions,
+    /// Detection of lane changes.
+    pub lateral: LateralOptions,
+    /// The cut-in and its filters.
+    pub cut_in: CutInOptions,
+    /// The cut-out and its filters.
+    pub cut_out: CutOutOptions,
+    /// The leader deceleration and its filter.
+    pub lvd: LvdOptions,
+}
+
+/// Longitudinal activities (method.md §3, table).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LongitudinalOptions {
+    /// Window over which a speed change is seen, s. Default 1 (k_h).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub window_s: f64,
+    /// Mean acceleration over the window below which a vehicle cruises, m/s². Default 0.1 (a_cruise).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub cruise_acceleration_mps2: f64,
+    /// An activity changes the speed by more than this, m/s. Default 1 (Δv).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_speed_change_mps: f64,
+    /// Cruising shorter than this between two activities is removed, s. Default 4 (N_cruise).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_cruise_s: f64,
+}
+
+/// Lane changes (method.md §3, table).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LateralOptions {
+    /// Window over which lateral motion is seen, s. Default 1 (k_h).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub window_s: f64,
+    /// Mean lateral speed over the window below which a vehicle is calm, m/s. Default 0.25 (v_lat).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub calm_speed_mps: f64,
+    /// Beyond this share of the lane width from the line, the change has certainly ended or not yet
+    /// begun. Default 0.5 (α_max).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub far_share: f64,
+    /// Beyond this share of the lane width from the line, calm means that the change has ended or not
+    /// yet begun. Default 0.1 (α_min).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub near_share: f64,
+    /// How far from the crossing a start and an end are looked for, s. Default 10.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+    pub search_s: f64,
+    /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
+    pub lc_end: LaneChangeEnd,
+}
+
+/// Where the window lies that finds a vehicle calm at the end of a lane change. It drives T.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LaneChangeEnd {
+    /// The window begins at the sample: the published formula; ends the change up to 1 s early.
+    Published,
+    /// The window ends at the sample: closest to the true end of the motion.
+    #[default]
+    Observed,
+}
+
+/// The cut-in: what counts as found, and the filters of the paper.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CutInOptions {
+    /// Shorter ones are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_duration_s: f64,
+    /// The search goes on this long after a cut-in of the same ego and target, s. Default 5.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub pause_s: f64,
+    /// Kept only if the target's initial speed is below this share of the ego's. Default 0.95 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub max_speed_share: f64,
+    /// Kept only if the initial THW is below this, s. Default 2 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub max_thw_s: f64,
+}
+
+/// The cut-out: what counts as found, and the filters of the paper.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CutOutOptions {
+    /// Shorter ones are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_duration_s: f64,
+    /// The search goes on this long after a cut-out of the same ego and target, s. Default 5.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub pause_s: f64,
+    /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true
+    /// (paper). A cut-out without a vehicle ahead is never kept: there is nothing to uncover.
+    pub require_slower_lead: bool,
+}
+
+/// The leader deceleration: what counts as found, and the filter of the paper.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LvdOptions {
+    /// Intervals of the tags up to this long are discarded, s. Default 0.1.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub max_discarded_s: f64,
+    /// Dropped if shorter than this after trimming to the speed's maximum and minimum, s. Default 0.5.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_duration_s: f64,
+    /// Kept only if the peak deceleration is above this, m/s². Default 2 (paper).
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_peak_deceleration_mps2: f64,
+}
+
+impl Default for MiningOptions {
+    fn default() -> Self {
+        MiningOptions {
+            ego_view: EgoViewOptions::default(),
+            leader_max_thw_s: 2.0,
+            longitudinal: LongitudinalOptions::default(),
+            lateral: LateralOptions::default(),
+            cut_in: CutInOptions::default(),
+            cut_out: CutOutOptions::default(),
+            lvd: LvdOptions::default(),
+        }
+    }
+}
+
+impl Default for LongitudinalOptions {
+    fn default() -> Self {
+        LongitudinalOptions {
+            window_s: 1.0,
+            cruise_acceleration_mps2: 0.1,
+            min_speed_change_mps: 1.0,
+            min_cruise_s: 4.0,
+        }
+    }
+}
+
+impl Default for LateralOptions {
+    fn default() -> Self {
+        LateralOptions {
+            window_s: 1.0,
+            calm_speed_mps: 0.25,
+            far_share: 0.5,
+            near_share: 0.1,
+            search_s: 10.0,
+            lc_end: LaneChangeEnd::Observed,
+        }
+    }
+}
+
+impl Default for CutInOptions {
+    fn default() -> Self {
+        CutInOptions { min_duration_s: 0.1, pause_s: 5.0, max_speed_share: 0.95, max_thw_s: 2.0 }
+    }
+}
+
+impl Default for CutOutOptions {
+    fn default() -> Self {
+        CutOutOptions { min_duration_s: 0.1, pause_s: 5.0, require_slower_lead: true }
+    }
+}
+
+impl Default for LvdOptions {
+    fn default() -> Self {
+        LvdOptions { max_discarded_s: 0.1, min_duration_s: 0.5, min_peak_deceleration_mps2: 2.0 }
+    }
+}
+
+impl MiningOptions {
+    /// Refuses values with which the definitions lose their meaning.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a length of time or way
+    /// is needed.
+    pub fn validate(&self) -> Result<()> {
+        let positive = [
+            ("ego_view.range_m", self.ego_view.range_m),
+            ("leader_max_thw_s", self.leader_max_thw_s),
+            ("longitudinal.window_s", self.longitudinal.window_s),
+            ("longitudinal.cruise_acceleration_mps2", self.longitudinal.cruise_acceleration_mps2),
+            ("lateral.window_s", self.lateral.window_s),
+            ("lateral.calm_speed_mps", self.lateral.calm_speed_mps),
+            ("lateral.search_s", self.lateral.search_s),
+        ];
+        let at_least_zero = [
+            ("ego_view.cut_m", self.ego_view.cut_m),
+            ("longitudinal.min_speed_change_mps", self.longitudinal.min_speed_change_mps),
+            ("longitudinal.min_cruise_s", self.longitudinal.min_cruise_s),
+            ("lateral.far_share", self.lateral.far_share),
+            ("lateral.near_share", self.lateral.near_share),
+            ("cut_in.min_duration_s", self.cut_in.min_duration_s),
+            ("cut_in.pause_s", self.cut_in.pause_s),
+            ("cut_in.max_speed_share", self.cut_in.max_speed_share),
+            ("cut_in.max_thw_s", self.cut_in.max_thw_s),
+            ("cut_out.min_duration_s", self.cut_out.min_duration_s),
+            ("cut_out.pause_s", self.cut_out.pause_s),
+            ("lvd.max_discarded_s", self.lvd.max_discarded_s),
+            ("lvd.min_duration_s", self.lvd.min_duration_s),
+            ("lvd.min_peak_deceleration_mps2", self.lvd.min_peak_deceleration_mps2),
+        ];
+        let refused = |name: &str, value: f64, expected: &str| {
+            Error::usage(
+                Place::item(format!("mining option `{name}`")),
+                format!("is {value}, but must be {expected}"),
+                "leave the option out to use the paper's value",
+            )
+        };
+        for (name, value) in positive {
+            if !(value > 0.0 && value <= LARGEST) {
+                return Err(refused(name, value, "above 0 and at most 1e6"));
+            }
+        }
+        for (name, value) in at_least_zero {
+            if !(0.0..=LARGEST).contains(&value) {
+                return Err(refused(name, value, "at least 0 and at most 1e6"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Beyond this no time, way or speed tells anything about traffic, and its count in samples gets out of range.
+const LARGEST: f64 = 1e6;
+
+/// Positions in metres, filter values in their unit and times in seconds this near to a limit count as
+/// equal to it (method.md §3).
+pub(super) const TOLERANCE: f64 = LIMIT_TOLERANCE_M;
+
+/// A time in samples, to the nearest whole one: thresholds in seconds hold at any frame rate.
+pub(super) fn samples(time_s: f64, frame_rate_hz: f64) -> usize {
+    (time_s * frame_rate_hz).round() as usize
+}
+
+/// A window in samples: as [`samples`], at least one.
+pub(super) fn window_samples(window_s: f64, frame_rate_hz: f64) -> usize {
+    samples(window_s, frame_rate_hz).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_survive_toml() {
+        let options = MiningOptions::default();
+        options.validate().unwrap();
+        let text = toml::to_string(&options).unwrap();
+        assert_eq!(toml::from_str::<MiningOptions>(&text).unwrap(), options);
+        assert_eq!(toml::from_str::<MiningOptions>("").unwrap(), options);
+    }
+
+    #[test]
+    fn one_option_can_be_changed_alone() {
+        let options: MiningOptions = toml::from_str("[lateral]\nlc_end = \"published\"").unwrap();
+        assert_eq!(options.lateral.lc_end, LaneChangeEnd::Published);
+        assert_eq!(options.lateral.search_s, 10.0);
+    }
+
+    #[test]
+    fn a_misspelt_option_is_refused() {
+        assert!(toml::from_str::<MiningOptions>("range = 50.0").is_err());
+        assert!(toml::from_str::<MiningOptions>("[cut_in]\nmax_thw = 1.0").is_err());
+    }
+
+    #[test]
+    fn a_window_of_no_length_is_refused_by_name() {
+        let mut options = MiningOptions::default();
+        options.lateral.window_s = 0.0;
+        assert!(options.validate().unwrap_err().to_string().contains("lateral.window_s"));
+        let options = MiningOptions { leader_max_thw_s: f64::NAN, ..MiningOptions::default() };
+        assert!(options.validate().unwrap_err().to_string().contains("leader_max_thw_s"));
+    }
+
+    #[test]
+    fn windows_are_whole_samples_at_any_rate() {
+        assert_eq!(window_samples(1.0, 25.0), 25);
+        assert_eq!(window_samples(1.0, 29.97), 30);
+        assert_eq!(window_samples(1.0, 0.2), 1);
+    }
+}

@@ -1,0 +1,125 @@
+//! The upstream end of the road: who arrives in which lane, and when.
+
+use super::options::GeneratorOptions;
+use super::random::Stream;
+use super::vehicle::Vehicle;
+use crate::traffic::trajectory::VehicleClass;
+
+/// Share of arrivals that follow the vehicle before at their own headway; the others arrive freely.
+const FOLLOWERS: f64 = 0.5;
+/// Only who wants to go at most this much faster than the vehicle ahead arrives as its follower, m/s.
+const FOLLOWS_WITHIN_MPS: f64 = 4.0;
+/// Mean number of lanes per direction in the default mix of roads: the published flow belongs to it, and
+/// wider or narrower roads carry more or less.
+const MEAN_LANES: f64 = 8.0 / 3.0;
+/// Some arrivals wait for room; demand is raised by this so that the flow comes out as asked.
+const QUEUED: f64 = 1.035;
+
+/// What arrives in one lane.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LaneDemand {
+    /// Mean time between vehicles, s.
+    mean_headway_s: f64,
+    truck_share: f64,
+    /// Desired speed usual for cars in this lane, m/s.
+    car_speed_mps: f64,
+}
+
+/// The demand of every lane of a carriageway, leftmost first. `flow_level`, `truck_level` and
+/// `speed_level` (about 1) tell one recording from another.
+pub(super) fn demand(
+    options: &GeneratorOptions,
+    lanes: usize,
+    flow_level: f64,
+    truck_level: f64,
+    speed_level: f64,
+) -> Vec<LaneDemand> {
+    // Shares of the flow and of the trucks, and desired car speeds (above the published peak of 33 m/s,
+    // since most drive behind others), from the leftmost lane.
+    let (flow, trucks, speeds): (&[f64], &[f64], &[f64]) = match lanes {
+        2 => (&[0.57, 0.43], &[0.02, 0.98], &[40.0, 34.0]),
+        _ => (&[0.37, 0.38, 0.25], &[0.0, 0.06, 0.94], &[41.0, 38.0, 34.0]),
+    };
+    let total_vehph = QUEUED * options.flow_vehph * flow_level * lanes as f64 / MEAN_LANES;
+    let truck_share = (options.truck_share * truck_level).min(0.6);
+    (0..lanes)
+        .map(|lane| {
+            let lane_vehph = total_vehph * flow[lane];
+            LaneDemand {
+                mean_headway_s: 3600.0 / lane_vehph,
+                truck_share: (truck_share * trucks[lane] / flow[lane]).min(0.95),
+                car_speed_mps: speeds[lane] * speed_level,
+            }
+        })
+        .collect()
+}
+
+/// The queue before one lane: the next vehicle and when it is due.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Inflow {
+    demand: LaneDemand,
+    lane: usize,
+    centre_m: f64,
+    lane_width_m: f64,
+    due_s: f64,
+    next: Vehicle,
+}
+
+impl Inflow {
+    /// An empty lane's first vehicle.
+    pub fn new(demand: LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Inflow {
+        let next = draw(&demand, lane, centre_m, lane_width_m, stream);
+        let due_s = stream.between(0.0, 2.0 * demand.mean_headway_s);
+        Inflow { demand, lane, centre_m, lane_width_m, due_s, next }
+    }
+
+    /// The next vehicle, if it is due and finds room behind the last one of its lane
+    /// (`last`: rear bumper and speed), at `entrance_m`.
+    pub fn arrive(
+        &mut self,
+        now_s: f64,
+        entrance_m: f64,
+        last: Option<(f64, f64)>,
+        stream: &mut Stream,
+    ) -> Option<Vehicle> {
+        if now_s < self.due_s {
+            return None;
+        }
+        let driver = self.next.driver;
+        let mut speed_mps = driver.desired_speed_mps;
+        if let Some((rear_m, last_mps)) = last {
+            let gap_m = rear_m - entrance_m - 0.5 * self.next.length_m;
+            let spare_m = gap_m - driver.standstill_gap_m - 0.8 * driver.time_headway_s * last_mps;
+            if spare_m < 0.0 {
+                return None;
+            }
+            // Faster than the one ahead only as far as the room allows a gentle approach.
+            speed_mps = speed_mps.min(last_mps + (0.6 * spare_m).sqrt());
+        }
+        let mut vehicle =
+            std::mem::replace(&mut self.next, draw(&self.demand, self.lane, self.centre_m, self.lane_width_m, stream));
+        vehicle.s_m = entrance_m;
+        vehicle.speed_mps = speed_mps;
+        self.due_s = self.due_s.max(now_s - 5.0) + self.headway_s(speed_mps, stream);
+        Some(vehicle)
+    }
+
+    /// Time from one arrival to the next: following, or following plus a free share that restores the mean.
+    fn headway_s(&self, speed_mps: f64, stream: &mut Stream) -> f64 {
+        let own_s = |driver_s: f64, length_m: f64| driver_s + (length_m + 3.4) / speed_mps.max(10.0);
+        let following_s = own_s(self.next.driver.time_headway_s, self.next.length_m);
+        let share = self.demand.truck_share;
+        let mean_following_s = (1.0 - share) * own_s(1.5, 4.6) + share * own_s(1.85, 12.0);
+        let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - FOLLOWERS);
+        // Who wants to go much faster than the one ahead is no follower: he has left the lane long ago.
+        let follows = self.next.driver.desired_speed_mps < speed_mps + FOLLOWS_WITHIN_MPS && stream.chance(FOLLOWERS);
+        if free_s <= 0.0 || follows { following_s } else { following_s + stream.exponential(free_s) }
+    }
+}
+
+fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Vehicle {
+    let class = if stream.chance(demand.truck_share) { VehicleClass::Truck } else { VehicleClass::Car };
+    let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, stream);
+    vehicle.place(lane, centre_m, lane_width_m, stream);
+    vehicle
+}

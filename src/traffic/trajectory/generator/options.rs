@@ -1,0 +1,124 @@
+//! What a user may choose about the synthetic recordings, and the defaults of the embedded ones.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::support::error::{Error, Place, Result};
+
+/// Options of the generator. The default is the data `lanesweep study` runs on when it is given none.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GeneratorOptions {
+    /// Seed of every random number. Same seed and options, same bits.
+    pub seed: u64,
+    /// Number of recordings, 1 to 99 (they are called `01`, `02`, …).
+    #[schemars(range(min = 1, max = 99))]
+    pub recordings: usize,
+    /// Length of each recording, s.
+    #[schemars(range(min = 1.0, max = 7200.0))]
+    pub duration_s: f64,
+    /// Samples per second; the simulation's own step is the largest fraction of a sample ≤ 0.04 s.
+    #[schemars(range(min = 1.0, max = 200.0))]
+    pub frame_rate_hz: f64,
+    /// Length of road that the camera sees, m.
+    #[schemars(range(min = 50.0, max = 5000.0))]
+    pub window_m: f64,
+    /// Mean flow per direction of travel, vehicles per hour, for roads with the default mix of two and
+    /// three lanes (published: 3,350).
+    #[schemars(range(min = 60.0, max = 4500.0))]
+    pub flow_vehph: f64,
+    /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub truck_share: f64,
+    /// How much more often than on a real motorway lane changes are made and leaders brake hard, within
+    /// the camera's view; 1 is the published rate. Raised so that a few minutes hold enough scenarios;
+    /// how an event looks, once it happens, does not depend on it.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub event_rate_factor: f64,
+}
+
+impl Default for GeneratorOptions {
+    fn default() -> Self {
+        GeneratorOptions {
+            seed: 20_240_901,
+            recordings: 12,
+            duration_s: 245.0,
+            frame_rate_hz: 25.0,
+            window_m: 420.0,
+            flow_vehph: 3350.0,
+            truck_share: 0.2,
+            event_rate_factor: 8.0,
+        }
+    }
+}
+
+impl GeneratorOptions {
+    /// Checks every option; the error names the first one outside its range.
+    pub fn validate(&self) -> Result<()> {
+        let ranges = [
+            ("recordings", self.recordings as f64, 1.0, 99.0),
+            ("duration_s", self.duration_s, 1.0, 7200.0),
+            ("frame_rate_hz", self.frame_rate_hz, 1.0, 200.0),
+            ("window_m", self.window_m, 50.0, 5000.0),
+            ("flow_vehph", self.flow_vehph, 60.0, 4500.0),
+            ("truck_share", self.truck_share, 0.0, 0.5),
+            ("event_rate_factor", self.event_rate_factor, 0.0, 20.0),
+        ];
+        for (name, value, low, high) in ranges {
+            // Written so that NaN fails too.
+            if !(value >= low && value <= high) {
+                return Err(Error::usage(
+                    Place::item(format!("generator option `{name}`")),
+                    format!("{value} is outside {low} to {high}"),
+                    format!("choose a value from {low} to {high}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// One line that every output made from these recordings should carry.
+    pub fn describe(&self) -> String {
+        format!(
+            "SYNTHETIC recordings: {} of {} s at {} Hz, seed {}, lane changes and hard brakings {} times as frequent \
+             as published for highD; not a measurement of real traffic",
+            self.recordings, self.duration_s, self.frame_rate_hz, self.seed, self.event_rate_factor
+        )
+    }
+
+    /// Simulation steps per sample: the fewest that keep a step at 0.04 s or below.
+    pub(super) fn steps_per_sample(&self) -> usize {
+        // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
+        ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)
+    }
+
+    /// Samples per recording.
+    pub(super) fn samples(&self) -> usize {
+        (self.duration_s * self.frame_rate_hz).round() as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_valid_and_a_bad_option_is_named() {
+        GeneratorOptions::default().validate().unwrap();
+        let error = GeneratorOptions { duration_s: f64::NAN, ..GeneratorOptions::default() }.validate().unwrap_err();
+        assert!(error.to_string().contains("duration_s"), "{error}");
+        let error = GeneratorOptions { recordings: 0, ..GeneratorOptions::default() }.validate().unwrap_err();
+        assert!(error.to_string().contains("recordings"), "{error}");
+    }
+
+    #[test]
+    fn a_sample_is_split_until_the_step_is_short_enough() {
+        let steps =
+            |frame_rate_hz| GeneratorOptions { frame_rate_hz, ..GeneratorOptions::default() }.steps_per_sample();
+        assert_eq!(steps(25.0), 1);
+        assert_eq!(steps(10.0), 3);
+        assert_eq!(steps(50.0), 1);
+        assert_eq!(steps(30.0), 1);
+        assert_eq!(steps(1.0), 25);
+    }
+}

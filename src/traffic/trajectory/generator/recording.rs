@@ -1,0 +1,98 @@
+//! From the simulated carriageways to one recording: road, numbering, and the decimals of a highD file,
+//! so that a recording read back from its own files is the same to the last bit.
+
+use super::inflow::demand;
+use super::options::GeneratorOptions;
+use super::random::{Purpose, Stream};
+use super::traffic::{Setting, Traffic};
+use super::vehicle::Vehicle;
+use crate::support::error::Result;
+use crate::traffic::trajectory::highd::{self, Precision};
+use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
+
+/// Upper edge of the image to the first line, and between the carriageways, m.
+const VERGE_M: f64 = 8.0;
+const MEDIAN_M: f64 = 4.5;
+
+/// One recording. `index` counts from 0. An error means that a highD file could not hold it.
+pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recording> {
+    let mut site = Stream::new(options.seed, index, 0, Purpose::Site);
+    // Two of three recordings have three lanes per direction.
+    let lanes = if index % 3 == 2 { 2 } else { 3 };
+    let lane_width_m = [3.5, 3.75, 3.6][(site.uniform() * 3.0) as usize % 3];
+    let road = [lanes, if index % 6 == 4 { 2 } else { lanes }];
+    let speed_level = site.normal_within(1.0, 0.03, 0.92, 1.08);
+    let truck_level = site.normal_within(1.0, 0.15, 0.6, 1.4);
+    let steps_per_sample = options.steps_per_sample();
+    let setting = Setting {
+        lane_width_m,
+        window_m: options.window_m,
+        step_s: 1.0 / (options.frame_rate_hz * steps_per_sample as f64),
+        steps_per_sample,
+        event_rate_factor: options.event_rate_factor,
+    };
+
+    let mut seen: Vec<(usize, Vehicle)> = Vec::new();
+    for (carriageway, &lanes) in road.iter().enumerate() {
+        let flow_level = site.normal_within(1.0, 0.08, 0.8, 1.12);
+        let demand = demand(options, lanes, flow_level, truck_level, speed_level);
+        let traffic = Traffic::new(setting.clone(), demand, (options.seed, index, carriageway));
+        seen.extend(traffic.run(options.samples()).into_iter().map(|vehicle| (carriageway, vehicle)));
+    }
+    // Numbers ascend by first appearance; the sort is stable, so ties keep carriageway and arrival.
+    seen.sort_by_key(|(_, vehicle)| vehicle.samples.first);
+
+    let carriageways = carriageways(road, lane_width_m);
+    let tracks = seen
+        .into_iter()
+        .enumerate()
+        .map(|(k, (carriageway, vehicle))| track(k as u32 + 1, carriageway, &carriageways, options.window_m, vehicle))
+        .collect();
+    let id = format!("{:02}", index + 1);
+    let mut recording = Recording { id, frame_rate_hz: options.frame_rate_hz, carriageways, tracks, synthetic: true };
+    highd::quantize(&mut recording, Precision::Hundredths)?;
+    label_lanes(&mut recording);
+    Ok(recording)
+}
+
+/// Lanes by the centre as it is written: rounding may have moved it over a line.
+fn label_lanes(recording: &mut Recording) {
+    for track in &mut recording.tracks {
+        let road = &recording.carriageways[track.carriageway];
+        let lane = |d: &f64| road.lane_at(*d).map_or(NO_LANE, |lane| lane as u16);
+        track.lane = track.d_m.iter().map(lane).collect();
+    }
+}
+
+/// Lines as the internal model has them for a highD image with `y` down: the upper carriageway (`1`,
+/// towards −x) has d = y, the lower one (`2`) d = −y.
+fn carriageways(lanes: [usize; 2], lane_width_m: f64) -> Vec<Carriageway> {
+    let upper_end_m = VERGE_M + lanes[0] as f64 * lane_width_m;
+    let lines = |first_m: f64, lanes: usize| (0..=lanes).map(|k| first_m - k as f64 * lane_width_m).collect();
+    vec![
+        Carriageway { name: "1".to_owned(), lane_lines_m: lines(upper_end_m, lanes[0]) },
+        Carriageway { name: "2".to_owned(), lane_lines_m: lines(-(upper_end_m + MEDIAN_M), lanes[1]) },
+    ]
+}
+
+fn track(id: u32, carriageway: usize, carriageways: &[Carriageway], window_m: f64, vehicle: Vehicle) -> Track {
+    // highD's x runs with carriageway 2 and against carriageway 1, whose s therefore ends at 0.
+    let start_m = if carriageway == 0 { -window_m } else { 0.0 };
+    let left_m = carriageways[carriageway].lane_lines_m[0];
+    let samples = vehicle.samples;
+    let n = samples.s_m.len();
+    Track {
+        id,
+        class: vehicle.class,
+        length_m: vehicle.length_m,
+        width_m: vehicle.width_m,
+        carriageway,
+        first_frame: samples.first as i64 + 1,
+        s_m: samples.s_m.iter().map(|s| start_m + s).collect(),
+        d_m: samples.d_m.iter().map(|d| left_m + d).collect(),
+        v_s_mps: samples.v_s_mps,
+        v_d_mps: samples.v_d_mps,
+        a_s_mps2: samples.a_s_mps2,
+        lane: vec![NO_LANE; n], // by `label_lanes`, from the rounded positions
+    }
+}

@@ -1,0 +1,168 @@
+//! One vehicle of the simulation: who drives it, what it is, where it is, and what was seen of it.
+
+use super::braking::Braking;
+use super::idm::DriverParameters;
+use super::lateral::{LaneChange, Wander};
+use super::random::Stream;
+use crate::traffic::trajectory::VehicleClass;
+
+/// Spread of where drivers keep within their lane, m.
+const LINE_SD_M: f64 = 0.18;
+
+/// What was seen of a vehicle by the camera, one value per sample.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Samples {
+    /// Number of the first sample, from 0.
+    pub first: usize,
+    /// Along the road from the start of the camera's view, m.
+    pub s_m: Vec<f64>,
+    /// Across the road, to the left of the leftmost line, m (negative on the road).
+    pub d_m: Vec<f64>,
+    /// Speed along the road, m/s.
+    pub v_s_mps: Vec<f64>,
+    /// Speed across the road, m/s, to the left.
+    pub v_d_mps: Vec<f64>,
+    /// Acceleration along the road, m/s².
+    pub a_s_mps2: Vec<f64>,
+}
+
+/// A vehicle with its driver.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Vehicle {
+    /// Car or truck.
+    pub class: VehicleClass,
+    /// m.
+    pub length_m: f64,
+    /// m.
+    pub width_m: f64,
+    /// The driver's car-following.
+    pub driver: DriverParameters,
+    /// Centre along the road, m; 0 where the camera's view begins.
+    pub s_m: f64,
+    /// m/s, ≥ 0.
+    pub speed_mps: f64,
+    /// m/s², as realised.
+    pub acceleration_mps2: f64,
+    /// m/s², as the driver wants it; the vehicle follows with a short lag.
+    pub command_mps2: f64,
+    /// Correlated noise in the command, m/s².
+    pub noise_mps2: f64,
+    /// Headway in force, s: the driver's own, or a shorter one tolerated after a cut-in.
+    pub headway_s: f64,
+    /// Leader of the last step.
+    pub leader: Option<usize>,
+    /// The leader's acceleration as perceived (smoothed), m/s².
+    pub perceived_mps2: f64,
+    /// Lane that holds the centre, 0 the leftmost.
+    pub lane: usize,
+    /// Lanes it occupies or has claimed, one bit each.
+    pub occupied: u8,
+    /// Line it keeps to, outside lane changes: lateral position of its centre, m.
+    pub line_m: f64,
+    /// Deviation from the line.
+    pub wander: Wander,
+    /// Lane change under way.
+    pub change: Option<LaneChange>,
+    /// Scheduled braking under way.
+    pub braking: Option<Braking>,
+    /// Time until it may think of another lane change, s.
+    pub settle_s: f64,
+    /// What the camera saw.
+    pub samples: Samples,
+}
+
+impl Vehicle {
+    /// Draws size and driver. `lane_speed_mps` is the desired speed usual for cars in this lane.
+    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut Stream) -> Vehicle {
+        let (length_m, width_m) = match class {
+            VehicleClass::Car => (stream.normal_within(4.6, 0.5, 3.4, 6.4), stream.normal_within(1.9, 0.09, 1.6, 2.2)),
+            // Articulated lorries, and everything from box vans up: the two peaks of 12 ± 4.7 m.
+            VehicleClass::Truck if stream.chance(0.42) => {
+                (stream.normal_within(16.3, 1.0, 13.5, 18.8), stream.normal_within(2.52, 0.05, 2.4, 2.6))
+            }
+            VehicleClass::Truck => {
+                (stream.normal_within(8.9, 2.0, 5.5, 13.0), stream.normal_within(2.42, 0.12, 2.1, 2.6))
+            }
+        };
+        let driver = match class {
+            VehicleClass::Car => DriverParameters {
+                desired_speed_mps: stream.normal_within(lane_speed_mps, 3.2, 24.0, 52.0),
+                time_headway_s: stream.lognormal_within(CAR_HEADWAY_S, HEADWAY_SIGMA, 0.45, 4.5),
+                standstill_gap_m: 3.4,
+                acceleration_mps2: stream.lognormal_within(0.55, 0.25, 0.3, 1.2),
+                comfortable_mps2: stream.lognormal_within(1.5, 0.2, 0.9, 2.5),
+            },
+            VehicleClass::Truck => DriverParameters {
+                desired_speed_mps: stream.normal_within(24.8, 0.9, 22.0, 28.0),
+                time_headway_s: stream.lognormal_within(TRUCK_HEADWAY_S, HEADWAY_SIGMA, 0.8, 4.5),
+                standstill_gap_m: 3.4,
+                acceleration_mps2: stream.lognormal_within(0.45, 0.25, 0.2, 0.9),
+                comfortable_mps2: stream.lognormal_within(1.2, 0.2, 0.8, 2.0),
+            },
+        };
+        Vehicle {
+            class,
+            length_m,
+            width_m,
+            driver,
+            s_m: 0.0,
+            speed_mps: driver.desired_speed_mps,
+            acceleration_mps2: 0.0,
+            command_mps2: 0.0,
+            noise_mps2: 0.0,
+            headway_s: driver.time_headway_s,
+            leader: None,
+            perceived_mps2: 0.0,
+            lane: 0,
+            occupied: 1,
+            line_m: 0.0,
+            wander: Wander::default(),
+            change: None,
+            braking: None,
+            settle_s: 0.0,
+            samples: Samples::default(),
+        }
+    }
+
+    /// Puts it into a lane, on a line of its own choice.
+    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) {
+        self.lane = lane;
+        self.occupied = 1 << lane;
+        self.line_m = draw_line(centre_m, lane_width_m, self.width_m, stream);
+    }
+
+    /// Front bumper, m.
+    pub fn front_m(&self) -> f64 {
+        self.s_m + 0.5 * self.length_m
+    }
+
+    /// Rear bumper, m.
+    pub fn rear_m(&self) -> f64 {
+        self.s_m - 0.5 * self.length_m
+    }
+
+    /// Occupies or has claimed this lane.
+    pub fn is_in(&self, lane: usize) -> bool {
+        self.occupied & (1 << lane) != 0
+    }
+
+    /// Lateral position and speed of the centre, m and m/s.
+    pub fn lateral(&self) -> (f64, f64) {
+        let (line_m, rate_mps) = self.change.map_or((self.line_m, 0.0), |change| change.position_and_speed());
+        (line_m + self.wander.offset_m, rate_mps + self.wander.rate_mps)
+    }
+}
+
+/// Median of the car drivers' time headways, s: with the spread below the mean is the 1.5 s of the
+/// hierarchical IDM fit on highD.
+pub(super) const CAR_HEADWAY_S: f64 = 1.30;
+/// The same for trucks, s.
+pub(super) const TRUCK_HEADWAY_S: f64 = 1.7;
+/// Spread of the logarithm of the headways.
+pub(super) const HEADWAY_SIGMA: f64 = 0.5;
+
+/// The line a driver keeps to in a lane: near the middle, and with the whole body inside the lane.
+pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut Stream) -> f64 {
+    let room_m = (0.5 * (lane_width_m - width_m) - 0.3).max(0.05);
+    centre_m + stream.normal_within(0.0, LINE_SD_M, -room_m, room_m)
+}

@@ -1,0 +1,423 @@
+//! A comma-separated table with named columns: opens it, finds columns by name, hands out typed fields,
+//! and says file, line and column wherever something is wrong. Knows nothing about traffic.
+//!
+//! Tolerated silently because they change no value: Windows line ends, a byte order mark, blank lines,
+//! quotes, blanks around a field, columns in another order, columns that nobody asks for.
+
+use crate::support::hex::hex;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
+use sha2::{Digest, Sha256};
+
+use super::number;
+use crate::support::input_file;
+use crate::support::near_name::nearest;
+use crate::{Error, Place, Result};
+
+/// What identifies a file's content in a run's record.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct FileChecksum {
+    /// Name of the file without its folder.
+    pub file: String,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the whole file, lower-case hexadecimal.
+    pub sha256: String,
+}
+
+/// A column that the header has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Column {
+    index: usize,
+    name: &'static str,
+}
+
+/// An open table, positioned on one of its lines.
+pub(super) struct Table {
+    path: PathBuf,
+    reader: Reader<Hashing<File>>,
+    known: &'static [&'static str],
+    header: Vec<String>,
+    record: ByteRecord,
+    line: u64,
+    /// Line on which the last record ended.
+    last_line: u64,
+    rows: u64,
+}
+
+/// Read at once from the file: long enough that the disk, not the call, sets the pace.
+const READ_AHEAD_BYTES: usize = 1 << 18;
+
+/// A line of the format has a few hundred bytes. Where none ends within this, the file is another one, or a quotation
+/// mark is not closed.
+const LONGEST_LINE_BYTES: u64 = 1 << 20;
+
+impl Table {
+    /// Opens a file and reads its header. `known` are the names that the format gives its columns: a
+    /// column that bears one of them is never suggested as another one misspelt.
+    ///
+    /// # Errors
+    /// If it cannot be read, is empty, or has no comma-separated header in UTF-8.
+    pub fn open(path: &Path, known: &'static [&'static str]) -> Result<Self> {
+        let file = input_file::open(path)?;
+        let reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            // Not CRLF: with it the line count lags one behind in files with Windows line ends.
+            .terminator(Terminator::Any(b'\n'))
+            .buffer_capacity(READ_AHEAD_BYTES)
+            .from_reader(Hashing::new(file));
+        let mut table = Table {
+            path: path.to_path_buf(),
+            reader,
+            known,
+            header: Vec::new(),
+            record: ByteRecord::new(),
+            line: 0,
+            last_line: 0,
+            rows: 0,
+        };
+        if !table.read_line()? {
+            return Err(Error::input(
+                Place::file(path),
+                "the file is empty; expected a header line with column names",
+                "copy or export the file again",
+            ));
+        }
+        table.header = table.record.iter().map(header_name).collect();
+        table.check_header()?;
+        Ok(table)
+    }
+
+    /// Steps to the next line; false at the end of the file.
+    ///
+    /// # Errors
+    /// If the file cannot be read or the line has another number of fields than the header.
+    pub fn next_row(&mut self) -> Result<bool> {
+        if !self.read_line()? {
+            return Ok(false);
+        }
+        self.rows += 1;
+        if self.record.len() != self.header.len() {
+            return Err(self.wrong_field_count());
+        }
+        Ok(true)
+    }
+
+    /// Number of data lines so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// The column with this name.
+    ///
+    /// # Errors
+    /// If the header has none, or two; names the most similar column that is there.
+    pub fn column(&self, name: &'static str) -> Result<Column> {
+        self.optional_column(name)?.ok_or_else(|| {
+            let problem = format!("the column is missing{}", self.strange_names_for_message());
+            let help = match self.similar_name(name) {
+                Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
+                None => format!("add the column `{name}`, or export the file again in the highD format"),
+            };
+            Error::input(Place::file(&self.path).row(1).column(name), problem, help)
+        })
+    }
+
+    /// The column with this name, if the header has it.
+    ///
+    /// # Errors
+    /// If the header has it twice.
+    pub fn optional_column(&self, name: &'static str) -> Result<Option<Column>> {
+        let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
+        let first = found.next().map(|(index, _)| Column { index, name });
+        if found.next().is_some() {
+            return Err(Error::input(
+                Place::file(&self.path).row(1).column(name),
+                "the header names this column twice",
+                "remove or rename one of the two",
+            ));
+        }
+        Ok(first)
+    }
+
+    /// A header name that looks like a spelling of `name` (`lane_id` for `laneId`).
+    pub fn similar_name(&self, name: &str) -> Option<&str> {
+        nearest(name, self.strange_names(), 0.75)
+    }
+
+    /// The bytes of a field.
+    pub fn bytes(&self, column: Column) -> &[u8] {
+        // Every line has as many fields as the header, so the field is there.
+        let field = self.record.get(column.index).unwrap_or_default();
+        // Windows line ends leave this in the last field.
+        field.strip_suffix(b"\r").unwrap_or(field)
+    }
+
+    /// A field as text, without blanks around it.
+    ///
+    /// # Errors
+    /// If it is not UTF-8.
+    pub fn text(&self, column: Column) -> Result<&str> {
+        match std::str::from_utf8(self.bytes(column)) {
+            Ok(text) => Ok(text.trim()),
+            Err(_) => Err(self.bad(
+                column,
+                format!("{} is not UTF-8 text", self.shown(column)),
+                "save the file as UTF-8 or export it again",
+            )),
+        }
+    }
+
+    /// A field as a number between ±10¹²: finite, and what is computed from it stays finite.
+    ///
+    /// # Errors
+    /// If it is no number, infinite, NaN or beyond the bounds.
+    pub fn real(&self, column: Column) -> Result<f64> {
+        match number::real(self.bytes(column)) {
+            Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
+            Some(value) if value.is_finite() => {
+                Err(self.bad(column, format!("{} is out of range", self.shown(column)), "correct the value"))
+            }
+            Some(_) => Err(self.bad(
+                column,
+                format!("{} is not finite; expected a finite number", self.shown(column)),
+                "correct the value, or remove the vehicle from the recording",
+            )),
+            None => Err(self.not_a_number(column, "a number")),
+        }
+    }
+
+    /// A field as a finite number above zero.
+    ///
+    /// # Errors
+    /// If it is no such number.
+    pub fn positive(&self, column: Column) -> Result<f64> {
+        let value = self.real(column)?;
+        if value > 0.0 {
+            return Ok(value);
+        }
+        Err(self.bad(column, format!("{} is not above zero", self.shown(column)), "correct the value"))
+    }
+
+    /// A field as a whole number.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn integer(&self, column: Column) -> Result<i64> {
+        number::integer(self.bytes(column)).ok_or_else(|| self.not_a_number(column, "a whole number"))
+    }
+
+    /// The error for a field of the present line.
+    pub fn bad(&self, column: Column, problem: impl Into<String>, help: impl Into<String>) -> Error {
+        Error::input(self.field(column), problem, help)
+    }
+
+    /// A field of the present line.
+    pub fn field(&self, column: Column) -> Place {
+        self.place().column(column.name)
+    }
+
+    /// The present line.
+    pub fn place(&self) -> Place {
+        Place::file(&self.path).row(self.line)
+    }
+
+    /// The whole file.
+    pub fn file_place(&self) -> Place {
+        Place::file(&self.path)
+    }
+
+    /// A field as messages show it.
+    pub fn shown(&self, column: Column) -> String {
+        quoted(&String::from_utf8_lossy(self.bytes(column)))
+    }
+
+    /// Closes the file; the checksum is of what was read, which is all of it after the last row.
+    pub fn finish(self) -> FileChecksum {
+        let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let hashing = self.reader.into_inner();
+        FileChecksum { file, bytes: hashing.bytes, sha256: hex(&hashing.hash.finalize()) }
+    }
+
+    /// Steps to the next line that is not blank.
+    fn read_line(&mut self) -> Result<bool> {
+        loop {
+            let from = self.reader.position().byte();
+            self.reader.get_mut().line_from = from;
+            if !self.reader.read_byte_record(&mut self.record).map_err(|error| self.unreadable(error))? {
+                return Ok(false);
+            }
+            // The reader stands on the line after the record, unless no line end closed it.
+            let end_line = self.reader.position().line().saturating_sub(u64::from(!self.ends_open()));
+            let spans_lines = end_line > self.last_line + 1;
+            self.line = if spans_lines { end_line.saturating_sub(self.inner_line_ends()) } else { end_line };
+            self.last_line = end_line;
+            if self.record.len() != 1 || !self.record[0].trim_ascii().is_empty() {
+                return Ok(true);
+            }
+        }
+    }
+
+    fn unreadable(&self, error: csv::Error) -> Error {
+        match error.into_kind() {
+            csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
+                Place::file(&self.path).row(self.last_line + 1),
+                format!("no line ends here within {} MiB, nor a quotation mark", LONGEST_LINE_BYTES >> 20),
+                "remove a quotation mark that is not closed; or copy or export the file again",
+            ),
+            csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
+            // Bytes are not decoded and the number of fields is free: nothing else is left to go wrong.
+            other => Error::Internal(format!("{}: {other:?}", self.path.display())),
+        }
+    }
+
+    /// Whether the record just read ends with the file and not with a line end: only then had the end of
+    /// the file to be seen.
+    fn ends_open(&self) -> bool {
+        let hashing = self.reader.get_ref();
+        hashing.at_end && self.reader.position().byte() == hashing.bytes
+    }
+
+    /// Line ends inside the fields of the record, where quotes allow them.
+    fn inner_line_ends(&self) -> u64 {
+        self.record.as_slice().iter().filter(|&&byte| byte == b'\n').count() as u64
+    }
+
+    /// Header names that the format does not know.
+    fn strange_names(&self) -> impl Iterator<Item = &str> {
+        self.header.iter().map(String::as_str).filter(|name| !self.known.contains(name))
+    }
+
+    /// What of the header helps to find a misnamed column.
+    fn strange_names_for_message(&self) -> String {
+        let strange: Vec<&str> = self.strange_names().collect();
+        if strange.is_empty() {
+            return String::new();
+        }
+        format!("; the header has names that the format does not have: {}", list(&strange))
+    }
+
+    fn check_header(&self) -> Result<()> {
+        let place = || Place::file(&self.path).row(1);
+        if self.record.iter().any(|field| field.contains(&0)) {
+            return Err(Error::input(
+                place(),
+                "the header contains zero bytes; expected UTF-8 text with comma-separated column names",
+                "save the file as UTF-8 (it may be UTF-16) or export it again",
+            ));
+        }
+        if let [only] = self.header.as_slice()
+            && let Some(separator) = [';', '\t'].into_iter().find(|&separator| only.contains(separator))
+        {
+            return Err(Error::input(
+                place(),
+                format!("the fields are separated by {separator:?}; expected commas"),
+                "export the file with commas between the fields and points in the numbers",
+            ));
+        }
+        Ok(())
+    }
+
+    fn wrong_field_count(&mut self) -> Error {
+        let place = self.place();
+        let (found, expected) = (self.record.len(), self.header.len());
+        let problem = format!("the line has {found} fields; expected {expected}, as many as the header");
+        if self.inner_line_ends() > 0 {
+            return Error::input(
+                place,
+                format!("{problem}: a quotation mark is opened and not closed on this line"),
+                "remove the quotation mark; the format needs none",
+            );
+        }
+        if found > expected {
+            return Error::input(
+                place,
+                problem,
+                "remove the surplus fields (a comma inside a number counts as a separator)",
+            );
+        }
+        let last = self.ends_open() || matches!(self.reader.read_byte_record(&mut self.record), Ok(false));
+        if last {
+            Error::input(
+                place,
+                format!("{problem}. It is the last line: the file is truncated"),
+                "copy or export the file again",
+            )
+        } else {
+            Error::input(place, problem, "complete the line or remove it")
+        }
+    }
+
+    fn not_a_number(&self, column: Column, expected: &str) -> Error {
+        let field = self.bytes(column);
+        if field.trim_ascii().is_empty() {
+            return self.bad(column, format!("the field is empty; expected {expected}"), "fill in the value");
+        }
+        let help = if std::str::from_utf8(field).is_err() {
+            "save the file as UTF-8 or export it again"
+        } else {
+            "correct the value"
+        };
+        self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
+    }
+}
+
+/// A header field as a column name.
+fn header_name(field: &[u8]) -> String {
+    String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
+}
+
+/// Column names for a message, the first few of many, without control characters.
+fn list(names: &[&str]) -> String {
+    const SHOWN: usize = 10;
+    let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
+    if names.len() > SHOWN {
+        shown.push(format!("{} more", names.len() - SHOWN));
+    }
+    shown.join(", ")
+}
+
+/// Text of a user's file as messages show it: in quotes, without control characters, not too long.
+pub(super) fn quoted(text: &str) -> String {
+    const SHOWN: usize = 40;
+    let end = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
+    format!("`{}{end}`", text.chars().take(SHOWN).flat_map(char::escape_debug).collect::<String>())
+}
+
+/// Hashes and counts what passes through, so that no file is read twice.
+struct Hashing<R> {
+    inner: R,
+    hash: Sha256,
+    bytes: u64,
+    at_end: bool,
+    /// Where the line begins that is being read, bytes.
+    line_from: u64,
+    /// That line was given up.
+    is_endless: bool,
+}
+
+impl<R> Hashing<R> {
+    fn new(inner: R) -> Self {
+        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
+    }
+}
+
+impl<R: Read> Read for Hashing<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        // More is asked for where all that came belongs to the line: it would be held in memory as a whole.
+        if self.bytes - self.line_from.min(self.bytes) > LONGEST_LINE_BYTES {
+            self.is_endless = true;
+            return Err(io::Error::from(io::ErrorKind::InvalidData));
+        }
+        let count = self.inner.read(buffer)?;
+        let read = &buffer[..count];
+        self.hash.update(read);
+        self.bytes += count as u64;
+        self.at_end = count == 0;
+        Ok(count)
+    }
+}

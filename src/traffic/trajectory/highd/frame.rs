@@ -1,0 +1,164 @@
+//! The two frames and the two lane numberings, both ways: highD's image (corner of the box, y down,
+//! `laneId` ascending with y) and the internal one (centre, forward and left, lane 0 leftmost).
+//! Reader and writer share these few lines, so that neither can drift from the other. Spec section 1.
+
+use crate::traffic::trajectory::NO_LANE;
+
+/// Which half of the image a vehicle drives in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    /// `drivingDirection` 1: the upper lanes, towards −x.
+    Upper,
+    /// `drivingDirection` 2: the lower lanes, towards +x.
+    Lower,
+}
+
+impl Direction {
+    /// Both, in the order of their numbers.
+    pub const BOTH: [Direction; 2] = [Direction::Upper, Direction::Lower];
+
+    /// From `drivingDirection`.
+    pub fn from_number(number: i64) -> Option<Self> {
+        match number {
+            1 => Some(Direction::Upper),
+            2 => Some(Direction::Lower),
+            _ => None,
+        }
+    }
+
+    /// As `drivingDirection` and as the carriageway's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Direction::Upper => "1",
+            Direction::Lower => "2",
+        }
+    }
+
+    /// Column of `recordingMeta` that holds this half's lane lines.
+    pub fn markings_column(self) -> &'static str {
+        match self {
+            Direction::Upper => "upperLaneMarkings",
+            Direction::Lower => "lowerLaneMarkings",
+        }
+    }
+
+    /// +1 where forward is +x.
+    fn sign(self) -> f64 {
+        match self {
+            Direction::Upper => -1.0,
+            Direction::Lower => 1.0,
+        }
+    }
+
+    /// Forward component of a velocity or acceleration along x.
+    pub fn forward(self, along_x: f64) -> f64 {
+        self.sign() * along_x
+    }
+
+    /// Leftward component of a velocity or acceleration along y; also the lateral position of a lane line.
+    pub fn leftward(self, along_y: f64) -> f64 {
+        -self.sign() * along_y
+    }
+
+    /// Centre along the road from the left edge of the box, m.
+    pub fn s_of(self, x: f64, length_m: f64) -> f64 {
+        self.forward(x + length_m / 2.0)
+    }
+
+    /// Centre across the road from the upper edge of the box, m.
+    pub fn d_of(self, y: f64, width_m: f64) -> f64 {
+        self.leftward(y + width_m / 2.0)
+    }
+
+    /// Left edge of the box, m: the way back from [`Direction::s_of`] up to rounding.
+    pub fn x_of(self, s_m: f64, length_m: f64) -> f64 {
+        self.forward(s_m) - length_m / 2.0
+    }
+
+    /// Upper edge of the box, m: the way back from [`Direction::d_of`] up to rounding.
+    pub fn y_of(self, d_m: f64, width_m: f64) -> f64 {
+        self.leftward(d_m) - width_m / 2.0
+    }
+}
+
+/// Translates `laneId` (1 + number of lane lines above) for one recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct LaneNumbers {
+    /// Number of upper lane lines: n bound n − 1 lanes, with the ids 2..=n.
+    pub upper_lines: usize,
+    /// Number of lower lane lines; their lanes follow the median, with the ids upper + 2..=upper + lower.
+    pub lower_lines: usize,
+}
+
+impl LaneNumbers {
+    /// Lane of the carriageway, 0 leftmost; [`NO_LANE`] where the id is none of its lanes.
+    pub fn lane_of(self, direction: Direction, lane_id: i64) -> u16 {
+        let lane = match direction {
+            // Driving towards −x with y down, the left is the greater y.
+            Direction::Upper => (self.upper_lines as i64).saturating_sub(lane_id),
+            Direction::Lower => lane_id.saturating_sub(self.upper_lines as i64 + 2),
+        };
+        let lanes = self.lines(direction).saturating_sub(1) as i64;
+        if (0..lanes).contains(&lane) { lane as u16 } else { NO_LANE }
+    }
+
+    /// The id of a lane; `None` if the carriageway has no such lane.
+    pub fn id_of(self, direction: Direction, lane: u16) -> Option<i64> {
+        let lanes = self.lines(direction).saturating_sub(1);
+        (usize::from(lane) < lanes).then(|| match direction {
+            Direction::Upper => self.upper_lines as i64 - i64::from(lane),
+            Direction::Lower => self.upper_lines as i64 + 2 + i64::from(lane),
+        })
+    }
+
+    fn lines(self, direction: Direction) -> usize {
+        match direction {
+            Direction::Upper => self.upper_lines,
+            Direction::Lower => self.lower_lines,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lane_ids_count_the_lines_above_and_lane_0_is_the_leftmost_of_its_travel() {
+        // Three upper and four lower lanes: ids 2, 3, 4 | median 5 | 6, 7, 8, 9.
+        let numbers = LaneNumbers { upper_lines: 4, lower_lines: 5 };
+        let upper: Vec<_> = (1..=5).map(|id| numbers.lane_of(Direction::Upper, id)).collect();
+        assert_eq!(upper, [NO_LANE, 2, 1, 0, NO_LANE]);
+        let lower: Vec<_> = (5..=10).map(|id| numbers.lane_of(Direction::Lower, id)).collect();
+        assert_eq!(lower, [NO_LANE, 0, 1, 2, 3, NO_LANE]);
+        // A vehicle of the upper lanes is in no lane of its own while it is in a lower one.
+        assert_eq!(numbers.lane_of(Direction::Upper, 7), NO_LANE);
+    }
+
+    #[test]
+    fn lane_ids_go_both_ways() {
+        for (upper_lines, lower_lines) in [(4, 4), (2, 5), (0, 3), (3, 0)] {
+            let numbers = LaneNumbers { upper_lines, lower_lines };
+            for direction in Direction::BOTH {
+                for lane in 0..6 {
+                    if let Some(id) = numbers.id_of(direction, lane) {
+                        assert_eq!(numbers.lane_of(direction, id), lane);
+                    }
+                }
+                assert_eq!(numbers.id_of(direction, NO_LANE), None);
+            }
+        }
+    }
+
+    #[test]
+    fn forward_and_left_follow_the_direction_of_travel() {
+        // A 4 m car, box from x = 100, y = 10 (1.8 m wide): its centre is at (102, 10.9) of the image.
+        assert_eq!(Direction::Lower.s_of(100.0, 4.0), 102.0);
+        assert_eq!(Direction::Upper.s_of(100.0, 4.0), -102.0);
+        assert_eq!(Direction::Lower.d_of(10.0, 1.8), -10.9);
+        assert_eq!(Direction::Upper.d_of(10.0, 1.8), 10.9);
+        // Down the image is to the right of +x and to the left of −x.
+        assert_eq!(Direction::Lower.leftward(1.0), -1.0);
+        assert_eq!(Direction::Upper.leftward(1.0), 1.0);
+    }
+}

@@ -1,0 +1,159 @@
+//! Which recordings a folder holds: three files of the same prefix are one recording.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::input_file;
+use crate::{Error, Place, Result};
+
+/// The three files of one recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HighdFiles {
+    /// What stands before `_tracks.csv`, `01` for instance: the recording's name.
+    pub id: String,
+    /// `NN_tracks.csv`: one line per vehicle and frame.
+    pub tracks: PathBuf,
+    /// `NN_tracksMeta.csv`: one line per vehicle.
+    pub tracks_meta: PathBuf,
+    /// `NN_recordingMeta.csv`: one line.
+    pub recording_meta: PathBuf,
+}
+
+impl HighdFiles {
+    /// The names the three files of recording `id` have in `dir`.
+    pub fn named(dir: &Path, id: &str) -> Self {
+        let [tracks, tracks_meta, recording_meta] = SUFFIXES.map(|suffix| dir.join(format!("{id}{suffix}")));
+        HighdFiles { id: id.to_owned(), tracks, tracks_meta, recording_meta }
+    }
+}
+
+/// What a folder holds.
+#[derive(Debug)]
+pub struct Inventory {
+    /// Complete recordings, ascending by [`HighdFiles::id`].
+    pub recordings: Vec<HighdFiles>,
+    /// One error for each incomplete recording; the complete ones can be used all the same.
+    pub problems: Vec<Error>,
+}
+
+/// File names after the prefix, in the order of the fields of [`HighdFiles`].
+const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"];
+
+/// Finds the recordings of a folder (not of its subfolders).
+///
+/// # Errors
+/// If the folder cannot be listed, is none, or holds no complete recording.
+pub fn inventory(dir: &Path) -> Result<Inventory> {
+    let found = prefixes(dir)?;
+    let unfinished = crate::support::run_dir::unfinished(dir).unwrap_or_default();
+    if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
+        let problem = "`lanesweep synth` ended here before all of its recordings had their names: it is no data set";
+        let help = "give that command again, which completes the folder, or remove the folder";
+        return Err(Error::input(Place::file(dir), problem, help));
+    }
+    let mut inventory = Inventory { recordings: Vec::new(), problems: Vec::new() };
+    for (id, present) in found {
+        let missing: Vec<String> =
+            (0..3).filter(|&file| !present[file]).map(|file| format!("{id}{}", SUFFIXES[file])).collect();
+        if missing.is_empty() {
+            inventory.recordings.push(HighdFiles::named(dir, &id));
+        } else {
+            inventory.problems.push(Error::input(
+                Place::file(dir).of(format!("recording `{id}`")),
+                format!(
+                    "{} missing; a recording consists of {}",
+                    are(&missing),
+                    SUFFIXES.map(|s| format!("{id}{s}")).join(", ")
+                ),
+                "add what is missing, or remove the other files of this recording",
+            ));
+        }
+    }
+    if inventory.recordings.is_empty() {
+        return Err(nothing_complete(dir, inventory.problems));
+    }
+    Ok(inventory)
+}
+
+/// File that `lanesweep synth` leaves beside its recordings, for people, and for folders of versions that did not mark the
+/// recordings themselves.
+pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
+
+/// What the marker of a folder says of its recordings, in one line; `None` without a marker.
+pub fn made_up(dir: &Path) -> Option<String> {
+    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::LARGEST_SETTINGS_BYTES).ok()?;
+    text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
+}
+
+/// The folder that a recording's file is in.
+pub(super) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Every prefix that occurs, with which of the three files are there. The map sorts them.
+fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
+    let facts = fs::metadata(dir).map_err(|source| Error::io(dir, "read the folder", source))?;
+    if !facts.is_dir() {
+        return Err(Error::input(
+            Place::file(dir),
+            "this is a file; expected a folder with recordings",
+            "name the folder that holds the files NN_tracks.csv, NN_tracksMeta.csv, NN_recordingMeta.csv",
+        ));
+    }
+    let mut found: BTreeMap<String, [bool; 3]> = BTreeMap::new();
+    for entry in fs::read_dir(dir).map_err(|source| Error::io(dir, "read the folder", source))? {
+        let entry = entry.map_err(|source| Error::io(dir, "read the folder", source))?;
+        // A name that is no text cannot become part of a scenario's key; names with a leading point are
+        // what some systems leave beside the real files.
+        let Ok(name) = entry.file_name().into_string() else { continue };
+        // Not `Path::is_file`: it says no to everything in a folder that may be listed but not entered.
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        let leads_nowhere = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && !entry.path().exists();
+        if name.starts_with('.') || is_folder || leads_nowhere {
+            continue;
+        }
+        for (file, suffix) in SUFFIXES.iter().enumerate() {
+            if let Some(prefix) = name.strip_suffix(suffix)
+                && !prefix.is_empty()
+            {
+                found.entry(prefix.to_owned()).or_default()[file] = true;
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
+    match problems.len() {
+        0 => {
+            let help = match subfolder_with_recordings(dir) {
+                Some(inner) => format!("the folder {} has recordings: name that one", inner.display()),
+                None => "name a folder with highD-format recordings".to_owned(),
+            };
+            Error::input(
+                Place::file(dir),
+                "the folder has no recording; expected files NN_tracks.csv, NN_tracksMeta.csv, NN_recordingMeta.csv",
+                help,
+            )
+        }
+        1 => problems.remove(0),
+        count => Error::input(
+            Place::file(dir),
+            format!("none of the {count} recordings is complete. First: {}", problems[0]),
+            "every recording needs NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv",
+        ),
+    }
+}
+
+/// highD is handed out as an archive that unpacks into `data/`: naming the outer folder is a likely slip.
+fn subfolder_with_recordings(dir: &Path) -> Option<PathBuf> {
+    let mut folders: Vec<PathBuf> =
+        fs::read_dir(dir).ok()?.flatten().map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    folders.sort();
+    folders.into_iter().find(|folder| prefixes(folder).is_ok_and(|found| !found.is_empty()))
+}
+
+fn are(names: &[String]) -> String {
+    format!("{} {}", names.join(" and "), if names.len() == 1 { "is" } else { "are" })
+}

@@ -1,0 +1,283 @@
+//! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
+//! (size, class and direction of each vehicle).
+
+use super::columns::{Column, FileChecksum, Table, quoted};
+use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TRACKS_META_COLUMNS};
+use super::frame::{Direction, LaneNumbers};
+use super::inventory::HighdFiles;
+use super::number;
+use crate::support::plausibility::{Doubts, HELP, Quantity};
+use crate::traffic::trajectory::{Carriageway, VehicleClass};
+use crate::{Error, Place, Result};
+
+/// What `recordingMeta` says.
+pub(super) struct RecordingMeta {
+    pub frame_rate_hz: f64,
+    pub lane_numbers: LaneNumbers,
+    /// Those of the two carriageways that have lane lines.
+    pub carriageways: Vec<Carriageway>,
+    /// The line says that the program made the recording up.
+    pub synthetic: bool,
+    pub checksum: FileChecksum,
+    /// The line that says all this.
+    place: Place,
+}
+
+impl RecordingMeta {
+    /// Index of a direction's carriageway; `None` without lane lines.
+    fn carriageway(&self, direction: Direction) -> Option<usize> {
+        self.carriageways.iter().position(|carriageway| carriageway.name == direction.name())
+    }
+}
+
+/// What `tracksMeta` says about one vehicle.
+pub(super) struct Vehicle {
+    pub id: u32,
+    pub class: VehicleClass,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub direction: Direction,
+    pub carriageway: usize,
+    /// Number of lines it must have in `tracks`, where the file says so.
+    pub samples: Option<u64>,
+}
+
+/// Reads `recordingMeta`.
+pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
+    let mut table = Table::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
+    let frame_rate = table.column("frameRate")?;
+    let upper_column = table.column(Direction::Upper.markings_column())?;
+    let lower_column = table.column(Direction::Lower.markings_column())?;
+    let synthetic_column = table.optional_column("synthetic")?;
+    if !table.next_row()? {
+        return Err(Error::input(
+            table.file_place(),
+            "the file has no line after the header; expected one that describes the recording",
+            "copy or export the file again",
+        ));
+    }
+    let place = table.place();
+    let frame_rate_hz = frames_per_second(&table, frame_rate)?;
+    let upper = markings(&table, upper_column)?;
+    let lower = markings(&table, lower_column)?;
+    let synthetic = synthetic_column.map_or(Ok(false), |column| yes_or_no(&table, column))?;
+    if upper.is_empty() && lower.is_empty() {
+        return Err(table.bad(
+            upper_column,
+            "the lane lines are missing, here and in `lowerLaneMarkings`; expected at least two in one of them",
+            MARKINGS_HELP,
+        ));
+    }
+    if let (Some(last_upper), Some(first_lower)) = (upper.last(), lower.first())
+        && last_upper > first_lower
+    {
+        return Err(table.bad(
+            lower_column,
+            format!("the lower lane lines begin at {first_lower}, above the last of the upper ones at {last_upper}"),
+            "y points down: the upper lane lines must have the smaller values",
+        ));
+    }
+    judge(&table, frame_rate, Quantity::Rate, frame_rate_hz, doubts)?;
+    for (lines, column) in [(&upper, upper_column), (&lower, lower_column)] {
+        lines.array_windows().try_for_each(|[a, b]| judge(&table, column, Quantity::LaneWidth, b - a, doubts))?;
+    }
+    if table.next_row()? {
+        return Err(Error::input(
+            table.place(),
+            "a second line; expected only one, for this recording",
+            "keep the line of this recording and remove the others",
+        ));
+    }
+    let lane_numbers = LaneNumbers { upper_lines: upper.len(), lower_lines: lower.len() };
+    let carriageways = [(Direction::Upper, upper), (Direction::Lower, lower)]
+        .into_iter()
+        .filter(|(_, lines)| !lines.is_empty())
+        .map(|(direction, lines)| carriageway(direction, &lines))
+        .collect();
+    Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
+}
+
+fn judge(table: &Table, column: Column, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
+    let judged = doubts.judge(quantity, value, || table.field(column).to_string());
+    judged.map_err(|problem| table.bad(column, problem, HELP))
+}
+
+fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
+    match table.text(column)?.to_ascii_lowercase().as_str() {
+        "1" | "true" | "yes" => Ok(true),
+        "" | "0" | "false" | "no" => Ok(false),
+        _ => Err(table.bad(column, format!("{} is neither 1 nor 0", table.shown(column)), "write 1 or 0")),
+    }
+}
+
+fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
+    let frame_rate_hz = table.real(column)?;
+    if FRAME_RATES_HZ.contains(&frame_rate_hz) {
+        return Ok(frame_rate_hz);
+    }
+    let (least, most) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
+    Err(table.bad(
+        column,
+        format!("{} is no frame rate; expected between {least} and {most} frames per second", table.shown(column)),
+        "give the number of frames per second (highD: 25)",
+    ))
+}
+
+/// Lane lines of the image, from top to bottom, as a carriageway.
+fn carriageway(direction: Direction, lines_y: &[f64]) -> Carriageway {
+    let mut lane_lines_m: Vec<f64> = lines_y.iter().map(|&y| direction.leftward(y)).collect();
+    // Leftmost first: against the order of the image where the travel is against x.
+    if direction == Direction::Upper {
+        lane_lines_m.reverse();
+    }
+    Carriageway { name: direction.name().to_owned(), lane_lines_m }
+}
+
+const MARKINGS_HELP: &str =
+    "give the y of the lane lines in metres from top to bottom, separated by semicolons, such as 8.51;12.59;16.43";
+
+/// The lane lines of one cell, from top to bottom; none for an empty cell.
+fn markings(table: &Table, column: Column) -> Result<Vec<f64>> {
+    let text = table.text(column)?;
+    if text.is_empty() {
+        return Ok(Vec::new());
+    }
+    let bad = |problem: String| table.bad(column, problem, MARKINGS_HELP);
+    let mut lines: Vec<f64> = Vec::new();
+    for part in text.trim_end_matches(';').split(';') {
+        let line = number::real(part.as_bytes())
+            .filter(|line| line.abs() <= number::REAL_LIMIT)
+            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", quoted(part))))?;
+        if let Some(&above) = lines.last()
+            && line <= above
+        {
+            return Err(bad(format!("the lane lines do not ascend: {line} comes after {above}")));
+        }
+        lines.push(line);
+    }
+    if lines.len() < 2 || lines.len() > LANE_LINES_LIMIT {
+        let count = lines.len();
+        return Err(bad(format!("{count} lane line(s); expected 2 to {LANE_LINES_LIMIT}, or none without traffic")));
+    }
+    Ok(lines)
+}
+
+/// Reads `tracksMeta`: the vehicles, ascending by id.
+pub(super) fn read_tracks_meta(
+    files: &HighdFiles,
+    recording: &RecordingMeta,
+    doubts: &mut Doubts,
+) -> Result<(Vec<Vehicle>, FileChecksum)> {
+    let mut table = Table::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
+    let columns = MetaColumns::of(&table)?;
+    let mut vehicles: Vec<(Vehicle, Place)> = Vec::new();
+    while table.next_row()? {
+        let vehicle = columns.vehicle(&table, recording)?;
+        judge(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
+        judge(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
+        vehicles.push((vehicle, table.place()));
+    }
+    if vehicles.is_empty() {
+        return Err(Error::input(
+            table.file_place(),
+            "the recording has no vehicle: no line follows the header",
+            "remove the three files of this recording from the folder, or copy them again",
+        ));
+    }
+    // Stable, so that of two lines with one id the later one is called the surplus one.
+    vehicles.sort_by_key(|(vehicle, _)| vehicle.id);
+    if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.id == b.id) {
+        return Err(Error::input(
+            place.clone().column("id").of(format!("vehicle {}", vehicle.id)),
+            "an earlier line has the same id; expected one line per vehicle",
+            "remove the surplus line, or give the vehicle an id of its own in both files",
+        ));
+    }
+    Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()))
+}
+
+struct MetaColumns {
+    id: Column,
+    length: Column,
+    width: Column,
+    class: Column,
+    direction: Column,
+    samples: Option<Column>,
+    first_and_last_frame: Option<(Column, Column)>,
+}
+
+impl MetaColumns {
+    fn of(table: &Table) -> Result<Self> {
+        Ok(MetaColumns {
+            id: table.column("id")?,
+            // highD's box is that of the image: its width is the vehicle's length.
+            length: table.column("width")?,
+            width: table.column("height")?,
+            class: table.column("class")?,
+            direction: table.column("drivingDirection")?,
+            samples: table.optional_column("numFrames")?,
+            first_and_last_frame: table.optional_column("initialFrame")?.zip(table.optional_column("finalFrame")?),
+        })
+    }
+
+    fn vehicle(&self, table: &Table, recording: &RecordingMeta) -> Result<Vehicle> {
+        let id = table.integer(self.id)?;
+        let id = u32::try_from(id).map_err(|_| {
+            table.bad(self.id, format!("{id} is no vehicle id; expected 0 to {}", u32::MAX), "correct the id")
+        })?;
+        let direction = Direction::from_number(table.integer(self.direction)?).ok_or_else(|| {
+            let found = table.shown(self.direction);
+            table.bad(
+                self.direction,
+                format!("{found} is no driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
+                "correct the value",
+            )
+        })?;
+        let carriageway = recording.carriageway(direction).ok_or_else(|| {
+            Error::input(
+                recording.place.clone().column(direction.markings_column()),
+                format!("the lane lines are missing, but vehicle {id} drives in direction {}", direction.name()),
+                MARKINGS_HELP,
+            )
+        })?;
+        Ok(Vehicle {
+            id,
+            class: class(table, self.class)?,
+            length_m: table.positive(self.length)?,
+            width_m: table.positive(self.width)?,
+            direction,
+            carriageway,
+            samples: self.samples(table)?,
+        })
+    }
+
+    /// How many lines the vehicle has in `tracks`: as counted, or as follows from its first and last frame.
+    fn samples(&self, table: &Table) -> Result<Option<u64>> {
+        let (column, count) = match (self.samples, self.first_and_last_frame) {
+            (Some(column), _) => (column, table.integer(column)?),
+            (None, Some((first, last))) => {
+                (last, table.integer(last)?.saturating_sub(table.integer(first)?).saturating_add(1))
+            }
+            (None, None) => return Ok(None),
+        };
+        match u64::try_from(count) {
+            Ok(count) => Ok(Some(count)),
+            Err(_) => {
+                Err(table.bad(column, format!("{count} frames; expected no negative number"), "correct the value"))
+            }
+        }
+    }
+}
+
+/// highD knows `Car` and `Truck`; the names of its sibling formats are understood too.
+fn class(table: &Table, column: Column) -> Result<VehicleClass> {
+    match table.text(column)?.to_ascii_lowercase().as_str() {
+        "car" | "van" | "motorcycle" => Ok(VehicleClass::Car),
+        "truck" | "bus" | "trailer" => Ok(VehicleClass::Truck),
+        _ => Err(table.bad(
+            column,
+            format!("{} is no known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
+            "write `Car` or `Truck`",
+        )),
+    }
+}

@@ -1,0 +1,373 @@
+//! One recording's three files into the internal model. Only the columns that the model needs are
+//! looked at, each line once, and nothing is kept but the model itself.
+
+use std::path::Path;
+
+use super::columns::{Column, FileChecksum, Table};
+use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
+use super::inventory::{HighdFiles, folder_of, made_up};
+use super::meta::{self, RecordingMeta, Vehicle};
+use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
+use crate::traffic::trajectory::{NO_LANE, Recording, Track};
+use crate::{Error, Result};
+
+/// A recording as read, with what a run's record says about its files.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The recording.
+    pub recording: Recording,
+    /// Content of the three files, in the order tracks, tracksMeta, recordingMeta.
+    pub checksum_sha256: Vec<FileChecksum>,
+    /// Number of data lines in `tracks`.
+    pub rows: u64,
+    /// Size of the three files together, bytes.
+    pub bytes: u64,
+    /// What the data leaves open or what looks wrong without being an error, as sentences.
+    pub notes: Vec<String>,
+}
+
+/// As [`read_judged`], where implausible values are accepted.
+///
+/// # Errors
+/// As [`read_judged`].
+pub fn read(files: &HighdFiles) -> Result<Loaded> {
+    read_judged(files, Implausible::Accepted)
+}
+
+/// Reads one recording. Each file is read once, from start to end.
+///
+/// The lines of `tracks` may be grouped by vehicle or by frame; each vehicle's frames must ascend by
+/// one. Sizes come from `tracksMeta`; velocities and accelerations are the given ones; lanes come from
+/// `laneId` or, where that column is absent, from position and lane lines.
+///
+/// # Errors
+/// Anything that is not as it must be, with file, line and column or vehicle.
+pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
+    let mut doubts = Doubts::new(implausible);
+    let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
+    let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
+    let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let columns = TrackColumns::of(&table)?;
+    let reserve = can_hold(&files.tracks, &vehicles);
+    let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
+    let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
+    let mut notes = notes(&columns, &vehicles, &tracks);
+    notes.extend(doubts.sentences());
+    let rows = table.rows();
+    let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
+    let recording = Recording {
+        id: files.id.clone(),
+        frame_rate_hz: recording_meta.frame_rate_hz,
+        carriageways: recording_meta.carriageways,
+        tracks,
+        synthetic: recording_meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
+    };
+    let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
+    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
+}
+
+struct TrackColumns {
+    frame: Column,
+    id: Column,
+    x: Column,
+    y: Column,
+    velocity_x: Column,
+    velocity_y: Column,
+    acceleration_x: Column,
+    lane: Option<Column>,
+}
+
+impl TrackColumns {
+    fn of(table: &Table) -> Result<Self> {
+        let lane = match table.optional_column("laneId")? {
+            // The geometry can stand in for an absent column, but not for a misspelt one.
+            None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
+            lane => lane,
+        };
+        Ok(TrackColumns {
+            frame: table.column("frame")?,
+            id: table.column("id")?,
+            x: table.column("x")?,
+            y: table.column("y")?,
+            velocity_x: table.column("xVelocity")?,
+            velocity_y: table.column("yVelocity")?,
+            acceleration_x: table.column("xAcceleration")?,
+            lane,
+        })
+    }
+}
+
+/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file announces with no sample.
+fn read_tracks(
+    table: &mut Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicles: &[Vehicle],
+    mut tracks: Vec<Track>,
+    doubts: &mut Doubts,
+) -> Result<Vec<Track>> {
+    let judge = SampleJudge::new(meta.frame_rate_hz);
+    // Sums of the accelerations of each vehicle's last second: single samples are noisy.
+    let mut sums_mps2 = vec![0.0; vehicles.len()];
+    let mut at = 0;
+    while table.next_row()? {
+        at = find_vehicle(table, columns.id, vehicles, at)?;
+        add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
+        let sample = judge.sample(&tracks[at], &mut sums_mps2[at]);
+        if !sample.is_plausible() {
+            report(&sample, table, columns, &tracks[at], doubts)?;
+        }
+    }
+    check_counts(table, vehicles, &tracks)?;
+    tracks.retain(|track| !track.is_empty());
+    if tracks.is_empty() {
+        return Err(Error::input(
+            table.file_place(),
+            "the recording has no vehicle: no line follows the header",
+            "remove the three files of this recording from the folder, or copy them again",
+        ));
+    }
+    Ok(tracks)
+}
+
+/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any number.
+fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
+    let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
+    let bytes = std::fs::metadata(tracks).map_or(0, |file| file.len());
+    announced <= bytes / MIN_ROW_BYTES
+}
+
+/// A track without samples; `reserve` gives it room for the announced ones.
+fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
+    let samples = if reserve { vehicle.samples.unwrap_or(0) as usize } else { 0 };
+    Track {
+        id: vehicle.id,
+        class: vehicle.class,
+        length_m: vehicle.length_m,
+        width_m: vehicle.width_m,
+        carriageway: vehicle.carriageway,
+        first_frame: 0,
+        s_m: Vec::with_capacity(samples),
+        d_m: Vec::with_capacity(samples),
+        v_s_mps: Vec::with_capacity(samples),
+        v_d_mps: Vec::with_capacity(samples),
+        a_s_mps2: Vec::with_capacity(samples),
+        lane: Vec::with_capacity(samples),
+    }
+}
+
+/// Index of the present line's vehicle. Lines come grouped by vehicle or by frame, so it is mostly the
+/// same as before or the next one.
+fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
+    let id = table.integer(column)?;
+    let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
+    if is(before) {
+        return Ok(before);
+    }
+    if is(before + 1) {
+        return Ok(before + 1);
+    }
+    vehicles.binary_search_by_key(&id, |vehicle| i64::from(vehicle.id)).map_err(|_| {
+        table.bad(
+            column,
+            format!("vehicle {id} is not in the tracksMeta file"),
+            "add its line there or remove its lines here; check that the files belong to the same recording",
+        )
+    })
+}
+
+fn add_sample(
+    table: &Table,
+    columns: &TrackColumns,
+    meta: &RecordingMeta,
+    vehicle: &Vehicle,
+    track: &mut Track,
+    doubts: &mut Doubts,
+) -> Result<()> {
+    let frame = table.integer(columns.frame)?;
+    if track.is_empty() {
+        if !(-FRAME_LIMIT..=FRAME_LIMIT).contains(&frame) {
+            return Err(table.bad(columns.frame, format!("{frame} is out of range"), "correct the frame number"));
+        }
+        track.first_frame = frame;
+    } else if frame != track.last_frame() + 1 {
+        return Err(out_of_step(table, track, frame));
+    }
+    let direction = vehicle.direction;
+    let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
+    // Everything is parsed before anything is stored: the series keep the same length.
+    let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
+    let told = || table.field(columns.velocity_x).to_string();
+    let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), told);
+    if v_s_mps < 0.0 {
+        return Err(table.bad(
+            columns.velocity_x,
+            format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", vehicle.id),
+            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s is taken as 0)",
+        ));
+    }
+    let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
+    let a_s_mps2 = direction.forward(table.real(columns.acceleration_x)?);
+    let lane = match columns.lane {
+        Some(column) => meta.lane_numbers.lane_of(direction, table.integer(column)?),
+        None => meta.carriageways[vehicle.carriageway].lane_at(d_m).map_or(NO_LANE, |lane| lane as u16),
+    };
+    track.s_m.push(s_m);
+    track.d_m.push(d_m);
+    track.v_s_mps.push(v_s_mps);
+    track.v_d_mps.push(v_d_mps);
+    track.a_s_mps2.push(a_s_mps2);
+    track.lane.push(lane);
+    Ok(())
+}
+
+/// Judges the last sample of a track against the plausible ranges.
+struct SampleJudge {
+    rate_hz: f64,
+    /// Samples of a second.
+    window: usize,
+    /// One over that number.
+    inverse_window: f64,
+}
+
+/// What is judged of one sample; a quantity that it does not have yet is 0.
+struct JudgedSample {
+    speed_mps: f64,
+    lateral_speed_mps: f64,
+    /// Difference of the lateral positions over the time between two samples.
+    lateral_change_mps: f64,
+    /// Mean over the last second.
+    acceleration_mps2: f64,
+}
+
+impl SampleJudge {
+    fn new(rate_hz: f64) -> Self {
+        let window = (rate_hz.round() as usize).max(1);
+        SampleJudge { rate_hz, window, inverse_window: 1.0 / window as f64 }
+    }
+
+    /// `sum_mps2` is the sum of the track's accelerations over the last second so far.
+    #[inline]
+    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> JudgedSample {
+        let last = |series: &[f64]| series.last().copied().unwrap_or_default();
+        *sum_mps2 += last(&track.a_s_mps2);
+        let samples = track.a_s_mps2.len();
+        if let Some(&left) = samples.checked_sub(self.window + 1).and_then(|at| track.a_s_mps2.get(at)) {
+            *sum_mps2 -= left;
+        }
+        let lateral_change_m = match track.d_m[..] {
+            [.., before, now] => now - before,
+            _ => 0.0,
+        };
+        JudgedSample {
+            speed_mps: last(&track.v_s_mps),
+            lateral_speed_mps: last(&track.v_d_mps),
+            lateral_change_mps: lateral_change_m * self.rate_hz,
+            acceleration_mps2: if samples >= self.window { *sum_mps2 * self.inverse_window } else { 0.0 },
+        }
+    }
+}
+
+impl JudgedSample {
+    /// One test for all quantities: nearly every sample passes it.
+    #[inline]
+    fn is_plausible(&self) -> bool {
+        Quantity::Speed.is_plausible(self.speed_mps)
+            & Quantity::LateralSpeed.is_plausible(self.lateral_speed_mps)
+            & Quantity::LateralSpeed.is_plausible(self.lateral_change_mps)
+            & Quantity::Acceleration.is_plausible(self.acceleration_mps2)
+    }
+}
+
+/// Counts what is implausible about a sample.
+///
+/// # Errors
+/// A value beyond the physical range, unless such are accepted.
+#[cold]
+fn report(
+    sample: &JudgedSample,
+    table: &Table,
+    columns: &TrackColumns,
+    track: &Track,
+    doubts: &mut Doubts,
+) -> Result<()> {
+    let mut judge = |quantity, value, column| {
+        let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
+        doubts.judge(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
+    };
+    judge(Quantity::Speed, sample.speed_mps, columns.velocity_x)?;
+    judge(Quantity::LateralSpeed, sample.lateral_speed_mps, columns.velocity_y)?;
+    judge(Quantity::LateralSpeed, sample.lateral_change_mps, columns.y)?;
+    judge(Quantity::Acceleration, sample.acceleration_mps2, columns.acceleration_x)
+}
+
+/// The error for a frame that is not the one after the vehicle's last.
+fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
+    let (first, last) = (track.first_frame, track.last_frame());
+    let (problem, help) = if (first..=last).contains(&frame) {
+        (
+            format!("frame {frame} of this vehicle is there twice"),
+            "remove one of the two lines, or give the second vehicle an id of its own",
+        )
+    } else if frame < first {
+        (
+            format!("the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
+            "sort the lines by id and frame",
+        )
+    } else {
+        (
+            format!("a gap, or the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
+            "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
+        )
+    };
+    Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
+}
+
+/// The meta file says how many lines each vehicle has: the only way to notice a file that ends early.
+fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
+    let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
+        Some(samples) => samples != track.len() as u64,
+        None => track.is_empty(),
+    });
+    let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
+    let (found, more) = (track.len() as u64, mismatches.count());
+    let expected = match vehicle.samples {
+        Some(samples) => format!("the tracksMeta file announces {samples}"),
+        None => "it is in the tracksMeta file".to_owned(),
+    };
+    let more = if more == 0 { String::new() } else { format!(" ({more} more vehicles do not fit either)") };
+    let truncated = if vehicle.samples.is_none_or(|samples| found < samples) { ": is the file truncated?" } else { "" };
+    Err(Error::input(
+        table.file_place().of(format!("vehicle {}", vehicle.id)),
+        format!("the vehicle has {found} frames, but {expected}{more}{truncated}"),
+        "copy or export the files again; check that the three belong to the same recording",
+    ))
+}
+
+/// What a user should hear of although the data can be used.
+fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if columns.lane.is_none() {
+        notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
+    }
+    if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
+        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file would not be noticed".to_owned());
+    }
+    let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
+        let mut affected = tracks.iter().filter(|track| applies(track));
+        if let Some(first) = affected.next() {
+            notes.push(format!("{} vehicle(s) {what}, the first is vehicle {}", affected.count() + 1, first.id));
+        }
+    };
+    note("move against their drivingDirection", &|track| {
+        track.s_m.last().zip(track.s_m.first()).is_some_and(|(last, first)| last - first < -BACKWARDS_M)
+    });
+    note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
+    notes
+}
+
+/// Bytes of the shortest line: eight columns of one digit.
+const MIN_ROW_BYTES: u64 = 16;
+
+/// Way backwards, in metres, that is more than noise of a standing vehicle.
+const BACKWARDS_M: f64 = 5.0;

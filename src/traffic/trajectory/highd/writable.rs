@@ -1,0 +1,185 @@
+//! What a recording must be so that the format can hold it, and what of it the format keeps.
+
+use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
+use super::frame::{Direction, LaneNumbers};
+use super::number::REAL_LIMIT;
+use super::precision::Precision;
+use crate::traffic::trajectory::{NO_LANE, Recording, Track};
+use crate::{Error, Place, Result};
+
+/// Changes a recording into what would be read back from its own files: with `q` the quantized recording,
+/// reading what [`write`](super::write) wrote of `q` gives `q` bit for bit, at the same precision.
+///
+/// Every value goes the writer's and the reader's way (transform, round to the decimals, transform back)
+/// until that changes nothing more.
+///
+/// # Errors
+/// If the format cannot hold the recording, see [`write`](super::write).
+pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
+    let layout = Layout::of(recording, precision)?;
+    let settle = |values: &mut [f64], to_file: &dyn Fn(f64) -> f64, from_file: &dyn Fn(f64) -> f64| {
+        for value in values {
+            // Twice is enough: fl(fl(a + h) − h) is a fixed point of its own repetition (Knuth, The Art of
+            // Computer Programming 2, theorem 4.2.2 D).
+            for _ in 0..3 {
+                *value = from_file(precision.rounded(to_file(*value)));
+            }
+        }
+    };
+    for (carriageway, &direction) in recording.carriageways.iter_mut().zip(&layout.directions) {
+        let turn = |v| direction.leftward(v);
+        settle(&mut carriageway.lane_lines_m, &turn, &turn);
+    }
+    for track in &mut recording.tracks {
+        let direction = layout.directions[track.carriageway];
+        let (forward, leftward) = (|v| direction.forward(v), |v| direction.leftward(v));
+        let (length_m, width_m) = (precision.rounded(track.length_m), precision.rounded(track.width_m));
+        (track.length_m, track.width_m) = (length_m, width_m);
+        settle(&mut track.s_m, &|s| direction.x_of(s, length_m), &|x| direction.s_of(x, length_m));
+        settle(&mut track.d_m, &|d| direction.y_of(d, width_m), &|y| direction.d_of(y, width_m));
+        settle(&mut track.v_s_mps, &forward, &forward);
+        settle(&mut track.v_d_mps, &leftward, &leftward);
+        settle(&mut track.a_s_mps2, &forward, &forward);
+        for lane in &mut track.lane {
+            if layout.lane_numbers.id_of(direction, *lane).is_none() {
+                *lane = NO_LANE;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The image a recording becomes: which half each carriageway is, and its lane lines from top to bottom.
+pub(super) struct Layout {
+    /// By index of the carriageway.
+    pub directions: Vec<Direction>,
+    /// y of the upper lane lines, rounded, ascending; empty without that carriageway.
+    pub upper_y: Vec<f64>,
+    /// y of the lower lane lines, rounded, ascending.
+    pub lower_y: Vec<f64>,
+    /// The numbers of the lanes.
+    pub lane_numbers: LaneNumbers,
+}
+
+impl Layout {
+    /// The layout of a recording that the format can hold.
+    ///
+    /// # Errors
+    /// The first reason why it cannot.
+    pub fn of(recording: &Recording, precision: Precision) -> Result<Self> {
+        check_frame(recording)?;
+        let mut layout = Layout {
+            directions: Vec::new(),
+            upper_y: Vec::new(),
+            lower_y: Vec::new(),
+            lane_numbers: LaneNumbers { upper_lines: 0, lower_lines: 0 },
+        };
+        for carriageway in &recording.carriageways {
+            let bad = |problem: &str, help: &str| {
+                let item = format!("recording {}, carriageway `{}`", recording.id, carriageway.name);
+                Error::input(Place::item(item), format!("{problem}; highD files cannot hold it"), help)
+            };
+            let direction = Direction::BOTH
+                .into_iter()
+                .find(|direction| direction.name() == carriageway.name && !layout.directions.contains(direction))
+                .filter(|direction| *direction == Direction::Lower || layout.directions.is_empty())
+                .ok_or_else(|| {
+                    bad("unknown, repeated or out of order", "name them `1` (upper lanes) and `2` (lower lanes)")
+                })?;
+            let mut lines: Vec<f64> =
+                carriageway.lane_lines_m.iter().map(|&d| precision.rounded(direction.leftward(d))).collect();
+            if direction == Direction::Upper {
+                lines.reverse();
+            }
+            if !carriageway.lane_lines_m.iter().all(|d| in_range(*d))
+                || !(2..=LANE_LINES_LIMIT).contains(&lines.len())
+                || lines.array_windows().any(|[above, below]| above >= below)
+            {
+                return Err(bad(
+                    "its lane lines are not at least two values that fall from left to right",
+                    "give the lines from left to right, at least a hundredth of a metre apart",
+                ));
+            }
+            match direction {
+                Direction::Upper => layout.upper_y = lines,
+                Direction::Lower => layout.lower_y = lines,
+            }
+            layout.directions.push(direction);
+        }
+        if let (Some(last_upper), Some(first_lower)) = (layout.upper_y.last(), layout.lower_y.first())
+            && last_upper > first_lower
+        {
+            return Err(Error::input(
+                Place::item(format!("recording {}", recording.id)),
+                "carriageway `1` does not lie above carriageway `2` (y = d for `1`, y = −d for `2`)",
+                "shift one of them sideways",
+            ));
+        }
+        layout.lane_numbers = LaneNumbers { upper_lines: layout.upper_y.len(), lower_lines: layout.lower_y.len() };
+        check_tracks(recording, precision)?;
+        Ok(layout)
+    }
+
+    /// `laneId` of a lane; for [`NO_LANE`] a number that is read as no lane, the true count of lines above
+    /// where possible.
+    pub fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
+        self.lane_numbers.id_of(direction, lane).unwrap_or_else(|| {
+            let y = direction.leftward(d_m);
+            let above = self.upper_y.iter().chain(&self.lower_y).filter(|&&line| line < y).count() as i64;
+            let is_none = self.lane_numbers.lane_of(direction, above + 1) == NO_LANE;
+            if is_none { above + 1 } else { 0 }
+        })
+    }
+}
+
+fn in_range(value: f64) -> bool {
+    // Half, so that a position plus half a length stays readable; false for NaN.
+    value.abs() <= 0.5 * REAL_LIMIT
+}
+
+fn check_frame(recording: &Recording) -> Result<()> {
+    let bad = |problem: &str, help: &str| {
+        Err(Error::input(Place::item(format!("recording `{}`", recording.id)), problem, help))
+    };
+    if recording.id.is_empty() || recording.id.starts_with('.') || recording.id.contains(['/', '\\', '\0']) {
+        return bad("the name cannot begin a file name", "use a short name such as `01`");
+    }
+    if !FRAME_RATES_HZ.contains(&recording.frame_rate_hz) {
+        return bad("the frame rate is out of range", "use a rate between 0.01 and 10000 frames per second");
+    }
+    if recording.carriageways.is_empty() || recording.tracks.is_empty() {
+        return bad("no carriageway or no vehicle; highD files cannot hold it", "add at least one of each");
+    }
+    if recording.tracks.array_windows().any(|[a, b]| a.id >= b.id) {
+        return bad("the vehicles are not sorted by id, or two have the same", "sort them, each with its own id");
+    }
+    Ok(())
+}
+
+fn check_tracks(recording: &Recording, precision: Precision) -> Result<()> {
+    for track in &recording.tracks {
+        if let Some(problem) = track_problem(track, recording, precision) {
+            let place = Place::item(format!("recording {}, vehicle {}", recording.id, track.id));
+            return Err(Error::input(place, format!("{problem}; highD files cannot hold it"), "correct the recording"));
+        }
+    }
+    Ok(())
+}
+
+fn track_problem(track: &Track, recording: &Recording, precision: Precision) -> Option<&'static str> {
+    let series = [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2];
+    let size_is_good = |size: f64| in_range(size) && precision.rounded(size) > 0.0;
+    if track.carriageway >= recording.carriageways.len() {
+        Some("it drives on a carriageway that is not there")
+    } else if !size_is_good(track.length_m) || !size_is_good(track.width_m) {
+        Some("its size is not above zero")
+    } else if track.is_empty() || track.lane.len() != track.len() || series.iter().any(|s| s.len() != track.len()) {
+        Some("its series are empty or of different lengths")
+    } else if !series.iter().all(|series| series.iter().all(|&value| in_range(value))) {
+        Some("a value is not finite or out of range")
+    } else if !(-FRAME_LIMIT..=FRAME_LIMIT).contains(&track.first_frame) {
+        Some("its first frame is out of range")
+    } else {
+        None
+    }
+}

@@ -1,0 +1,13 @@
+//! Trajectories: recordings as they come in, and the internal model that everything else reads.
+//!
+//! Here live the recording model, one reader per file format (highD today), the writer of the same
+//! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
+//! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
+
+mod ego;
+pub mod generator;
+pub mod highd;
+mod recording;
+
+pub use ego::{EgoView, EgoViewOptions, Encounter, LIMIT_TOLERANCE_M, Sighting};
+pub use recording::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
