@@ -19,7 +19,7 @@ use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
 
 const REPETITIONS: usize = 5;
-const LEAST_BYTES: u64 = 1_000_000_000;
+const MIN_BYTES: u64 = 1_000_000_000;
 
 fn main() {
     // `cargo test --benches` calls without `--bench`: nothing to time then.
@@ -68,7 +68,7 @@ fn time<T>(part: &str, repetition: usize, amount: u64, unit: &str, work: impl Fn
 fn write_recordings(dir: &Path) -> u64 {
     let mut bytes = 0;
     let mut index = 0;
-    while bytes < LEAST_BYTES {
+    while bytes < MIN_BYTES {
         let options = GeneratorOptions { seed: 1000 + index, recordings: 1, ..GeneratorOptions::default() };
         let mut recording = generate_one(&options, 0).unwrap();
         recording.id = format!("{:03}", index + 1);

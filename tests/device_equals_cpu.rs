@@ -88,9 +88,9 @@ fn shaders_without_run_time_checks_give_the_same_words() {
 }
 
 /// What `verify` says of a device whose shaders have one text replaced.
-fn planted(from: &str, to: &str) -> Option<Comparison> {
-    let planted = Some((from.to_owned(), to.to_owned()));
-    let gpu = open(GpuOptions { planted, ..Default::default() })?;
+fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
+    let shader_patch = Some((from.to_owned(), to.to_owned()));
+    let gpu = open(GpuOptions { shader_patch, ..Default::default() })?;
     let profile = Profile::load("paper").unwrap();
     let mut found = compare("random", &random(&profile, 4000), &gpu, |_| ()).unwrap();
     let thresholds = compare("thresholds", &thresholds(&profile, 8), &gpu, |_| ()).unwrap();
@@ -101,7 +101,7 @@ fn planted(from: &str, to: &str) -> Option<Comparison> {
 
 #[test]
 fn one_step_more_delay_in_a_shader_is_found_with_its_model() {
-    let Some(found) = planted(
+    let Some(found) = shader_patch(
         "DriverState(driver_coasting, driver_delay_steps)",
         "DriverState(driver_coasting, driver_delay_steps + 1u)",
     ) else {
@@ -127,7 +127,7 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
         ("closing * btn_ramp_delay", "closing * bitcast<f32>(bitcast<u32>(btn_ramp_delay) + 1u)"),
     ];
     for (from, to) in plants {
-        let Some(found) = planted(from, to) else { return };
+        let Some(found) = shader_patch(from, to) else { return };
         assert!(!found.is_equal(), "{to} was not found");
     }
 }
@@ -137,15 +137,15 @@ fn the_quick_self_check_finds_a_wrong_shader_and_no_other() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let good = self_check(&gpu).unwrap();
     assert!(good.lanes > 8000 && good.differing == 0, "{good:?}");
-    let planted = Some(("(v_ego - v_before)".to_owned(), "(v_before - v_ego)".to_owned()));
-    let Some(gpu) = open(GpuOptions { planted, ..Default::default() }) else { return };
+    let shader_patch = Some(("(v_ego - v_before)".to_owned(), "(v_before - v_ego)".to_owned()));
+    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     assert!(self_check(&gpu).unwrap().differing > 0);
 }
 
 #[test]
 fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
-    let planted = Some(("if lane >= launch.lanes {".to_owned(), "if lane + 1u >= launch.lanes {".to_owned()));
-    let Some(gpu) = open(GpuOptions { planted, ..Default::default() }) else { return };
+    let shader_patch = Some(("if lane >= launch.lanes {".to_owned(), "if lane + 1u >= launch.lanes {".to_owned()));
+    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     let plan = random(&Profile::load("paper").unwrap(), 400);
     let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();
     assert!(error.to_string().contains("of 400 lanes") || error.to_string().contains("lanes of"), "{error}");

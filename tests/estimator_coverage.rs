@@ -263,10 +263,10 @@ fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32
     let s_prime = if is_wrong { (s + shift).clamp(0, 10) } else { s };
     let count = |n: i32| n.max(0) as u32;
     Confusion {
-        both: count(s.min(s_prime)),
-        only_s: count(s - s_prime),
-        only_s_prime: count(s_prime - s),
-        neither: count(10 - s.max(s_prime)),
+        tp: count(s.min(s_prime)),
+        fn_: count(s - s_prime),
+        fp: count(s_prime - s),
+        tn: count(10 - s.max(s_prime)),
     }
 }
 
@@ -342,7 +342,7 @@ fn intervals_of_f1_hold() {
                     let value = f1(&total(&units)).expect("failures");
                     assert!(ours.low <= value && value <= ours.high, "{ours:?} excludes {value}");
                     let sum = total(&units);
-                    let failures = sum.both + sum.only_s;
+                    let failures = sum.tp + sum.fn_;
                     Some(([percentiles(n, seed, score)?, (ours.low, ours.high)], failures))
                 };
                 let all: Vec<([(f64, f64); 2], u64)> = (0..REPEATS).into_par_iter().filter_map(of).collect();

@@ -118,10 +118,10 @@ fn counts_are_over_the_headways_of_one_scenario() {
     let unit = &partial.units()[2];
     assert_eq!(unit.unit, 2);
     let cell = |variant: usize| unit.cells[variant * plan.models.len() * Criterion::ALL.len()];
-    assert_eq!((cell(0).both, cell(0).neither), (10, 0), "S against itself");
-    assert_eq!((cell(1).both, cell(1).only_s, cell(1).only_s_prime, cell(1).neither), (3, 7, 0, 0));
-    assert_eq!((cell(2).both, cell(2).only_s), (0, 10));
-    assert_eq!(unit.cells[1].neither, 10, "TTC never fails");
+    assert_eq!((cell(0).tp, cell(0).tn), (10, 0), "S against itself");
+    assert_eq!((cell(1).tp, cell(1).fn_, cell(1).fp, cell(1).tn), (3, 7, 0, 0));
+    assert_eq!((cell(2).tp, cell(2).fn_), (0, 10));
+    assert_eq!(unit.cells[1].tn, 10, "TTC never fails");
     // Over the four cut-ins, headway by headway: S fails everywhere, variant 1 at the first three.
     let by_headway = partial.headway_failures(&plan, 0).unwrap();
     let width = plan.models.len() * Criterion::ALL.len();

@@ -40,7 +40,7 @@ fn a_study_that_never_fails_has_no_score() {
     for cell in &scores.cells {
         let values = (recall(&cell.counts), precision(&cell.counts), f1(&cell.counts));
         assert_eq!(values, (None, None, None));
-        assert_eq!((cell.f1_interval, cell.undefined_draws, cell.counts.neither), (None, 1000, 30));
+        assert_eq!((cell.f1_interval, cell.undefined_draws, cell.counts.tn), (None, 1000, 30));
     }
 }
 
@@ -59,7 +59,7 @@ fn f1_of_few_failures_has_no_interval_and_its_undefined_draws_are_counted() {
     // (3/4)^4 = 0.316 of the draws miss it; sigma = 15 draws.
     assert!((250..390).contains(&cell.undefined_draws), "{}", cell.undefined_draws);
     // Nine failures: no interval. Ten: one scenario never makes [1, 1].
-    assert_eq!((f1(&cell.counts), cell.counts.both, cell.f1_interval), (Some(1.0), 9, None));
+    assert_eq!((f1(&cell.counts), cell.counts.tp, cell.f1_interval), (Some(1.0), 9, None));
     let interval =
         fails(0).categories[0].cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()].f1_interval;
     let interval = interval.unwrap();
@@ -136,9 +136,9 @@ fn the_papers_lvd_f1_follow_from_their_integer_counts() {
         let (name, cell) = cell;
         let expected = cell["F1"].as_f64().unwrap();
         for candidate in cell["TP_FN_FP_candidates"].as_array().unwrap() {
-            let [both, only_s, only_s_prime] = [0, 1, 2].map(|k| candidate[k].as_u64().unwrap());
-            let ours = Confusion { both, only_s, only_s_prime, neither: 4820 - both - only_s - only_s_prime };
-            assert_eq!(both + only_s, cell["baseline_fails"].as_u64().unwrap(), "{name}");
+            let [both, fn_, fp] = [0, 1, 2].map(|k| candidate[k].as_u64().unwrap());
+            let ours = Confusion { tp: both, fn_, fp, tn: 4820 - both - fn_ - fp };
+            assert_eq!(both + fn_, cell["baseline_fails"].as_u64().unwrap(), "{name}");
             assert!((f1(&ours).unwrap() - expected).abs() < 1e-9, "{name}: {:?} {expected}", f1(&ours));
             checked += 1;
         }

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
-use lanesweep::engine::generated::{self, ATTEMPTS, MOST_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
+use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
 use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
@@ -78,7 +78,7 @@ fn generator_records() -> Vec<Record> {
         record!("Recipe", Recipe, {
             path: u32, lateral: u32, dimensions: u32, pair: u32, decelerates: u32, unlimited: u32, judged: u32,
             step_cap: u32, slots: [u32; 11], columns: ReducedColumns, lower: [f32; 14], upper: [f32; 14],
-            least_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
+            min_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
             half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32,
             attention: [AttentionRule<f32>; MODELS],
         }),
@@ -144,7 +144,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         assert_eq!((stride, ours), (size, theirs), "{name}");
     }
     for (name, value) in [
-        ("MOST_PARAMETERS", MOST_PARAMETERS as u32),
+        ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("ATTEMPTS", ATTEMPTS),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Quantity::TargetSpeed as u32),
@@ -349,8 +349,8 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         "abort_above_ttc_s",
         "safe_gap",
         "ignores",
-        "ease_gap",
-        "check_at_ease",
+        "steady_gap",
+        "check_steady",
         "shader_constants",
     ];
     for model in ModelId::ALL {

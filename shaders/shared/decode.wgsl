@@ -3,7 +3,7 @@
 // An event this close behind a step, in steps, counts as at the step.
 const STEP_TOLERANCE: f32 = 1e-4f;
 // No event is later, in steps.
-const MOST_STEPS: f32 = 1e6f;
+const MAX_STEPS: f32 = 1e6f;
 
 // sin(πx/2) on [0, 1] as x·p(x²).
 const SINE_0: f32 = 1.5707963267948966f;
@@ -14,7 +14,7 @@ const SINE_4: f32 = 0.00016044118478735982f;
 const SINE_5: f32 = -3.598843235212085e-6f;
 
 // Is the point inside the valid region?
-fn is_valid(point: array<f32, MOST_PARAMETERS>) -> bool {
+fn is_valid(point: array<f32, MAX_PARAMETERS>) -> bool {
     for (var j = 0u; j < recipe.dimensions; j++) {
         if !((point[j] >= recipe.lower[j]) & (point[j] <= recipe.upper[j])) {
             return false;
@@ -27,7 +27,7 @@ fn is_valid(point: array<f32, MOST_PARAMETERS>) -> bool {
         if recipe.columns.lead_gap != NO_SLOT {
             gap = reduced_column(point, recipe.columns.lead_gap);
         }
-        return (duration >= recipe.least_duration) & (duration <= recipe.longest_duration) & (ego_speed >= 0.0)
+        return (duration >= recipe.min_duration) & (duration <= recipe.longest_duration) & (ego_speed >= 0.0)
             & (gap >= 0.0);
     }
     if recipe.decelerates != 0u {
@@ -37,13 +37,13 @@ fn is_valid(point: array<f32, MOST_PARAMETERS>) -> bool {
             return false;
         }
         let duration = exact_div(initial - end, quantity(point, MEAN_DECELERATION));
-        return (duration >= recipe.least_duration) & (duration <= recipe.longest_duration);
+        return (duration >= recipe.min_duration) & (duration <= recipe.longest_duration);
     }
     return true;
 }
 
 // The case of a valid point; its series begin at these entries of the tables.
-fn decode_case(point: array<f32, MOST_PARAMETERS>, speed_at: u32, lateral_at: u32) -> LaneCase {
+fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32) -> LaneCase {
     var principal: Motion;
     var ahead: Motion;
     var ego_speed = 0.0;
@@ -125,7 +125,7 @@ fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneO
 }
 
 // The value of a quantity; 0 where no parameter gives it.
-fn quantity(point: array<f32, MOST_PARAMETERS>, which: u32) -> f32 {
+fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
     var values = point;
     let slot = recipe.slots[which];
     if slot == NO_SLOT {
@@ -135,7 +135,7 @@ fn quantity(point: array<f32, MOST_PARAMETERS>, which: u32) -> f32 {
 }
 
 // A column of the vector that belongs to coefficients.
-fn reduced_column(point: array<f32, MOST_PARAMETERS>, column: u32) -> f32 {
+fn reduced_column(point: array<f32, MAX_PARAMETERS>, column: u32) -> f32 {
     var coefficients = point;
     var value = number(column);
     for (var k = 0u; k < recipe.columns.coefficients; k++) {
@@ -146,7 +146,7 @@ fn reduced_column(point: array<f32, MOST_PARAMETERS>, column: u32) -> f32 {
 
 // Whole steps that cover a time, given in steps.
 fn steps_up(time: f32) -> u32 {
-    let late = larger(smaller(time, MOST_STEPS) - STEP_TOLERANCE, 0.0);
+    let late = larger(smaller(time, MAX_STEPS) - STEP_TOLERANCE, 0.0);
     let below = u32(late);
     return select(below, below + 1u, late > f32(below));
 }
@@ -248,7 +248,7 @@ fn between(step: u32, per_step: f32) -> Between {
 
 // A speed series of the reduction: linear between its instants, never below 0.
 fn reduced_speed(
-    point: array<f32, MOST_PARAMETERS>,
+    point: array<f32, MAX_PARAMETERS>,
     first: u32,
     duration: f32,
     motion: ptr<function, Motion>,
@@ -277,7 +277,7 @@ fn reduced_speed(
 // The lateral series of the reduction with its speed towards the ego, w[i] = (|y[i−1]| − |y[i]|)/dt, w[0] = w[1],
 // 0 after T.
 fn reduced_lateral(
-    point: array<f32, MOST_PARAMETERS>,
+    point: array<f32, MAX_PARAMETERS>,
     duration: f32,
     motion: ptr<function, Motion>,
     lateral_at: u32,

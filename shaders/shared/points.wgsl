@@ -9,7 +9,7 @@ const SOURCE_SOBOL: u32 = 1u;
 const SOURCE_GIVEN: u32 = 2u;
 
 struct Drawn {
-    values: array<f32, MOST_PARAMETERS>,
+    values: array<f32, MAX_PARAMETERS>,
     tries: u32,
 }
 
@@ -34,11 +34,11 @@ fn draw_point(index: vec2<u32>) -> Drawn {
 }
 
 // Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
-fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MOST_PARAMETERS> {
+fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
     let d = recipe.dimensions;
     var words: array<u32, 16>;
     if generation.source == SOURCE_GIVEN {
-        var given: array<f32, MOST_PARAMETERS>;
+        var given: array<f32, MAX_PARAMETERS>;
         // A plan holds no index beyond the points.
         for (var j = 0u; j < d; j++) {
             given[j] = number(generation.first_mean + index.x * d + j);
@@ -65,11 +65,11 @@ fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MOST_PARAMETERS> {
     }
     let factor = generation.first_factor + numbers[generation.first_factor_of + component] * d * d;
     let mean = generation.first_mean + component * d;
-    var deviates: array<f32, MOST_PARAMETERS>;
+    var deviates: array<f32, MAX_PARAMETERS>;
     for (var j = 0u; j < d; j++) {
         deviates[j] = standard_normal(words[2u + j]);
     }
-    var values: array<f32, MOST_PARAMETERS>;
+    var values: array<f32, MAX_PARAMETERS>;
     for (var j = 0u; j < d; j++) {
         var value = number(mean + j);
         for (var k = 0u; k <= j; k++) {

@@ -1,6 +1,6 @@
 // What a point's numbers mean: twin of src/engine/generated/recipe.rs. A test compares sizes and offsets.
 
-const MOST_PARAMETERS: u32 = 14u;
+const MAX_PARAMETERS: u32 = 14u;
 const QUANTITIES: u32 = 11u;
 const NO_SLOT: u32 = 0xffffffffu;
 
@@ -49,10 +49,10 @@ struct Recipe {
     step_cap: u32,
     slots: array<u32, QUANTITIES>,
     columns: ReducedColumns,
-    lower: array<f32, MOST_PARAMETERS>,
-    upper: array<f32, MOST_PARAMETERS>,
+    lower: array<f32, MAX_PARAMETERS>,
+    upper: array<f32, MAX_PARAMETERS>,
     // s
-    least_duration: f32,
+    min_duration: f32,
     // s
     longest_duration: f32,
     // s

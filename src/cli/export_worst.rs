@@ -14,7 +14,7 @@ use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 
 /// Lanes that one export writes at most.
-const MOST_LANES: usize = 10_000;
+const MAX_LANES: usize = 10_000;
 
 /// Of a study: per model the scenarios with the smallest limit state of the criterion (see [`limit_state`]), each with
 /// its worst lane over the variants and headways; smallest first, equal ones in the plan's order. The study's lanes are
@@ -106,7 +106,7 @@ pub(super) fn worst_of_sample(
         let help = "run `lanesweep sample` with --worst above 0, or name lanes with --lane";
         return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
     }
-    let text = input_file::read_text(&path, input_file::LARGEST_TABLE_BYTES)?;
+    let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let wrong = |row: u64, problem: String| {
         let help = "give the folder of a `lanesweep sample` run by this version";
@@ -135,9 +135,9 @@ fn wanted_models(plan: &LanePlan, models: Option<&[ModelId]>, count: usize) -> R
         None => (0..plan.models.len()).collect(),
         Some(list) => list.iter().map(|id| model(plan, *id)).collect::<Result<Vec<_>>>()?,
     };
-    if all.len().saturating_mul(count) > MOST_LANES {
+    if all.len().saturating_mul(count) > MAX_LANES {
         let problem = format!("{count} lanes of {} models are too many files", all.len());
-        return Err(Error::usage(Place::item("--worst"), problem, format!("write {MOST_LANES} at most at once")));
+        return Err(Error::usage(Place::item("--worst"), problem, format!("write {MAX_LANES} at most at once")));
     }
     Ok(all)
 }

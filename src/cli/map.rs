@@ -20,7 +20,7 @@ use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::presets::{self, Preset};
 use crate::run::grid::{
-    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MOST_PANELS, MapBackend, PARAMETERS, Parameter,
+    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MAX_PANELS, MapBackend, PARAMETERS, Parameter,
 };
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
@@ -329,8 +329,8 @@ impl Map {
         );
         let mut rows = found.set_rows;
         for axis in &left {
-            if rows.len().saturating_mul(axis.len()) > MOST_PANELS {
-                let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+            if rows.len().saturating_mul(axis.len()) > MAX_PANELS {
+                let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
                 return Err(Error::usage(Place::item("--distribution"), "too many panels", help));
             }
             let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();

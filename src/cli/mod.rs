@@ -142,7 +142,7 @@ impl ProfileFlags {
 }
 
 /// More threads than any machine has cores.
-const MOST_THREADS: usize = 4096;
+const MAX_THREADS: usize = 4096;
 
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
@@ -182,9 +182,9 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
 }
 
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
-    if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MOST_THREADS).contains(threads)) {
+    if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MAX_THREADS).contains(threads)) {
         let problem = format!("{threads} threads cannot work");
-        let help = format!("use at least 1 and at most {MOST_THREADS}; more than there are cores serve nothing");
+        let help = format!("use at least 1 and at most {MAX_THREADS}; more than there are cores serve nothing");
         return Err(Error::usage(Place::item("--threads"), problem, help));
     }
     start_threads(cli.common.threads)?;
@@ -250,12 +250,12 @@ mod tests {
     #[test]
     fn a_panic_in_any_worker_is_a_defect_that_is_told_and_no_crash() {
         let in_a_task = || {
-            (0..1000).into_par_iter().for_each(|k| assert!(k != 700, "planted"));
+            (0..1000).into_par_iter().for_each(|k| assert!(k != 700, "shader_patch"));
             Ok(Exit::Ok)
         };
         let in_a_thread = || {
             std::thread::scope(|scope| {
-                scope.spawn(|| panic!("planted"));
+                scope.spawn(|| panic!("shader_patch"));
             });
             Ok(Exit::Ok)
         };

@@ -61,7 +61,7 @@ pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
         let help = "give the folder (--out) of a `lanesweep sample` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = input_file::read(&path, input_file::LARGEST_TABLE_BYTES)?;
+    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
     let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
     if run.lanesweep_estimate != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));

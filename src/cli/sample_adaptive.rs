@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::Exit;
 use super::dry_run::{DryRun, Part};
 use super::sample::{EstimatorFlag, Run, one_headway};
-use super::sample_checks::MOST_HELD;
+use super::sample_checks::MAX_HELD;
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::report::sampling::{EstimateFile, Levels};
@@ -85,7 +85,7 @@ impl Run<'_> {
             units: "samples",
             is_at_most: true,
             // The points of a level or pilot, with their limit states and the fit's responsibilities.
-            more_bytes: lanes.min(MOST_HELD) * (self.density.space.parameters().len() as u64 + 8) * 8,
+            more_bytes: lanes.min(MAX_HELD) * (self.density.space.parameters().len() as u64 + 8) * 8,
             more: "the points that are held at once",
             forecast: None,
             backend: self.opened.backend().describe(),

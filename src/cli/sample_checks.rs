@@ -4,7 +4,7 @@ use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use crate::{Error, Place, Result};
 
 /// Points that an adaptive estimator holds at once, at most.
-pub(super) const MOST_HELD: u64 = 10_000_000;
+pub(super) const MAX_HELD: u64 = 10_000_000;
 
 /// Samples of a run that can be split and resumed, at most: as of `compare`.
 const MAX_SPLIT: u64 = (1 << 48) - 1;
@@ -67,11 +67,11 @@ impl Sample {
                 least("--samples", self.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
             }
             EstimatorFlag::Is => {
-                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?;
-                least("--pilot", self.pilot, 500, MOST_HELD)?;
+                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?;
+                least("--pilot", self.pilot, 500, MAX_HELD)?;
             }
-            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MOST_HELD)?,
-            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MOST_HELD)?,
+            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MAX_HELD)?,
+            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?,
             _ => (),
         }
         if self.bootstrap > 0 {

@@ -72,7 +72,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         let help = "leave --points out: draws of a distribution file are independent";
         return Err(Error::usage(Place::item("--points"), "there are no Sobol points of a distribution file", help));
     }
-    let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
+    let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
     let name = flags.category.as_deref().unwrap_or_default();
     let category = Category::parse(name).ok_or_else(|| {
         let problem = format!("there is no category `{name}`");
@@ -255,7 +255,7 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
         let help = "give the folder (--out) of a `lanesweep sample --distribution` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = input_file::read(&path, input_file::LARGEST_TABLE_BYTES)?;
+    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
     let kept: Kept = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no distribution: {e}")))?;
     if kept.lanesweep_distribution != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", kept.lanesweep_distribution)));

@@ -21,7 +21,7 @@ use crate::{Error, Place, Result};
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "sampling plan";
 /// Largest plan that is read: a density, mostly.
-const LARGEST_PLAN_BYTES: u64 = 1 << 30;
+const MAX_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` of this version";
 
 /// A run of crude Monte Carlo.
@@ -79,7 +79,7 @@ impl PlannedSample {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
     pub fn read(path: &Path) -> Result<(PlannedSample, String)> {
-        let (facts, run_sha256): (SampleFacts, _) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
+        let (facts, run_sha256): (SampleFacts, _) = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
         facts.profile.check(&place)?;

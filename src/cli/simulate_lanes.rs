@@ -154,7 +154,7 @@ fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
              there by itself up to 256 MiB, and with `--keep-plan always`",
         )
     };
-    let text = input_file::read(run, input_file::LARGEST_TABLE_BYTES)?;
+    let text = input_file::read(run, input_file::MAX_TABLE_BYTES)?;
     let recorded: Recorded =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no record of a study: {e}")))?;
     super::rerun::same_engine(recorded.engine).map_err(wrong)?;

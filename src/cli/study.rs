@@ -115,7 +115,7 @@ enum KeepPlan {
 
 impl KeepPlan {
     /// Largest plan that is left, bytes.
-    fn most_bytes(self) -> Option<u64> {
+    fn max_bytes(self) -> Option<u64> {
         match self {
             KeepPlan::Auto => Some(256 << 20),
             KeepPlan::Always => Some(u64::MAX),
@@ -317,12 +317,12 @@ impl Study {
 
     /// For `simulate --from`.
     fn leave_plan(&self, study: &PlannedStudy, results: &mut Results) -> Result<()> {
-        let Some(most_bytes) = self.keep_plan.most_bytes() else { return Ok(()) };
-        if !study.keep(results, RUN_PLAN_FILE, most_bytes)? {
+        let Some(max_bytes) = self.keep_plan.max_bytes() else { return Ok(()) };
+        if !study.keep(results, RUN_PLAN_FILE, max_bytes)? {
             tracing::info!(
                 "the plan is not left in {}: it has more than {} MiB; --keep-plan always leaves it, for `simulate --from`",
                 self.out.display(),
-                most_bytes >> 20
+                max_bytes >> 20
             );
         }
         Ok(())

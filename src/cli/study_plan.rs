@@ -17,7 +17,7 @@ use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Place, Result};
 
 /// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
-const LARGEST_HEAD_BYTES: u64 = 1 << 30;
+const MAX_HEAD_BYTES: u64 = 1 << 30;
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "study plan";
 
@@ -83,9 +83,9 @@ impl PlannedStudy {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn keep(&self, results: &mut Results, name: &str, most_bytes: u64) -> Result<bool> {
+    pub fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
         let (head, records) = (self.seal()?.0, self.study.records()?);
-        if (head.len() + records.len()) as u64 > most_bytes {
+        if (head.len() + records.len()) as u64 > max_bytes {
             return Ok(false);
         }
         results.add_with(name, |out| out.write_all(&head).and_then(|()| out.write_all(records)))?;
@@ -105,7 +105,7 @@ impl PlannedStudy {
     /// # Errors
     /// As [`PlannedStudy::read`].
     pub fn read_some(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<(PlannedStudy, String)> {
-        let (file, run_sha256, mut records) = read_sealed_line(KIND, path, LARGEST_HEAD_BYTES, AGAIN)?;
+        let (file, run_sha256, mut records) = read_sealed_line(KIND, path, MAX_HEAD_BYTES, AGAIN)?;
         let StudyPlanFile { facts, plan } = file;
         let place = Place::file(path);
         facts.score.validate()?;

@@ -62,12 +62,12 @@ pub struct Verify {
 }
 
 /// Random lanes of a model and category at most: their units are named one by one.
-const MOST_LANES: u64 = 100_000_000;
+const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         for (flag, value, most) in
-            [("--lanes", self.lanes, MOST_LANES), ("--threshold-units", self.threshold_units, MOST_LANES / 1000)]
+            [("--lanes", self.lanes, MAX_LANES), ("--threshold-units", self.threshold_units, MAX_LANES / 1000)]
         {
             if value == 0 || value > most {
                 let problem = format!("{value} is not usable; expected 1 to {most}");

@@ -22,7 +22,7 @@ pub(super) const PILOT_FILE: &str = "pilot.json";
 /// Kind of the sealed file.
 pub(super) const KIND: &str = "weighted sampling plan";
 /// Largest plan that is read: a density and a mixture.
-const LARGEST_PLAN_BYTES: u64 = 1 << 30;
+const MAX_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposal FILE --plan-only --out DIR` of this \
                      version";
 
@@ -85,7 +85,7 @@ impl PlannedWeighted {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
     pub fn read(path: &Path) -> Result<(PlannedWeighted, String)> {
-        let (facts, run_sha256): (WeightedFacts, _) = read_sealed(KIND, path, LARGEST_PLAN_BYTES, AGAIN)?;
+        let (facts, run_sha256): (WeightedFacts, _) = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
         facts.profile.check(&place)?;

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use crate::Result;
 use super::backend::{Backend, Chunk, Wanted};
 use super::plan::{Block, LanePlan};
+use crate::Result;
 
 /// Lanes of the first piece: enough for every thread of a common machine.
 const FIRST_PIECE: u64 = 4096;

@@ -7,7 +7,7 @@ use crate::scenario::Tables;
 use super::cpu::lane_result::conclude;
 use super::frame::{Simulation, Start};
 use super::lane_case::LaneCase;
-use super::lane_step::{LaneConstants, LaneState, Seen, Whereabouts, advance};
+use super::lane_step::{LaneConstants, LaneState, OtherState, Seen, advance};
 use super::outcome::Outcome;
 
 /// One step of a lane, for traces.
@@ -56,8 +56,8 @@ pub fn run_lane<R: Real, M: DriverModel<R>>(
     let is_pair = simulation.scene.is_pair;
     let mut state = LaneState::new(simulation, case, start);
     loop {
-        let first = Whereabouts::of(&case.others[0].motion, tables, state.index);
-        let second = if is_pair { Whereabouts::of(&case.others[1].motion, tables, state.index) } else { first };
+        let first = OtherState::of(&case.others[0].motion, tables, state.index);
+        let second = if is_pair { OtherState::of(&case.others[1].motion, tables, state.index) } else { first };
         let places = [first, second];
         let index = state.index;
         let v_ego = state.v_ego;

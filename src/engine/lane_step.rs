@@ -70,7 +70,7 @@ impl<R: Real> LaneConstants<R> {
 
 /// Where another vehicle is at one step.
 #[derive(Debug, Clone, Copy)]
-pub struct Whereabouts<R> {
+pub struct OtherState<R> {
     /// Speed, m/s.
     pub speed: R,
     /// Lateral position, m.
@@ -79,12 +79,12 @@ pub struct Whereabouts<R> {
     pub towards: R,
 }
 
-impl<R: Real> Whereabouts<R> {
+impl<R: Real> OtherState<R> {
     /// Decodes a motion at a step.
     #[inline(always)]
     pub fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
         let lateral = motion.lateral(tables, step);
-        Whereabouts { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
+        OtherState { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
     }
 }
 
@@ -173,7 +173,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
+    places: &[OtherState<R>; 2],
 ) -> Moved<R> {
     let &Simulation { frame, criteria, model, scene, .. } = simulation;
     let &LaneState { index, v_ego, .. } = state;
@@ -244,7 +244,7 @@ fn moved_gap<R: Real, M>(
     simulation: &Simulation<R, M>,
     ego: &Ego<R>,
     other: &OtherConstants<R>,
-    place: &Whereabouts<R>,
+    place: &OtherState<R>,
     gap: R,
     index: u32,
 ) -> R {
@@ -269,7 +269,7 @@ pub(super) fn see<R: Real, M>(
     simulation: &Simulation<R, M>,
     ego: &Ego<R>,
     other: &OtherConstants<R>,
-    place: &Whereabouts<R>,
+    place: &OtherState<R>,
     gap: R,
     index: u32,
     runs: Flag,
@@ -329,7 +329,7 @@ pub(super) fn check<R: Real, M: DriverModel<R>>(
     index: u32,
 ) -> Hazard<R> {
     let model = simulation.model;
-    let hazard = if simulation.scene.at_ease { model.check_at_ease(&seen.view) } else { model.check(&seen.view) };
+    let hazard = if simulation.scene.is_steady { model.check_steady(&seen.view) } else { model.check(&seen.view) };
     let attends = if simulation.scene.in_lane { Flag::TRUE } else { Flag::reached(index, other.attend_from) };
     let attentive = seen.present & attends;
     Hazard { is_unsafe: hazard.is_unsafe & attentive, demand: hazard.demand }

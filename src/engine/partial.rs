@@ -31,25 +31,25 @@ const VERSION: u64 = 3;
 #[serde(bound(serialize = "N: Copy + Serialize", deserialize = "N: Deserialize<'de>"))]
 pub struct Confusion<N = u64> {
     /// TP: S and S' fail.
-    pub both: N,
+    pub tp: N,
     /// FN: only S fails.
-    pub only_s: N,
+    pub fn_: N,
     /// FP: only S' fails.
-    pub only_s_prime: N,
+    pub fp: N,
     /// TN: both pass.
-    pub neither: N,
+    pub tn: N,
 }
 
 // Four numbers instead of four names: a unit of a study has a hundred of them.
 impl<N> From<[N; 4]> for Confusion<N> {
-    fn from([both, only_s, only_s_prime, neither]: [N; 4]) -> Confusion<N> {
-        Confusion { both, only_s, only_s_prime, neither }
+    fn from([tp, fn_, fp, tn]: [N; 4]) -> Confusion<N> {
+        Confusion { tp, fn_, fp, tn }
     }
 }
 
 impl<N> From<Confusion<N>> for [N; 4] {
     fn from(c: Confusion<N>) -> [N; 4] {
-        [c.both, c.only_s, c.only_s_prime, c.neither]
+        [c.tp, c.fn_, c.fp, c.tn]
     }
 }
 
@@ -57,26 +57,26 @@ impl Confusion<u32> {
     /// Counts one lane of S' against its lane of S.
     pub fn count(&mut self, s: bool, s_prime: bool) {
         match (s, s_prime) {
-            (true, true) => self.both += 1,
-            (true, false) => self.only_s += 1,
-            (false, true) => self.only_s_prime += 1,
-            (false, false) => self.neither += 1,
+            (true, true) => self.tp += 1,
+            (true, false) => self.fn_ += 1,
+            (false, true) => self.fp += 1,
+            (false, false) => self.tn += 1,
         }
     }
 
     /// The largest of the four counts.
     pub fn largest(&self) -> u32 {
-        self.both.max(self.only_s).max(self.only_s_prime).max(self.neither)
+        self.tp.max(self.fn_).max(self.fp).max(self.tn)
     }
 }
 
 impl<N: From<u32> + AddAssign> Confusion<N> {
     /// Adds the counts of a unit.
     pub fn add(&mut self, unit: &Confusion<u32>) {
-        self.both += N::from(unit.both);
-        self.only_s += N::from(unit.only_s);
-        self.only_s_prime += N::from(unit.only_s_prime);
-        self.neither += N::from(unit.neither);
+        self.tp += N::from(unit.tp);
+        self.fn_ += N::from(unit.fn_);
+        self.fp += N::from(unit.fp);
+        self.tn += N::from(unit.tn);
     }
 }
 
@@ -309,7 +309,7 @@ impl Partial {
         let mut of_units = vec![0_u64; sums.len()];
         for unit in units {
             for (sum, cell) in of_units.iter_mut().zip(&unit.cells) {
-                *sum += u64::from(cell.both) + u64::from(cell.only_s_prime);
+                *sum += u64::from(cell.tp) + u64::from(cell.fp);
             }
         }
         sums == of_units

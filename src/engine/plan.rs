@@ -6,7 +6,6 @@
 
 use std::ops::Range;
 
-
 use super::frame::Start;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

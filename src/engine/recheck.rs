@@ -146,7 +146,7 @@ impl<'p> Recheck<'p> {
             RecheckBy::Batches => format!(
                 "lane {lane}: {backend} says {found} where steps are left out, a single lane with every step made \
                  {expected}. Nothing that was computed here can be trusted: a promise by which {model} lets steps be \
-                 left out (`safe_gap`, `ignores`, `ease_gap`, `check_at_ease`, `SEES_…`, `KEEPS_…`) does not hold. \
+                 left out (`safe_gap`, `ignores`, `steady_gap`, `check_steady`, `SEES_…`, `KEEPS_…`) does not hold. \
                  Correct it, or take it out of the model"
             ),
             RecheckBy::Nothing | RecheckBy::Lanes => format!(
@@ -234,12 +234,12 @@ mod tests {
             Flag::of(self.1 == FalsePromise::Ignores) | self.0.ignores(lateral_gap, lateral_towards)
         }
 
-        fn ease_gap(&self, v_ego: f32, v_other: f32) -> f32 {
-            if self.1 == FalsePromise::Ease { 0.0 } else { self.0.ease_gap(v_ego, v_other) }
+        fn steady_gap(&self, v_ego: f32, v_other: f32) -> f32 {
+            if self.1 == FalsePromise::Ease { 0.0 } else { self.0.steady_gap(v_ego, v_other) }
         }
 
-        fn check_at_ease(&self, view: &View<f32>) -> Hazard<f32> {
-            let hazard = self.0.check_at_ease(view);
+        fn check_steady(&self, view: &View<f32>) -> Hazard<f32> {
+            let hazard = self.0.check_steady(view);
             Hazard { is_unsafe: hazard.is_unsafe & !Flag::of(self.1 == FalsePromise::Ease), ..hazard }
         }
 

@@ -15,7 +15,7 @@ pub struct Scene {
     /// It also stays in the middle of the ego's lane, and the driver attends to it from the first step on.
     pub in_lane: bool,
     /// Neither contact nor a criterion comes near, and the driver is at ease with it.
-    pub at_ease: bool,
+    pub is_steady: bool,
     /// A step may lead a vehicle's centre past the ego's: contacts between two steps are looked for.
     pub may_cross: bool,
 }
@@ -23,12 +23,12 @@ pub struct Scene {
 impl Scene {
     /// One or two other vehicles of which nothing is known.
     pub fn unknown(is_pair: bool) -> Scene {
-        Scene { is_pair, always_there: false, in_lane: false, at_ease: false, may_cross: true }
+        Scene { is_pair, always_there: false, in_lane: false, is_steady: false, may_cross: true }
     }
 
     /// One other vehicle, in the ego's lane from the first step to the last.
     pub(super) const fn in_lane() -> Scene {
-        Scene { is_pair: false, always_there: true, in_lane: true, at_ease: false, may_cross: false }
+        Scene { is_pair: false, always_there: true, in_lane: true, is_steady: false, may_cross: false }
     }
 
     /// What holds for all of these cases under a model. Where one vehicle comes or goes, there is a second one as
@@ -40,14 +40,14 @@ impl Scene {
         }
         let always_there = cases.iter().all(is_always_there);
         let in_lane = always_there && cases.iter().all(|case| is_in_lane(case, model_index));
-        Scene { is_pair: !always_there, always_there, in_lane, at_ease: false, may_cross: false }
+        Scene { is_pair: !always_there, always_there, in_lane, is_steady: false, may_cross: false }
     }
 
     /// What holds for lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only): they are there,
     /// judged and attended to.
-    pub(super) fn of_second_alone<R: Real>(cases: &[LaneCase<R>]) -> Scene {
+    pub(super) fn of_lead_only<R: Real>(cases: &[LaneCase<R>]) -> Scene {
         let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
-        Scene { is_pair: false, always_there: true, in_lane, at_ease: false, may_cross: false }
+        Scene { is_pair: false, always_there: true, in_lane, is_steady: false, may_cross: false }
     }
 }
 

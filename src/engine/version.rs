@@ -191,12 +191,12 @@ mod tests {
     use super::*;
     use crate::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
     use crate::engine::{Backend, Constants, CpuBackend, Headway, LanePlan, Silent, Start, Wanted, words};
-    use crate::run::study::unit_record;
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
     use crate::run::sampling::{SampleSource, generator_of};
     use crate::run::study::plan::Records;
     use crate::run::study::plan_file::{BlockHead, StudyHead};
+    use crate::run::study::unit_record;
     use crate::scenario::parameterization::{
         Kind, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis,
     };

@@ -150,7 +150,7 @@ impl Profile {
                 ),
             ));
         }
-        let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
+        let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
         Profile::parse(&text, &Place::file(path))
     }
 

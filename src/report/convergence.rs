@@ -53,7 +53,7 @@ const RIGHT_PX: f64 = 14.0;
 /// Empty space between the panels.
 const GAP_PX: f64 = 22.0;
 /// With more points than this a series has no markers: they would hide its line.
-const MOST_MARKERS: usize = 40;
+const MAX_MARKERS: usize = 40;
 
 impl ConvergencePoint {
     /// Why the point cannot be drawn, if so.
@@ -211,7 +211,7 @@ impl Axes {
             beside.into_iter().all(|p| p.probability == 0.0)
         };
         for (k, p) in points.iter().enumerate() {
-            if p.probability > 0.0 && points.len() > MOST_MARKERS && !alone(k) {
+            if p.probability > 0.0 && points.len() > MAX_MARKERS && !alone(k) {
                 continue;
             }
             let [estimate, lower, upper] = [p.probability, p.lower, p.upper].map(number);

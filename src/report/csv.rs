@@ -29,8 +29,7 @@ pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
         vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
     for category in &scores.categories {
         for (at, cell) in category.cells.iter().enumerate() {
-            let failures =
-                if cell.variant == 0 { cell.counts.both } else { cell.counts.both + cell.counts.only_s_prime };
+            let failures = if cell.variant == 0 { cell.counts.tp } else { cell.counts.tp + cell.counts.fp };
             // Cells are variant × model × criterion, these counts variant × model.
             let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
                 let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
@@ -85,10 +84,10 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
                 parameters,
                 cell.model.name().to_owned(),
                 cell.criterion.key().to_owned(),
-                c.both.to_string(),
-                c.only_s.to_string(),
-                c.only_s_prime.to_string(),
-                c.neither.to_string(),
+                c.tp.to_string(),
+                c.fn_.to_string(),
+                c.fp.to_string(),
+                c.tn.to_string(),
                 number(recall(c)),
                 number(precision(c)),
                 number(f1(c)),

@@ -11,7 +11,7 @@ use crate::scenario::{Category, Scenario};
 use crate::stats::density::ParameterSpace;
 
 /// Most bins of a histogram.
-const MOST_BINS: f64 = 40.0;
+const MAX_BINS: f64 = 40.0;
 
 /// Counts of one parameter in equal bins.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,7 +67,7 @@ fn bins(mut values: Vec<f64>) -> Option<(f64, f64, Vec<u64>)> {
     let n = values.len();
     let quartiles = values[n * 3 / 4] - values[n / 4];
     let rule = 2.0 * quartiles / libm::cbrt(n as f64);
-    let least = ((last - first) / MOST_BINS).max(1e-9 * first.abs().max(last.abs())).max(1e-9);
+    let least = ((last - first) / MAX_BINS).max(1e-9 * first.abs().max(last.abs())).max(1e-9);
     // From half the rule's width on: the next plain number is up to 2.5 times as large.
     let width = plain_step((0.5 * rule).max(least));
     let (from, to) = ((first / width).floor(), (last / width).floor());

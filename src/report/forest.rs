@@ -55,7 +55,7 @@ const VALUE_LEFT_PX: f64 = PLOT_PX.1 + 18.0;
 const VALUE_WIDTH_PX: f64 = WIDTH_PX - BORDER_PX - VALUE_LEFT_PX;
 /// With more lines than this the axis stands at the top too.
 const LONG_ROWS: usize = 20;
-const MOST_NUMBERS: usize = 6;
+const MAX_NUMBERS: usize = 6;
 const ROW: Type = Type { size_px: 14, bold: false, colour: INK };
 /// Colour of a reference's band; its estimate is a diamond, that of a row a disc.
 const REFERENCE_COLOUR: &str = "#E69F00";
@@ -130,7 +130,7 @@ impl ForestFigure {
         let mut below = bottom;
         if let Some(axis) = &axis {
             rect(&mut scene, (PLOT_PX.0, top), (PLOT_PX.1, bottom), Color::None, Some((GREY, 1.0)));
-            below = axis.draw_below(&mut scene, (top, bottom), MOST_NUMBERS, false);
+            below = axis.draw_below(&mut scene, (top, bottom), MAX_NUMBERS, false);
             for words in NAME.wrap(&self.axis, TEXT_WIDTH_PX - NAME_WIDTH_PX) {
                 text(&mut scene, ((PLOT_PX.0 + PLOT_PX.1) / 2.0, below + 20.0), &words, NAME, TextAnchor::Middle);
                 below += NAME.line_px();
@@ -163,7 +163,7 @@ impl ForestFigure {
     }
 
     fn grid(&self, scene: &mut Scene, axis: &Axis, (top, bottom): (f64, f64), numbers_on_top: bool) {
-        for tick in axis.ticks(MOST_NUMBERS) {
+        for tick in axis.ticks(MAX_NUMBERS) {
             let Some(label) = &tick.label else { continue };
             line(scene, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
             if numbers_on_top {

@@ -83,9 +83,9 @@ const LEFT_PX: f64 = 56.0;
 const RIGHT_PX: f64 = 16.0;
 const GAP_PX: f64 = 22.0;
 /// With more values than this a line has no markers: they would hide it.
-const MOST_MARKERS: usize = 40;
+const MAX_MARKERS: usize = 40;
 /// With more labelled values than this none is written out.
-const MOST_WORDS: usize = 8;
+const MAX_WORDS: usize = 8;
 
 impl PanelFigure {
     /// The figure as a complete SVG document, 1000 px wide and as high as its panels and texts need. The same figure
@@ -247,7 +247,7 @@ impl PanelSeries {
     ) {
         let is_marked = match self.mark {
             Mark::Points => true,
-            Mark::LineAndPoints => self.values.len() <= MOST_MARKERS,
+            Mark::LineAndPoints => self.values.len() <= MAX_MARKERS,
             Mark::Line | Mark::Bars(_) => false,
         };
         if !is_marked {
@@ -267,7 +267,7 @@ impl PanelSeries {
             scene.elements.push(look.marker(place));
             scene.elements.push(Primitive::GroupEnd);
             // A word per value of a few; with many they would cover one another.
-            if !label.is_empty() && self.values.len() <= MOST_WORDS {
+            if !label.is_empty() && self.values.len() <= MAX_WORDS {
                 let width = TICK.text_px(label);
                 let places = [(9.0, -7.0), (-9.0 - width, -7.0), (9.0, 14.0), (-9.0 - width, 14.0), (9.0, -21.0)];
                 let is_free = |(x, y): &(f64, f64)| {

@@ -14,7 +14,7 @@ use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
 
 /// Recordings that are listed; the rest are in `run.json`.
-const MOST_RECORDINGS: usize = 200;
+const MAX_RECORDINGS: usize = 200;
 
 impl StudyReport {
     /// `report.html`.
@@ -68,7 +68,7 @@ impl StudyReport {
             [label.to_owned()].into_iter().chain(numbers.map(count)).collect()
         });
         let counts = table("Mined scenarios, and what became of them", &header, 1, rows.collect());
-        let shown = run.recordings.iter().take(MOST_RECORDINGS);
+        let shown = run.recordings.iter().take(MAX_RECORDINGS);
         let line = |recording: &RecordingSummary| {
             let files = recording.files.iter().map(|file| format!("\n  {} {}", file.sha256, file.file));
             let (hours, kilometres) = (recording.driven_s / 3600.0, recording.driven_m / 1000.0);
@@ -77,8 +77,8 @@ impl StudyReport {
             format!("{}: {counts}{}", recording.id, files.collect::<String>())
         };
         let mut recordings: Vec<String> = shown.map(line).collect();
-        if run.recordings.len() > MOST_RECORDINGS {
-            recordings.push(format!("… and {} more in run.json", run.recordings.len() - MOST_RECORDINGS));
+        if run.recordings.len() > MAX_RECORDINGS {
+            recordings.push(format!("… and {} more in run.json", run.recordings.len() - MAX_RECORDINGS));
         }
         let mut details = vec![("Thresholds and filters of the mining".to_owned(), toml_text(&run.mining))];
         if !recordings.is_empty() {

@@ -49,7 +49,7 @@ pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<Stri
     let mut rows = Vec::new();
     for category in &scores.categories {
         for (at, &model) in category.models.iter().enumerate() {
-            let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.both);
+            let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.tp);
             let mut row = vec![category.category.label().to_owned(), model.name().to_owned()];
             row.extend(Criterion::ALL.map(|c| readable::count(count(c))));
             row.extend([category.simulations, category.capped[at]].map(readable::count));
@@ -89,7 +89,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
         for criterion in Criterion::ALL {
             let Some(s) = scores.index(0, model, criterion) else { continue };
             let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
-            row.push(readable::count(scores.cells[s].counts.both));
+            row.push(readable::count(scores.cells[s].counts.tp));
             for variant in 1..scores.variants.len() {
                 let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
                 let mut text = cell.map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));

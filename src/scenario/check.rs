@@ -34,7 +34,7 @@ pub(super) struct Problem {
 /// What no type says: lengths, signs and what a category needs.
 pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
-    expect((LEAST_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
+    expect((MIN_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
     above_zero("lane_width", s.lane_width)?;
     at_least_zero("ego.v0", s.ego.v0)?;
     above_zero("ego.length", s.ego.length)?;
@@ -86,7 +86,7 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
 }
 
 /// Least sample rate, Hz: no motion can be told at a lower one.
-const LEAST_RATE_HZ: f64 = 0.1;
+const MIN_RATE_HZ: f64 = 0.1;
 
 /// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
 const LARGEST: f64 = 1e6;

@@ -27,11 +27,11 @@ pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile
     for row in 1.. {
         line.clear();
         let place = Place::file(path).row(row);
-        let mut up_to_longest = reader.by_ref().take(LONGEST_LINE_BYTES);
+        let mut up_to_longest = reader.by_ref().take(MAX_LINE_BYTES);
         match up_to_longest.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))? as u64 {
             0 => break,
-            LONGEST_LINE_BYTES => {
-                let problem = format!("the line is longer than {} MiB", LONGEST_LINE_BYTES >> 20);
+            MAX_LINE_BYTES => {
+                let problem = format!("the line is longer than {} MiB", MAX_LINE_BYTES >> 20);
                 return Err(Error::input(place, problem, "expected one scenario a line"));
             }
             _ => (),
@@ -88,7 +88,7 @@ fn write_lines<'a>(
 }
 
 /// Longest line: hours at 1000 samples a second fit.
-const LONGEST_LINE_BYTES: u64 = 64 << 20;
+const MAX_LINE_BYTES: u64 = 64 << 20;
 
 /// What a line was refused for, with the field where one can be named.
 fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {

@@ -40,9 +40,9 @@ const WIDTH_M: f64 = 1.9;
 /// Samples per second unless told otherwise.
 const RATE_HZ: f64 = 25.0;
 /// A scenario lasts at least so long unless told otherwise, s.
-const SHORTEST_S: f64 = 1.0;
+const MIN_DURATION_S: f64 = 1.0;
 /// And at most so long, s: the time cap of the paper's profile.
-const LONGEST_S: f64 = 120.0;
+const MAX_DURATION_S: f64 = 120.0;
 /// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
@@ -184,7 +184,7 @@ fn of_row(
     };
     parameters.settle(doubts, place);
     let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
-    let case = plain.case(LONGEST_S)?;
+    let case = plain.case(MAX_DURATION_S)?;
     let in_range = |key: &str, default: f64, least: f64, most: f64| match value(key) {
         None => Ok(default),
         Some(value) if (least..=most).contains(&value) => Ok(value),
@@ -194,7 +194,7 @@ fn of_row(
         }
     };
     let rate_hz = in_range("rate", RATE_HZ, 1.0, 1000.0)?;
-    let duration_s = in_range("duration", case.horizon_s.max(SHORTEST_S), 0.1, LONGEST_S)?;
+    let duration_s = in_range("duration", case.horizon_s.max(MIN_DURATION_S), 0.1, MAX_DURATION_S)?;
     let (gap0, thw0) = match (value("gap"), value("thw")) {
         (Some(_), Some(_)) => {
             return Err(Error::usage(

@@ -11,9 +11,9 @@ use sha2::{Digest, Sha256};
 use crate::{Error, Place, Result};
 
 /// Largest file of settings (profiles, exposures): those that the program writes have a few kilobytes.
-pub(crate) const LARGEST_SETTINGS_BYTES: u64 = 4 << 20;
+pub(crate) const MAX_SETTINGS_BYTES: u64 = 4 << 20;
 /// Largest table that is held in memory as a whole: a few million rows.
-pub(crate) const LARGEST_TABLE_BYTES: u64 = 256 << 20;
+pub(crate) const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Opens a regular file, or a link to one.
 ///

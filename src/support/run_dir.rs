@@ -266,7 +266,7 @@ struct Listed {
 impl Listed {
     /// One that cannot be read says nothing.
     fn read(record: &Path) -> Listed {
-        let text = input_file::read(record, input_file::LARGEST_TABLE_BYTES).unwrap_or_default();
+        let text = input_file::read(record, input_file::MAX_TABLE_BYTES).unwrap_or_default();
         serde_json::from_slice(&text).unwrap_or_default()
     }
 }
@@ -274,7 +274,7 @@ impl Listed {
 /// The files beside a record that it lists: plain names of results only.
 fn listed(record: &Path) -> Vec<String> {
     let files = if record.extension().is_some_and(|ending| ending == "csv") {
-        let text = input_file::read_text(record, input_file::LARGEST_TABLE_BYTES).unwrap_or_default();
+        let text = input_file::read_text(record, input_file::MAX_TABLE_BYTES).unwrap_or_default();
         let rows = csv::Reader::from_reader(text.as_bytes()).into_records().flatten();
         rows.flat_map(|row| row.iter().take(2).map(str::to_owned).collect::<Vec<_>>()).collect()
     } else {
@@ -299,7 +299,7 @@ pub fn is_listed(dir: &Path, name: &str) -> bool {
 
 /// The files of a folder whose run ended while they got their names; `None` where none did.
 pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
-    let text = input_file::read(&dir.join(UNFINISHED), input_file::LARGEST_TABLE_BYTES).ok()?;
+    let text = input_file::read(&dir.join(UNFINISHED), input_file::MAX_TABLE_BYTES).ok()?;
     let found: Unfinished = serde_json::from_slice(&text).ok()?;
     // Between the record's name and the end: all is there.
     if is_result_name(&found.record) && dir.join(&found.record).exists() {

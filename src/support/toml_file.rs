@@ -60,7 +60,7 @@ fn meant(message: &str) -> Option<&str> {
 /// # Errors
 /// As [`parse`]; [`Error::Io`]; [`Error::Input`] for what is no text file of a few megabytes at most.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
-    parse(&input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?, &Place::file(path), help)
+    parse(&input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }
 
 #[cfg(test)]

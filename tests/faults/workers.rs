@@ -53,9 +53,9 @@ impl Session for FailingSession<'_> {
             return self.inner.run(units, wanted);
         }
         if self.how == Failure::Panic {
-            rayon::join(|| panic!("planted"), || ());
+            rayon::join(|| panic!("shader_patch"), || ());
         }
-        Err(Error::device("planted", "the device is lost", ""))
+        Err(Error::device("shader_patch", "the device is lost", ""))
     }
 
     fn chunk_lanes(&self, _: Wanted) -> u64 {

@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::io::Write;
 
 /// Most that one input may hold at once, bytes.
-pub const MOST_BYTES: isize = 1 << 30;
+pub const MAX_BYTES: isize = 1 << 30;
 
 /// The input that a thread works on outside of any.
 pub const NO_INPUT: u64 = u64::MAX;
@@ -24,7 +24,7 @@ impl Counting {
     /// Counts a change; false where the input has asked for too much.
     fn count(change: isize) -> bool {
         let live = LIVE.get() + change;
-        if change > 0 && live > MOST_BYTES && INPUT.get() != NO_INPUT {
+        if change > 0 && live > MAX_BYTES && INPUT.get() != NO_INPUT {
             let mut text = [0_u8; 128];
             let (input, mib) = (INPUT.get(), live >> 20);
             let _ = writeln!(&mut text[..], "input {input} asks for {mib} MiB: refused, so this process ends");

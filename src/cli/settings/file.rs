@@ -25,7 +25,7 @@ pub(super) struct Line {
 /// [`Error::Usage`] with the line: what is not TOML, an unknown table or key, a value that the key does not take.
 /// [`Error::Io`]; [`Error::Input`] for what is no text file of a few megabytes at most.
 pub(super) fn read(path: &Path, keys: &[Key]) -> Result<Vec<Line>> {
-    parse(&input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?, &Place::file(path), keys)
+    parse(&input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?, &Place::file(path), keys)
 }
 
 /// The values in a text; errors name `place`.

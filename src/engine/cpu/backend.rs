@@ -10,7 +10,7 @@ use crate::Result;
 use crate::engine::backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
 use crate::engine::cpu::instructions::Instructions;
 use crate::engine::cpu::runner::LaneRunner;
-use crate::engine::cpu::series::most_entries;
+use crate::engine::cpu::series::max_entries;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::LanePlan;
 use crate::model::scalar::Real;
@@ -191,7 +191,7 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
         let per_unit_and_model = variants * self.plan.headways.len().max(1) as u64;
         let threads = rayon::current_num_threads() as u64;
         let vehicles = if block.category == Category::CutOut { 2 } else { 1 };
-        let entries = variants * vehicles * most_entries(self.plan.profile.step_cap());
+        let entries = variants * vehicles * max_entries(self.plan.profile.step_cap());
         let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_ENTRIES / entries).max(1);
         let least = SMALL_TASK.div_ceil(per_unit_and_model).min(most);
         units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)

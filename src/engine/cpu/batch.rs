@@ -12,13 +12,13 @@ use crate::model::flag::Flag;
 use crate::model::scalar::Real;
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
-use crate::engine::cpu::fast_forward::calm_steps;
+use crate::engine::cpu::fast_forward::quiescent_steps;
 use crate::engine::cpu::pending::{Lanes, ROOM, Waiting};
 use crate::engine::cpu::rules::Rules;
-use crate::engine::cpu::steady_following::ease_steps;
+use crate::engine::cpu::steady_following::steady_steps;
 use crate::engine::cpu::transpose::Window;
 use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, LaneState, Whereabouts, advance};
+use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
 
 /// Batches of a burst.
 pub(in crate::engine) const BATCHES: usize = 3;
@@ -95,7 +95,7 @@ impl Batch {
 
     /// A lane after its last step, and the other vehicles at that step.
     #[inline(always)]
-    pub fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [Whereabouts<f32>; 2]) {
+    pub fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
         let state = self.lanes.state.at(k);
         let row = (state.index - 1 - self.from[k]) as usize;
         (self.lanes.fixed.at(k), state, places(&self.windows, row, k))
@@ -121,7 +121,7 @@ impl Batch {
             let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
             let index = moving.index[k];
-            let is_worth_a_look = index > ego.restless_until[k];
+            let is_worth_a_look = index > ego.eventful_until[k];
             let is_still = index > ego.still_from[k] && moving.gap[k] == self.gaps[k];
             calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
             leaving |= u16::from(index >= ego.leaves_from[k]) << k;
@@ -131,9 +131,9 @@ impl Batch {
         self.leaving = leaving & !finished & !self.free;
     }
 
-    /// After a burst at ease, which moved only what [`StateArrays::set_at_ease`] says.
+    /// After a burst at ease, which moved only what [`StateArrays::set_steady_following`] says.
     #[inline(always)]
-    fn end_at_ease(&mut self) {
+    fn end_steady_following(&mut self) {
         let LaneArrays { fixed, state } = &mut self.lanes;
         let moving = &mut state.moving;
         // The state before the last step stands where that step read it.
@@ -149,21 +149,21 @@ impl Batch {
     }
 
     /// Leaves out calm steps of a lane where it pays, else looks again later.
-    pub fn leave_out_calm<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
+    pub fn jump_ahead<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
         let (constants, state, places) = self.last_step(k);
         let LaneArrays { fixed, state: arrays } = &mut self.lanes;
-        let restless_until = &mut fixed.ego.restless_until[k];
-        match calm_steps(simulation, &constants, &state, &places) {
+        let eventful_until = &mut fixed.ego.eventful_until[k];
+        match quiescent_steps(simulation, &constants, &state, &places) {
             Some(calm) => {
                 arrays.moving.index[k] += calm.steps;
                 arrays.moving.gap[k] = calm.gaps[0];
                 arrays.ahead.gap[k] = calm.gaps[1];
-                *restless_until = arrays.moving.index[k];
+                *eventful_until = arrays.moving.index[k];
             }
             None => {
                 // One that stood still was looked at for that, and may be due later for the other reason.
-                if state.index > *restless_until {
-                    *restless_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
+                if state.index > *eventful_until {
+                    *eventful_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
                 }
                 fixed.ego.still_from[k] = state.index + LOOK_AGAIN;
             }
@@ -186,7 +186,11 @@ impl Batch {
     }
 
     /// Lets lanes go that are at ease for long enough; the others are asked again later.
-    pub fn set_apart_at_ease<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, apart: &mut Waiting) {
+    pub fn set_apart_steady_following<M: DriverModel<f32>>(
+        &mut self,
+        simulation: &Simulation<f32, M>,
+        apart: &mut Waiting,
+    ) {
         while self.leaving != 0 {
             let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
@@ -195,7 +199,7 @@ impl Batch {
                 continue;
             }
             let (constants, state, places) = self.last_step(k);
-            let steps = ease_steps(simulation, &constants, &state, &places[0]);
+            let steps = steady_steps(simulation, &constants, &state, &places[0]);
             if steps < FEWEST_AT_EASE {
                 self.lanes.fixed.ego.leaves_from[k] = state.index + LOOK_AGAIN;
             } else if apart.has_room(1) {
@@ -217,7 +221,7 @@ impl Batch {
             let k = used_up.trailing_zeros() as usize;
             used_up &= used_up - 1;
             let (constants, state) = (self.lanes.fixed.at(k), self.lanes.state.at(k));
-            let steps = ease_steps(simulation, &constants, &state, &places(&self.windows, ROWS - 1, k)[0]);
+            let steps = steady_steps(simulation, &constants, &state, &places(&self.windows, ROWS - 1, k)[0]);
             if steps < ROWS as u32 {
                 back.add_lane(&self.lanes, k, state.index + LOOK_AGAIN);
                 self.free |= 1 << k;
@@ -263,8 +267,8 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
         for (furthest, &index) in furthest.iter_mut().zip(&batch.from) {
             *furthest = index.max(*furthest);
         }
-        let at_ease = rules.scene.at_ease;
-        let is_seen = [true, !at_ease, M::SEES_LATERAL_SPEED && !at_ease];
+        let is_steady = rules.scene.is_steady;
+        let is_seen = [true, !is_steady, M::SEES_LATERAL_SPEED && !is_steady];
         let Batch { lanes, windows, from, .. } = batch;
         for (windows, other) in windows.iter_mut().zip(&lanes.fixed.others).take(1 + usize::from(rules.scene.is_pair)) {
             for ((window, tracks), is_seen) in windows.iter_mut().zip(&other.tracks).zip(is_seen) {
@@ -277,7 +281,7 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
     }
     // No lane steps beyond the cap, so no step asks for it; one at ease is far from it.
     let left = frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize;
-    let rows = if rules.scene.at_ease { ROWS } else { left.min(ROWS) };
+    let rows = if rules.scene.is_steady { ROWS } else { left.min(ROWS) };
     for row in 0..rows {
         for batch in batches.iter_mut() {
             let Batch { lanes, after, windows, .. } = batch;
@@ -292,8 +296,8 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
         if rows % 2 == 1 {
             batch.lanes.state = batch.after;
         }
-        if rules.scene.at_ease {
-            batch.end_at_ease();
+        if rules.scene.is_steady {
+            batch.end_steady_following();
         }
         batch.find_finished(frame.step_cap);
     }
@@ -311,9 +315,9 @@ fn step<M: DriverModel<f32>>(
     after: &mut StateArrays<LANES>,
 ) {
     for k in 0..LANES {
-        if rules.scene.at_ease {
-            let moved = advance(simulation, &fixed.at(k), &before.at_ease(k), &places(windows, row, k));
-            after.set_at_ease::<M>(k, &moved.state);
+        if rules.scene.is_steady {
+            let moved = advance(simulation, &fixed.at(k), &before.is_steady(k), &places(windows, row, k));
+            after.set_steady_following::<M>(k, &moved.state);
         } else {
             let moved = advance(simulation, &fixed.at(k), &before.at(k), &places(windows, row, k));
             after.set::<M>(k, &moved.state, rules);
@@ -323,10 +327,10 @@ fn step<M: DriverModel<f32>>(
 
 /// The other vehicles as a lane sees them at a row.
 #[inline(always)]
-fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [Whereabouts<f32>; 2] {
+fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [OtherState<f32>; 2] {
     let place = |vehicle: usize| {
         let [speed, position, towards] = &windows[vehicle];
-        Whereabouts { speed: speed.rows[row][k], position: position.rows[row][k], towards: towards.rows[row][k] }
+        OtherState { speed: speed.rows[row][k], position: position.rows[row][k], towards: towards.rows[row][k] }
     };
     [place(0), place(1)]
 }

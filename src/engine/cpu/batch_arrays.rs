@@ -55,7 +55,7 @@ pub(in crate::engine) struct EgoArrays<const N: usize> {
     width: [f32; N],
     pub horizon: [u32; N],
     /// Up to this step it is not worth looking for calm ones.
-    pub restless_until: [u32; N],
+    pub eventful_until: [u32; N],
     /// From this step on a lane may stand still: the other vehicles keep speed and lateral position.
     pub still_from: [u32; N],
     /// From this step on it may belong into batches of another kind.
@@ -211,7 +211,7 @@ impl<const N: usize> LaneArrays<N> {
         fill(&mut self.fixed.ego.width, from, constants.ego_width);
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
         let steady_from = steady_from(tracks);
-        fill(&mut self.fixed.ego.restless_until, from, steady_from);
+        fill(&mut self.fixed.ego.eventful_until, from, steady_from);
         fill(&mut self.fixed.ego.still_from, from, steady_from);
         fill(&mut self.fixed.ego.leaves_from, from, leaves_from);
         let moving = &mut self.state.moving;
@@ -246,7 +246,7 @@ impl<const N: usize> LaneArrays<N> {
         if vehicle == 1 {
             self.state.moving.gap[to] = state.ahead.gap[k];
             let steady_from = lanes.steady_from(k, 1);
-            (self.fixed.ego.restless_until[to], self.fixed.ego.still_from[to]) = (steady_from, steady_from);
+            (self.fixed.ego.eventful_until[to], self.fixed.ego.still_from[to]) = (steady_from, steady_from);
         }
     }
 
@@ -336,7 +336,7 @@ impl<const N: usize> StateArrays<N> {
     /// Of one lane at ease, as far as its steps look at it: they are not the first, the reaction time is over, and
     /// nothing is judged.
     #[inline(always)]
-    pub fn at_ease(&self, k: usize) -> LaneState<f32> {
+    pub fn is_steady(&self, k: usize) -> LaneState<f32> {
         let moving = &self.moving;
         let record = Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: f32::INFINITY };
         LaneState {
@@ -353,7 +353,7 @@ impl<const N: usize> StateArrays<N> {
 
     /// What moves in a step at ease.
     #[inline(always)]
-    pub fn set_at_ease<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
+    pub fn set_steady_following<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
         self.moving.v_ego[k] = lane.v_ego;
         self.moving.gap[k] = lane.gaps[0];
         if M::KEEPS_DECELERATION {
@@ -457,7 +457,7 @@ mod tests {
         assert_eq!((alone.others[0].half_lengths, alone.others[0].attend_from, alone.horizon), (33.0, 34, 7));
         assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
         assert!(waiting.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
-        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
+        assert_eq!((waiting.fixed.ego.eventful_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
         assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
 
         // One that goes on with its first vehicle keeps all it has but the step at which it leaves.
@@ -465,7 +465,7 @@ mod tests {
         waiting.set_single(31, &batch, 5, 0, 25);
         assert_eq!(waiting.fixed.at(31).others[0].half_lengths, 1.0);
         assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, 25));
-        assert_eq!((waiting.fixed.ego.restless_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[0]));
+        assert_eq!((waiting.fixed.ego.eventful_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[0]));
         assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;

@@ -2,7 +2,7 @@
 //!
 //! Once the other vehicles have ended their manoeuvres and the ego keeps its speed, a lane often goes on for minutes in
 //! which only the gap changes, each step by the same number, until it is small enough for the driver or a criterion.
-//! Those steps are counted instead of made: [`calm_gap`] is the gap down to which all is well, [`carried`] tells how many
+//! Those steps are counted instead of made: [`quiescent_gap`] is the gap down to which all is well, [`carried`] tells how many
 //! steps the lane stays above it, and where that leaves the gap to the bit.
 //!
 //! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Without a promise go
@@ -16,7 +16,7 @@ use crate::model::scalar::Real;
 use crate::engine::cpu::batch_arrays::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{
-    Ego, LaneConstants, LaneState, OtherConstants, Record, Whereabouts, advance, check, criteria_safe_gap, judge, see,
+    Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, judge, see,
 };
 
 /// Fewer steps are sooner made than counted.
@@ -32,11 +32,11 @@ pub(in crate::engine) struct Calm {
 /// How many of a lane's next steps need not be made, if it pays: neither the driver nor a criterion nor the end of the
 /// lane comes before. `state` is between two steps, at `state.index` at least 1; the other vehicles keep speed and
 /// lateral position of `places` for ever.
-pub(in crate::engine) fn calm_steps<M: DriverModel<f32>>(
+pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
-    places: &[Whereabouts<f32>; 2],
+    places: &[OtherState<f32>; 2],
 ) -> Option<Calm> {
     let index = state.index;
     // A burst is left to be made, so that the lane's end is reached as any other's.
@@ -71,7 +71,7 @@ pub(in crate::engine) fn calm_steps<M: DriverModel<f32>>(
             continue;
         }
         settled &= state.v_ego <= place.speed;
-        lowest[vehicle] = Some(calm_gap(simulation, lane, state, places, vehicle)?);
+        lowest[vehicle] = Some(quiescent_gap(simulation, lane, state, places, vehicle)?);
     }
     if settled || state.v_ego <= 0.0 {
         // The step at the horizon ends the lane.
@@ -101,7 +101,7 @@ fn is_still<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
-    places: &[Whereabouts<f32>; 2],
+    places: &[OtherState<f32>; 2],
 ) -> bool {
     // Seldom so: what it is about comes first.
     let change = (places[0].speed - state.v_ego) * simulation.frame.dt;
@@ -129,7 +129,7 @@ pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     other: &OtherConstants<f32>,
-    place: &Whereabouts<f32>,
+    place: &OtherState<f32>,
 ) -> Flag {
     let lateral_gap = place.position.abs() - other.half_widths;
     let judged = simulation.criteria.sees(0.0, other.half_lengths, lateral_gap, place.position, lane.ego_width);
@@ -137,11 +137,11 @@ pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
 }
 
 /// A gap down to which nothing happens with a vehicle; none where it is not in the ego's lane, or already too near.
-fn calm_gap<M: DriverModel<f32>>(
+fn quiescent_gap<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
-    places: &[Whereabouts<f32>; 2],
+    places: &[OtherState<f32>; 2],
     vehicle: usize,
 ) -> Option<f32> {
     let (other, place) = (&lane.others[vehicle], &places[vehicle]);
@@ -273,14 +273,14 @@ mod tests {
     }
 
     /// A lane among vehicles that keep speed and lateral position, somewhere in its run.
-    fn lane(number: u64) -> (LaneConstants<f32>, LaneState<f32>, [Whereabouts<f32>; 2]) {
+    fn lane(number: u64) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
         let mut drawn = 0;
         let mut between = |least: f32, most: f32| {
             drawn += 1;
             least + (most - least) * f32::from(mixed(64 * number + drawn) as u16) / 65536.0
         };
         let v_ego = between(0.0, 40.0);
-        let place = |between: &mut dyn FnMut(f32, f32) -> f32| Whereabouts {
+        let place = |between: &mut dyn FnMut(f32, f32) -> f32| OtherState {
             speed: (v_ego + between(-8.0, 6.0)).max(0.0),
             position: if between(0.0, 1.0) < 0.6 { between(-1.0, 1.0) } else { between(-5.0, 5.0) },
             towards: if between(0.0, 1.0) < 0.8 { 0.0 } else { between(-1.0, 1.0) },
@@ -324,9 +324,12 @@ mod tests {
         let (mut found, mut lasting) = (0, 0);
         for number in 0..20_000 {
             let (lane, start, places) = lane(number);
-            let calm = calm_steps(simulation, &lane, &start, &places);
+            let calm = quiescent_steps(simulation, &lane, &start, &places);
             let slowing = LaneState { v_before: start.v_ego + 0.1, ..start };
-            assert!(!M::SEES_OWN_ACCELERATION || calm_steps(simulation, &lane, &slowing, &places).is_none(), "{name}");
+            assert!(
+                !M::SEES_OWN_ACCELERATION || quiescent_steps(simulation, &lane, &slowing, &places).is_none(),
+                "{name}"
+            );
             let Some(calm) = calm else { continue };
             make_one_by_one(simulation, &lane, &start, &places, &calm, &format!("{name}, lane {number}"));
             found += 1;
@@ -340,7 +343,7 @@ mod tests {
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
         start: &LaneState<f32>,
-        places: &[Whereabouts<f32>; 2],
+        places: &[OtherState<f32>; 2],
         calm: &Calm,
         name: &str,
     ) -> LaneState<f32> {
@@ -376,7 +379,7 @@ mod tests {
         for number in 0..200 {
             let (lane, start, places) = lane(number);
             let speed = start.v_ego.max(5.0) - 0.01 * (number % 100) as f32;
-            let place = Whereabouts { speed, position: 0.0, towards: 0.0 };
+            let place = OtherState { speed, position: 0.0, towards: 0.0 };
             let always =
                 OtherConstants { present_from: 0, present_until: Flag::LATEST_STEP, attend_from: 0, ..lane.others[0] };
             let lane = LaneConstants { others: [always; 2], horizon: Flag::LATEST_STEP, ..lane };
@@ -385,7 +388,7 @@ mod tests {
             state.gaps = [state.v_ego * (1.5 + (number % 7) as f32 / 2.0); 2];
             let places = [place, places[1]];
             while !state.over.holds() && state.index < frame.step_cap {
-                let Some(calm) = calm_steps(&simulation, &lane, &state, &places) else {
+                let Some(calm) = quiescent_steps(&simulation, &lane, &state, &places) else {
                     state = advance(&simulation, &lane, &state, &places).state;
                     continue;
                 };

@@ -6,7 +6,7 @@ use crate::model::scalar::Real;
 
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{
-    Ego, LaneConstants, LaneState, OtherConstants, Seen, Whereabouts, aborts, is_settled, is_touched, see,
+    Ego, LaneConstants, LaneState, OtherConstants, OtherState, Seen, aborts, is_settled, is_touched, see,
 };
 use crate::engine::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
@@ -20,7 +20,7 @@ pub trait Ending: From<Outcome<f32>> {
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
         state: &LaneState<f32>,
-        places: &[Whereabouts<f32>; 2],
+        places: &[OtherState<f32>; 2],
     ) -> Self;
 }
 
@@ -38,7 +38,7 @@ impl Ending for Verdicts {
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
         state: &LaneState<f32>,
-        places: &[Whereabouts<f32>; 2],
+        places: &[OtherState<f32>; 2],
     ) -> Self {
         verdicts(simulation, lane, state, places)
     }
@@ -52,7 +52,7 @@ impl Ending for Outcome<f32> {
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
         state: &LaneState<f32>,
-        places: &[Whereabouts<f32>; 2],
+        places: &[OtherState<f32>; 2],
     ) -> Self {
         conclude(simulation, lane, state, places)
     }
@@ -65,7 +65,7 @@ pub fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
+    places: &[OtherState<R>; 2],
 ) -> Verdicts {
     let [first, second] = last_seen(simulation, lane, state, places);
     let scene = simulation.scene;
@@ -92,7 +92,7 @@ pub fn conclude<R: Real, M>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
+    places: &[OtherState<R>; 2],
 ) -> Outcome<R> {
     let &Simulation { frame, criteria, scene, .. } = simulation;
     let (index, v_ego) = (state.index - 1, state.v_before);
@@ -140,7 +140,7 @@ fn last_seen<R: Real, M>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
-    places: &[Whereabouts<R>; 2],
+    places: &[OtherState<R>; 2],
 ) -> [Seen<R>; 2] {
     let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
     let index = state.index - 1;

@@ -11,12 +11,12 @@ use crate::engine::cpu::batch_arrays::{NEVER_LEAVES, ROWS};
 use crate::engine::cpu::fast_forward::is_out_of_the_way;
 use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, Whereabouts};
+use crate::engine::lane_step::{LaneConstants, OtherState};
 
 /// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
 /// [`NEVER_LEAVES`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
 /// `entries`.
-pub(in crate::engine) fn alone_from<M: DriverModel<f32>>(
+pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     tracks: &[VehicleTracks; 2],
@@ -36,7 +36,7 @@ pub(in crate::engine) fn alone_from<M: DriverModel<f32>>(
     let is_out = |step: u32, count: usize| {
         let mut is_out = Flag::TRUE;
         for (&position, &towards) in at(position, step, count).iter().zip(at(towards, step, count)) {
-            let place = Whereabouts { speed: 0.0, position, towards };
+            let place = OtherState { speed: 0.0, position, towards };
             is_out = is_out & is_out_of_the_way(simulation, lane, principal, &place);
         }
         is_out.holds()
@@ -91,19 +91,19 @@ mod tests {
         name: &str,
     ) -> u32 {
         let cases = std::slice::from_ref(case);
-        let alone = &Simulation { scene: Scene::of_second_alone(cases), ..*pair };
+        let alone = &Simulation { scene: Scene::of_lead_only(cases), ..*pair };
         assert!(alone.scene.in_lane, "{name}");
         let mut series = Series::default();
         let tracks = series.unroll(case, tables, pair.frame.step_cap);
         let constants = LaneConstants::new(pair, case);
-        let from = alone_from(pair, &constants, &tracks, series.entries());
+        let from = lead_only_from(pair, &constants, &tracks, series.entries());
         let second = constants.others[1];
         let on_its_own = LaneConstants { others: [second; 2], ..constants };
         let mut state = LaneState::new(pair, case, Start::Headway(1.4));
         let mut other: Option<LaneState<f32>> = None;
         let mut saved = 0;
         while !state.over.holds() && state.index < pair.frame.step_cap {
-            let places = [0, 1].map(|k: usize| Whereabouts::of(&case.others[k].motion, tables, state.index));
+            let places = [0, 1].map(|k: usize| OtherState::of(&case.others[k].motion, tables, state.index));
             if state.index >= from && other.is_none() {
                 other = Some(LaneState { gaps: [state.gaps[1]; 2], ..state });
             }
@@ -117,7 +117,7 @@ mod tests {
         }
         // The step before it may matter: the first vehicle is in the way, or the second not there or not attended to.
         if from != NEVER_LEAVES && from > second.present_from.max(second.attend_from) {
-            let first = Whereabouts::of(&case.others[0].motion, tables, from - 1);
+            let first = OtherState::of(&case.others[0].motion, tables, from - 1);
             let present = from - 1 < constants.others[0].present_until;
             let is_out = is_out_of_the_way(pair, &constants, &constants.others[0], &first).holds();
             assert!(present && !is_out, "{name}");

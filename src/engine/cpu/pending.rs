@@ -5,7 +5,7 @@ use crate::model::driver::DriverModel;
 
 use crate::engine::cpu::batch::Slots;
 use crate::engine::cpu::batch_arrays::{LANES, LaneArrays, NEVER_LEAVES, Words, steady_from};
-use crate::engine::cpu::lead_only::alone_from;
+use crate::engine::cpu::lead_only::lead_only_from;
 use crate::engine::cpu::series::VehicleTracks;
 use crate::engine::frame::{Simulation, Start};
 use crate::engine::lane_case::LaneCase;
@@ -48,7 +48,7 @@ pub(in crate::engine) struct Waiting {
     /// Continuous values are wanted, not verdicts alone.
     values: bool,
     /// Lanes with a single vehicle are asked whether they are at ease.
-    asks_ease: bool,
+    asks_steady: bool,
     /// The first that waits.
     first: usize,
     /// The end of them.
@@ -62,8 +62,17 @@ pub(in crate::engine) struct Waiting {
 
 impl Waiting {
     /// At the beginning of a stream.
-    pub fn new(values: bool, asks_ease: bool) -> Self {
-        Waiting { lanes: Box::new(LaneArrays::idle()), values, asks_ease, first: 0, end: 0, case: 0, start: 0, lane: 0 }
+    pub fn new(values: bool, asks_steady: bool) -> Self {
+        Waiting {
+            lanes: Box::new(LaneArrays::idle()),
+            values,
+            asks_steady,
+            first: 0,
+            end: 0,
+            case: 0,
+            start: 0,
+            lane: 0,
+        }
     }
 
     /// How many wait.
@@ -114,7 +123,7 @@ impl Waiting {
 
     /// Adds a lane that goes on with the second vehicle alone.
     pub fn add_alone(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
-        let leaves_from = if self.asks_ease { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
+        let leaves_from = if self.asks_steady { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
         self.add_single(lanes, k, 1, leaves_from);
     }
 
@@ -152,8 +161,8 @@ impl Waiting {
         let tracks = &stream.tracks[self.case];
         let constants = LaneConstants::new(simulation, case);
         let leaves_from = match sets_apart {
-            Some(entries) => alone_from(simulation, &constants, tracks, entries),
-            None if self.asks_ease => steady_from(&tracks[..1]) + 1,
+            Some(entries) => lead_only_from(simulation, &constants, tracks, entries),
+            None if self.asks_steady => steady_from(&tracks[..1]) + 1,
             None => NEVER_LEAVES,
         };
         let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];

@@ -22,7 +22,7 @@ impl Rules {
     pub(in crate::engine) const SETS: u32 = 26;
 
     const IN_LANE: u32 = 20;
-    const AT_EASE: u32 = 21;
+    const STEADY_FOLLOWING: u32 = 21;
     const CROSSING: u32 = 22;
 
     /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
@@ -49,14 +49,14 @@ impl Rules {
     }
 
     /// Of the steps at ease of lanes with a single vehicle, where only verdicts are wanted.
-    pub(in crate::engine) fn at_ease() -> Rules {
-        Rules::from_bits(Rules::AT_EASE)
+    pub(in crate::engine) fn is_steady() -> Rules {
+        Rules::from_bits(Rules::STEADY_FOLLOWING)
     }
 
     /// As a number below [`Rules::SETS`].
     pub(in crate::engine) const fn bits(self) -> u32 {
-        if self.scene.at_ease {
-            return Rules::AT_EASE;
+        if self.scene.is_steady {
+            return Rules::STEADY_FOLLOWING;
         }
         if self.scene.in_lane {
             // Nothing is seen across the road, so there is no gate.
@@ -72,13 +72,13 @@ impl Rules {
     /// From that number.
     pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
         if bits >= Rules::CROSSING {
-            let scene = Scene { is_pair: true, always_there: false, in_lane: false, at_ease: false, may_cross: true };
+            let scene = Scene { is_pair: true, always_there: false, in_lane: false, is_steady: false, may_cross: true };
             let sees_overlap = (bits - Rules::CROSSING) & 1 != 0;
             let is_verdict_only = (bits - Rules::CROSSING) & 2 != 0;
             return Rules { scene, is_ratio: false, sees_overlap, aborts: false, is_verdict_only };
         }
         if bits >= Rules::IN_LANE {
-            let scene = Scene { at_ease: bits == Rules::AT_EASE, ..Scene::in_lane() };
+            let scene = Scene { is_steady: bits == Rules::STEADY_FOLLOWING, ..Scene::in_lane() };
             return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
         }
         let seldom = bits >> 2;
@@ -88,7 +88,7 @@ impl Rules {
                 is_pair,
                 always_there: !is_pair,
                 in_lane: false,
-                at_ease: false,
+                is_steady: false,
                 may_cross: seldom != 0 && seldom != 4,
             },
             sees_overlap: bits & 2 != 0,

@@ -43,7 +43,7 @@ impl VehicleTracks {
 }
 
 /// Entries that a vehicle's motion takes at most.
-pub(in crate::engine) fn most_entries(step_cap: u32) -> u64 {
+pub(in crate::engine) fn max_entries(step_cap: u32) -> u64 {
     3 * (u64::from(step_cap) + 1 + ROWS as u64)
 }
 
@@ -157,6 +157,6 @@ mod tests {
         let motion = Motion::encode(&speed, &Lateral::Centred, 0.1, &mut Tables::default()).cast();
         let mut series = Series::default();
         series.vehicle(&motion, &Tables::default(), 100);
-        assert!(series.entries.len() as u64 <= most_entries(100));
+        assert!(series.entries.len() as u64 <= max_entries(100));
     }
 }

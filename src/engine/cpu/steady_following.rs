@@ -2,26 +2,26 @@
 //!
 //! A driver who keeps a comfortable distance from a vehicle that keeps its speed often comes near it ever more slowly, in
 //! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part is
-//! left, [`DriverModel::check_at_ease`], however hard the driver brakes by it. Where only verdicts are wanted, batches make these steps
-//! among lanes at ease, which work out nothing else. [`ease_steps`] says for how long that is the whole step, to the bit.
+//! left, [`DriverModel::check_steady`], however hard the driver brakes by it. Where only verdicts are wanted, batches make these steps
+//! among lanes at ease, which work out nothing else. [`steady_steps`] says for how long that is the whole step, to the bit.
 
 use crate::model::driver::DriverModel;
 use crate::model::scalar::Real;
 
 use crate::engine::cpu::batch_arrays::ROWS;
 use crate::engine::frame::Simulation;
-use crate::engine::lane_step::{LaneConstants, LaneState, Whereabouts, criteria_safe_gap};
+use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
 
 /// At most so many steps are foreseen at once: few enough for what rounding does to their gaps.
 const MOST: u32 = 1024;
 
 /// How many of a lane's next steps are at ease for certain, at most [`MOST`]. `state` is between two steps, at
 /// `state.index` at least 1; the other vehicle, the only one, keeps speed and lateral position of `place` for ever.
-pub(in crate::engine) fn ease_steps<M: DriverModel<f32>>(
+pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
-    place: &Whereabouts<f32>,
+    place: &OtherState<f32>,
 ) -> u32 {
     let &Simulation { frame, criteria, model, scene, .. } = simulation;
     let (other, index, gap) = (&lane.others[0], state.index, state.gaps[0]);
@@ -35,7 +35,7 @@ pub(in crate::engine) fn ease_steps<M: DriverModel<f32>>(
     let closing = (state.v_ego - place.speed).max(0.0);
     let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
     // What is no number stays none: the larger of two takes that of its second.
-    let safe = of_criteria.larger(model.ease_gap(state.v_ego, place.speed));
+    let safe = of_criteria.larger(model.steady_gap(state.v_ego, place.speed));
     // Thousandths and a millimetre for what rounding does to the distances and to the sums.
     let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
     let by = 1.001 * closing * frame.dt;
@@ -59,14 +59,14 @@ mod tests {
     use crate::stats::random::{philox4x32_10, unit_uniform};
 
     /// A lane behind a vehicle that keeps its speed, somewhere in its run: the ego brakes or has braked.
-    fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, Whereabouts<f32>) {
+    fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, OtherState<f32>) {
         let mut drawn = 0;
         let mut between = |least: f32, most: f32| {
             drawn += 1;
             least + (most - least) * unit_uniform(philox4x32_10([drawn, number, 0, 0], [11, 0])[0])
         };
         let speed = between(0.0, 40.0);
-        let place = Whereabouts { speed, position: between(-2.2, 2.2), towards: 0.0 };
+        let place = OtherState { speed, position: between(-2.2, 2.2), towards: 0.0 };
         let other = OtherConstants {
             half_lengths: 4.5,
             half_widths: 1.9,
@@ -100,36 +100,36 @@ mod tests {
     /// changes. A lane that ends among them does so because it is settled, from the first such step past the horizon
     /// on.
     #[test]
-    fn steps_at_ease_are_the_whole_step() {
+    fn steady_following_steps_equal_the_whole_step() {
         for name in Profile::names() {
             let constants = Constants::<f32>::resolve(&Profile::load(name).unwrap(), Category::Lvd);
             let criteria = &Criteria { keeps_values: false, ..constants.criteria };
             let frame = &crate::engine::frame::Frame { step_cap: 3000, abort_above_ttc: 0.0, ..constants.frames[3] };
             let whole =
                 Simulation { frame, criteria, model: &constants.fsm, model_index: 3, scene: Scene::unknown(false) };
-            let short = Simulation { scene: Scene { at_ease: true, ..Scene::in_lane() }, ..whole };
-            let (mut eased, mut braking, mut settled) = (0, 0, 0);
+            let short = Simulation { scene: Scene { is_steady: true, ..Scene::in_lane() }, ..whole };
+            let (mut steady_ones, mut braking, mut settled) = (0, 0, 0);
             for number in 0..20_000 {
                 let (lane, start, place) = lane(number);
-                let steps = ease_steps(&whole, &lane, &start, &place);
+                let steps = steady_steps(&whole, &lane, &start, &place);
                 let what = |index: u32| format!("{name}, lane {number}, step {index} of {}+{steps}", start.index);
                 let mut state = start;
                 for _ in 0..steps {
                     let index = state.index;
-                    let of_ease = LaneState {
+                    let of_steady = LaneState {
                         index: 1,
                         v_before: state.v_ego,
                         driver: DriverState { delay_steps: 0, ..state.driver },
                         ..state
                     };
-                    let eased = advance(&short, &lane, &of_ease, &[place; 2]).state;
+                    let steady_ones = advance(&short, &lane, &of_steady, &[place; 2]).state;
                     let next = advance(&whole, &lane, &state, &[place; 2]).state;
                     let is_settled = state.v_ego <= place.speed && index >= lane.horizon;
                     assert_eq!(next.over.holds(), is_settled, "{}", what(index));
                     let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
                     assert_eq!(failed(&next), failed(&start), "{}", what(index));
                     let moved = |state: &LaneState<f32>| (state.v_ego, state.gaps[0], state.driver.deceleration);
-                    assert_eq!(moved(&eased), moved(&next), "{}", what(index));
+                    assert_eq!(moved(&steady_ones), moved(&next), "{}", what(index));
                     assert!(next.v_ego <= state.v_ego, "{}", what(index));
                     braking += u32::from(next.v_ego < state.v_ego);
                     state = next;
@@ -138,16 +138,19 @@ mod tests {
                         break;
                     }
                 }
-                eased += u32::from(steps > 0);
+                steady_ones += u32::from(steps > 0);
             }
-            assert!(eased > 5000 && braking > 200_000 && settled > 200, "{name}: {eased} {braking} {settled}");
+            assert!(
+                steady_ones > 5000 && braking > 200_000 && settled > 200,
+                "{name}: {steady_ones} {braking} {settled}"
+            );
         }
     }
 
     /// No lane is at ease whose driver does not attend yet or waits, whose leader is beside the lane or drives
     /// backwards, or that is about to reach the cap.
     #[test]
-    fn who_does_not_follow_is_not_at_ease() {
+    fn a_driver_that_does_not_follow_is_not_steady() {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
         let frame = &constants.frames[3];
         let (criteria, model) = (&constants.criteria, &constants.fsm);
@@ -156,9 +159,9 @@ mod tests {
         let lane = LaneConstants { others: [OtherConstants { attend_from: 0, ..lane.others[0] }; 2], ..lane };
         let driver = DriverState { deceleration: 0.0, delay_steps: 0 };
         let state = LaneState { index: 100, gaps: [80.0; 2], v_ego: 20.0, v_before: 20.0, driver, ..state };
-        let place = Whereabouts { speed: 19.0, position: 0.0, ..place };
-        let steps = |lane: &LaneConstants<f32>, state: &LaneState<f32>, place: &Whereabouts<f32>| {
-            ease_steps(&simulation, lane, state, place)
+        let place = OtherState { speed: 19.0, position: 0.0, ..place };
+        let steps = |lane: &LaneConstants<f32>, state: &LaneState<f32>, place: &OtherState<f32>| {
+            steady_steps(&simulation, lane, state, place)
         };
         assert!(steps(&lane, &state, &place) > 500);
         let with = |other: OtherConstants<f32>| LaneConstants { others: [other; 2], ..lane };
@@ -167,8 +170,8 @@ mod tests {
         assert_eq!(steps(&with(OtherConstants { present_from: 101, ..other }), &state, &place), 0);
         assert_eq!(steps(&with(OtherConstants { present_until: 150, ..other }), &state, &place), 0);
         assert_eq!(steps(&lane, &LaneState { driver: DriverState { delay_steps: 1, ..driver }, ..state }, &place), 0);
-        assert_eq!(steps(&lane, &state, &Whereabouts { position: 3.5, ..place }), 0);
-        assert_eq!(steps(&lane, &state, &Whereabouts { speed: -1.0, ..place }), 0);
+        assert_eq!(steps(&lane, &state, &OtherState { position: 3.5, ..place }), 0);
+        assert_eq!(steps(&lane, &state, &OtherState { speed: -1.0, ..place }), 0);
         assert_eq!(steps(&lane, &LaneState { index: frame.step_cap - ROWS as u32, ..state }, &place), 0);
         // Nearer, and faster: fewer steps.
         let nearer = LaneState { gaps: [10.0; 2], ..state };
@@ -179,9 +182,9 @@ mod tests {
         let mut profile = Profile::load("paper").unwrap().fsm;
         profile.comfortable_deceleration_mps2 = 0.0;
         let model = &profile.resolve::<f32>(0.04, Category::Lvd);
-        let place = Whereabouts { speed: state.v_ego, ..place };
-        assert!(model.ease_gap(state.v_ego, place.speed).is_nan());
-        assert_eq!(ease_steps(&Simulation { model, ..simulation }, &lane, &state, &place), 0);
+        let place = OtherState { speed: state.v_ego, ..place };
+        assert!(model.steady_gap(state.v_ego, place.speed).is_nan());
+        assert_eq!(steady_steps(&Simulation { model, ..simulation }, &lane, &state, &place), 0);
         for gap in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert_eq!(steps(&lane, &LaneState { gaps: [gap; 2], ..state }, &place), 0, "{gap}");
         }

@@ -64,7 +64,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         // Some rules have no loop for verdicts alone.
         let values = !rules_of(simulation.scene).is_verdict_only;
         let leaves_out = !values && !stream.every_step;
-        let knows_ease = leaves_out && M::KNOWS_EASE;
+        let knows_steady = leaves_out && M::KNOWS_EASE;
         // A stage whose lanes look at these vehicles.
         let stage = |scene: Scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
             simulation: Simulation { scene, ..simulation },
@@ -75,15 +75,15 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
             apart: apart.map(Box::new),
         };
         let single = |scene, vehicles| {
-            let at_ease = knows_ease.then(|| stage(Scene::in_lane(), Rules::at_ease(), vehicles, None));
-            stage(scene, rules_of(scene), vehicles, at_ease)
+            let is_steady = knows_steady.then(|| stage(Scene::in_lane(), Rules::is_steady(), vehicles, None));
+            stage(scene, rules_of(scene), vehicles, is_steady)
         };
         let scene = simulation.scene;
         if !scene.is_pair {
             return single(scene, [0, 0]);
         }
         // The second vehicle alone may still be crossed, which batches of single vehicles do not look for.
-        let alone = (leaves_out && !scene.may_cross).then(|| single(Scene::of_second_alone(stream.cases), [1, 1]));
+        let alone = (leaves_out && !scene.may_cross).then(|| single(Scene::of_lead_only(stream.cases), [1, 1]));
         stage(scene, rules_of(scene), [0, 1], alone)
     }
 
@@ -101,7 +101,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
             if is_pair {
                 batch.set_apart_alone(&mut apart.waiting);
             } else {
-                batch.set_apart_at_ease(simulation, &mut apart.waiting);
+                batch.set_apart_steady_following(simulation, &mut apart.waiting);
             }
         }
         // Seldom before the stream's end: this stage has run dry, and is given more lanes when this one returns.
@@ -139,7 +139,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
             batch.free_finished();
             let mut calm = if self.leaves_out { batch.calm } else { 0 };
             while calm != 0 {
-                batch.leave_out_calm(simulation, calm.trailing_zeros() as usize);
+                batch.jump_ahead(simulation, calm.trailing_zeros() as usize);
                 calm &= calm - 1;
             }
         }

@@ -10,7 +10,7 @@ use super::recipe::{Lateral, NO_SLOT, Path, Quantity, Recipe};
 /// An event this close behind a step, in steps, counts as at the step.
 const STEP_TOLERANCE: f64 = 1e-4;
 /// No event is later, in steps.
-const MOST_STEPS: f64 = 1e6;
+const MAX_STEPS: f64 = 1e6;
 
 /// sin(πx/2) on [0, 1] as x·p(x²): the series to degree 11. With binary32's rounding its error is below 2·10⁻⁷.
 const SINE: [f64; 6] = [
@@ -34,7 +34,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
         let duration = column::<f32>(recipe, basis, point, columns.duration);
         let ego_speed = column::<f32>(recipe, basis, point, columns.ego_speed);
         let gap = if columns.lead_gap == NO_SLOT { 0.0 } else { column(recipe, basis, point, columns.lead_gap) };
-        return duration >= recipe.least_duration
+        return duration >= recipe.min_duration
             && duration <= recipe.longest_duration
             && ego_speed >= 0.0
             && gap >= 0.0;
@@ -45,7 +45,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
             return false;
         }
         let duration = (initial - end).exact_div(at(recipe, point, Quantity::MeanDeceleration));
-        return duration >= recipe.least_duration && duration <= recipe.longest_duration;
+        return duration >= recipe.min_duration && duration <= recipe.longest_duration;
     }
     true
 }
@@ -145,7 +145,7 @@ fn column<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], column: u32) -
 /// Whole steps that cover a time, given in steps.
 #[inline]
 fn steps_up<R: Real>(time: R) -> u32 {
-    let late = (time.smaller(R::from_f64(MOST_STEPS)) - R::from_f64(STEP_TOLERANCE)).larger(R::ZERO);
+    let late = (time.smaller(R::from_f64(MAX_STEPS)) - R::from_f64(STEP_TOLERANCE)).larger(R::ZERO);
     let below = late.floor_to_step();
     if late > R::from_step(below) { below + 1 } else { below }
 }

@@ -8,7 +8,7 @@ mod decode;
 mod points;
 mod recipe;
 
-pub use points::{ATTEMPTS, Drawn, MOST_PARAMETERS, PointSource, Points};
+pub use points::{ATTEMPTS, Drawn, MAX_PARAMETERS, PointSource, Points};
 pub use recipe::{Lateral, NO_SLOT, Path, Quantity, Recipe, ReducedColumns};
 
 use crate::model::scalar::Real;

@@ -4,7 +4,7 @@
 use crate::stats::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Parameters of a point at most.
-pub const MOST_PARAMETERS: usize = 14;
+pub const MAX_PARAMETERS: usize = 14;
 
 /// Draws of a sample index at most: where all are invalid, the sample is void.
 pub const ATTEMPTS: u32 = 64;
@@ -28,7 +28,7 @@ pub enum PointSource {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
     /// One value per parameter, then zeros. Means nothing where the sample is void.
-    pub values: [f32; MOST_PARAMETERS],
+    pub values: [f32; MAX_PARAMETERS],
     /// Draws that it took; [`ATTEMPTS`] + 1 where all were invalid.
     pub tries: u32,
 }
@@ -45,7 +45,7 @@ impl Drawn {
 pub struct Points {
     /// Where words come from.
     pub source: PointSource,
-    /// Parameters of a point, 1 to [`MOST_PARAMETERS`].
+    /// Parameters of a point, 1 to [`MAX_PARAMETERS`].
     pub dimensions: usize,
     /// Component by its weight; `None` where all weigh the same.
     pub weights: Option<AliasTable>,
@@ -85,7 +85,7 @@ impl Points {
                 return Drawn { values, tries: attempt + 1 };
             }
         }
-        Drawn { values: [0.0; MOST_PARAMETERS], tries: ATTEMPTS + 1 }
+        Drawn { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
     /// The component that a draw comes from: that of draw `tries` (from 1) of an index. `None` for given points.
@@ -111,7 +111,7 @@ impl Points {
 
     /// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
     #[inline]
-    fn candidate(&self, index: u64, attempt: u32) -> [f32; MOST_PARAMETERS] {
+    fn candidate(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
         let d = self.dimensions;
         let mut words = [0_u32; 4 * BLOCKS as usize];
         match &self.source {
@@ -128,7 +128,7 @@ impl Points {
                 }
             }
             PointSource::Given => {
-                let mut values = [0.0; MOST_PARAMETERS];
+                let mut values = [0.0; MAX_PARAMETERS];
                 let first = index as usize * d;
                 values[..d].copy_from_slice(&self.means[first..first + d]);
                 return values;
@@ -137,11 +137,11 @@ impl Points {
         let component = self.chosen(words[0], words[1]) as usize;
         let factor = &self.factors[self.factor_of[component] as usize * d * d..][..d * d];
         let mean = &self.means[component * d..][..d];
-        let mut deviates = [0.0; MOST_PARAMETERS];
+        let mut deviates = [0.0; MAX_PARAMETERS];
         for (deviate, &word) in deviates.iter_mut().zip(&words[2..2 + d]) {
             *deviate = standard_normal(word);
         }
-        let mut values = [0.0; MOST_PARAMETERS];
+        let mut values = [0.0; MAX_PARAMETERS];
         for j in 0..d {
             let mut value = mean[j];
             for k in 0..=j {

@@ -6,7 +6,7 @@ use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
 use crate::scenario::Motion;
 
-use super::points::MOST_PARAMETERS;
+use super::points::MAX_PARAMETERS;
 
 /// A quantity that a case is made of; its code is its place in [`Recipe::slots`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,11 +116,11 @@ pub struct Recipe {
     /// Columns of the reduction.
     pub columns: ReducedColumns,
     /// Least valid value of each parameter.
-    pub lower: [f32; MOST_PARAMETERS],
+    pub lower: [f32; MAX_PARAMETERS],
     /// Largest valid value of each parameter.
-    pub upper: [f32; MOST_PARAMETERS],
+    pub upper: [f32; MAX_PARAMETERS],
     /// Least valid T that follows from other numbers, s.
-    pub least_duration: f32,
+    pub min_duration: f32,
     /// Largest valid T that follows from other numbers, s.
     pub longest_duration: f32,
     /// Time step, s.

@@ -25,7 +25,7 @@ pub struct GpuOptions {
     /// Takes the plain path where the exact one exists, as on other interfaces: for tests.
     pub plain: bool,
     /// Replaces text of the shaders before they are compiled, to see that verification finds it: for tests.
-    pub planted: Option<(String, String)>,
+    pub shader_patch: Option<(String, String)>,
     /// Makes one job fail: for tests.
     pub fault: Option<Fault>,
 }
@@ -37,7 +37,7 @@ impl Default for GpuOptions {
             timeout: Duration::from_secs(60),
             first_lanes: 1 << 14,
             plain: false,
-            planted: None,
+            shader_patch: None,
             fault: None,
         }
     }
@@ -197,7 +197,7 @@ impl Device {
         values: &[(&'static str, f64)],
         layout: &wgpu::PipelineLayout,
     ) -> Result<wgpu::ComputePipeline> {
-        if let Some((from, to)) = &self.options.planted {
+        if let Some((from, to)) = &self.options.shader_patch {
             source = source.replace(from, to);
         }
         let label = Some(label);
@@ -268,12 +268,12 @@ impl Device {
     }
 
     /// Lanes per model that a job may hold at most: what fits into the buffers of results.
-    pub fn most_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
+    pub fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
         // The read-back buffer holds the counts and times as well.
         let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
-        let most = limits.max_storage_buffer_binding_size.min(room).min(MOST_RESULT_BYTES);
-        ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MOST_LANES)
+        let most = limits.max_storage_buffer_binding_size.min(room).min(MAX_RESULT_BYTES);
+        ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
     }
 
     /// Workgroups of a dispatch in two dimensions, because one ends at 65,535.
@@ -301,11 +301,11 @@ impl Device {
 }
 
 /// Results of one job at most, bytes.
-const MOST_RESULT_BYTES: u64 = 256 << 20;
+const MAX_RESULT_BYTES: u64 = 256 << 20;
 /// Left for counts, times and rounding beside them.
 const SMALL_RESULT_BYTES: u64 = 4 << 20;
 /// Lanes per model of one job at most: their number and every index into their results stay far below 2³².
-const MOST_LANES: u64 = 1 << 27;
+const MAX_LANES: u64 = 1 << 27;
 
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
 fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {

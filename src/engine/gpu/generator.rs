@@ -10,13 +10,13 @@ use super::device::Device;
 use super::ring::Inputs;
 use crate::Result;
 use crate::engine::LaneCase;
-use crate::engine::generated::{Generator, MOST_PARAMETERS, PointSource, Recipe, ReducedColumns};
+use crate::engine::generated::{Generator, MAX_PARAMETERS, PointSource, Recipe, ReducedColumns};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::stats::random::normal_table;
 
 const _: () = assert!(size_of::<AttentionRule<f32>>() == 20);
 const _: () = assert!(size_of::<ReducedColumns>() == 36);
-const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MOST_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
+const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Recipe {}

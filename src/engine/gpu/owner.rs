@@ -61,9 +61,9 @@ pub(super) enum Command {
 pub(super) struct Prepared {
     pub session: u64,
     /// Lanes per model of a job at most: verdicts, outcomes, counts.
-    pub most_lanes: [u64; 3],
+    pub max_lanes: [u64; 3],
     /// Cases that the device holds at most at once.
-    pub most_cases: u64,
+    pub max_cases: u64,
 }
 
 /// What is known of the device once it is open.
@@ -188,16 +188,16 @@ impl Owner {
         self.sessions.insert(session, inputs);
         let models = setup.models;
         let record = size_of::<super::records::OutcomeRecord>() as f64;
-        let most_lanes = [0.5, record + 0.5, 1e-3].map(|bytes| self.device.most_lanes(models, bytes));
+        let max_lanes = [0.5, record + 0.5, 1e-3].map(|bytes| self.device.max_lanes(models, bytes));
         let limits = self.device.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = most.min(if setup.generator.is_some() { MOST_MADE_BYTES } else { MOST_CASE_BYTES });
-        Ok(Prepared { session, most_lanes, most_cases: (most / sample_bytes).max(1) })
+        let most = most.min(if setup.generator.is_some() { MAX_MADE_BYTES } else { MAX_CASE_BYTES });
+        Ok(Prepared { session, max_lanes, max_cases: (most / sample_bytes).max(1) })
     }
 
     fn submit(&mut self, session: u64, cases: Option<Cases>, job: Job) -> Result<(Slot, Flight)> {
         self.alive()?;
-        self.strike()?;
+        self.inject_fault()?;
         let device = &mut self.device;
         let inputs = self.sessions.get_mut(&session).ok_or_else(|| device.failed("the session is closed"))?;
         match cases {
@@ -252,7 +252,7 @@ impl Owner {
     }
 
     /// The fault that a test asked for.
-    fn strike(&mut self) -> Result<()> {
+    fn inject_fault(&mut self) -> Result<()> {
         let job = self.jobs;
         self.jobs += 1;
         match self.device.options.fault {
@@ -269,6 +269,6 @@ impl Owner {
 }
 
 /// Cases on the device at once, bytes.
-const MOST_CASE_BYTES: u64 = 64 << 20;
+const MAX_CASE_BYTES: u64 = 64 << 20;
 /// The same where the device makes them, with their tables.
-const MOST_MADE_BYTES: u64 = 512 << 20;
+const MAX_MADE_BYTES: u64 = 512 << 20;

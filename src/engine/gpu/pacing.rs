@@ -5,7 +5,7 @@
 /// Seconds that the longest dispatch of a job should take.
 const TARGET_S: f64 = 0.1;
 /// A step up or down is at most this factor, so that one odd measurement does no harm.
-const MOST_CHANGE: f64 = 4.0;
+const MAX_CHANGE: f64 = 4.0;
 
 /// The size of the next job, from the time of the last.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,7 @@ impl Pacer {
             return;
         }
         // A small last piece says little about a large one: it costs the same start.
-        let change = (TARGET_S / slowest_s).clamp(1.0 / MOST_CHANGE, MOST_CHANGE);
+        let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
         let wanted = lanes as f64 * change;
         if change < 1.0 || wanted > self.lanes as f64 {
             self.lanes = (wanted as u64).max(1);
@@ -33,9 +33,9 @@ impl Pacer {
     }
 
     /// Units of a job where each has `lanes_per_unit` lanes per model; at least one, at most so many that
-    /// `most_lanes` are not exceeded.
-    pub fn units(&self, lanes_per_unit: u64, most_lanes: u64) -> u64 {
-        (self.lanes.min(most_lanes) / lanes_per_unit.max(1)).max(1)
+    /// `max_lanes` are not exceeded.
+    pub fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
+        (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
     }
 
     /// Lanes per model of the next job.

@@ -72,8 +72,8 @@ impl<'p> GpuSession<'p> {
         Ok(GpuSession { plan, device, commands, prepared, constants, pacer, window: None, device_s: 0.0 })
     }
 
-    fn most_lanes(&self, wanted: Wanted) -> u64 {
-        self.prepared.most_lanes[wanted as usize]
+    fn max_lanes(&self, wanted: Wanted) -> u64 {
+        self.prepared.max_lanes[wanted as usize]
     }
 
     /// Sends one job of units from `units` on; says how far it reaches.
@@ -81,15 +81,15 @@ impl<'p> GpuSession<'p> {
         let plan = self.plan;
         let variants = plan.blocks[block].variants.len() as u64;
         let per_unit = variants * plan.headways.len() as u64;
-        let most = self.most_lanes(wanted);
-        if per_unit > most || variants > self.prepared.most_cases {
+        let most = self.max_lanes(wanted);
+        if per_unit > most || variants > self.prepared.max_cases {
             let problem = format!("one scenario has {per_unit} lanes per model, and it can hold {most} at once");
             return Err(Error::device(&self.device, problem, "use --backend cpu, or fewer headways"));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
         let mut cases = None;
         if !inside {
-            let room = self.prepared.most_cases / variants;
+            let room = self.prepared.max_cases / variants;
             let end = (units.start + room).min(plan.blocks[block].units.held().end);
             // Not beyond what is asked for: a generator's samples have no natural end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };

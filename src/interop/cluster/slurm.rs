@@ -3,7 +3,7 @@
 //! What ends a task early loses nothing, for a shard keeps a journal and the same command continues it:
 //! - the time limit: Slurm sends the batch shell USR1 some time before, the shell sends lanesweep TERM, lanesweep
 //!   finishes its chunk and ends with 75, the task goes back to the queue;
-//! - a crash (out of memory, a killed process): back to the queue, at most [`MOST_RESTARTS`] times;
+//! - a crash (out of memory, a killed process): back to the queue, at most [`MAX_RESTARTS`] times;
 //! - a lost node or preemption: Slurm itself puts the task back to the queue (`--requeue`);
 //! - `scancel`: the task gets TERM, ends its chunk and stays out of the queue. That is why the time limit is told by
 //!   USR1: TERM alone would not say whether the task is to come back.
@@ -17,9 +17,9 @@ use crate::{Error, Place, Result};
 /// Exit status of a run that was told to stop: complete so far, to be continued by the same command.
 pub const STATUS_INTERRUPTED: u8 = 75;
 /// Restarts of a task, for whatever reason, after which a crash ends it for good.
-pub const MOST_RESTARTS: u32 = 10;
+pub const MAX_RESTARTS: u32 = 10;
 /// Shards at most: their numbers have five digits.
-pub const MOST_SHARDS: u32 = 99_999;
+pub const MAX_SHARDS: u32 = 99_999;
 
 /// What each task asks Slurm for.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,9 +78,9 @@ impl SlurmArray {
     /// # Errors
     /// [`Error::Usage`] naming the flag for a value that Slurm would not take or that cannot be quoted.
     pub fn scripts(&self) -> Result<Scripts> {
-        if self.shards == 0 || self.shards > MOST_SHARDS {
+        if self.shards == 0 || self.shards > MAX_SHARDS {
             let problem = format!("{} tasks cannot be numbered", self.shards);
-            return Err(Error::usage(Place::item("--array"), problem, format!("use 1 to {MOST_SHARDS}")));
+            return Err(Error::usage(Place::item("--array"), problem, format!("use 1 to {MAX_SHARDS}")));
         }
         self.resources.validate()?;
         Ok(Scripts { array: self.array()?, merge: self.merge()?, submit: self.submit()? })
@@ -106,7 +106,7 @@ impl SlurmArray {
         text.push_str(ARRAY_HEAD);
         let _ = writeln!(text, "{} &\npid=$!", words.join(" "));
         text.push_str(
-            &ARRAY_TAIL.replace("@75@", &STATUS_INTERRUPTED.to_string()).replace("@10@", &MOST_RESTARTS.to_string()),
+            &ARRAY_TAIL.replace("@75@", &STATUS_INTERRUPTED.to_string()).replace("@10@", &MAX_RESTARTS.to_string()),
         );
         Ok(text)
     }

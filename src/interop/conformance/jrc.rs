@@ -5,7 +5,7 @@ use super::tally::Tally;
 use crate::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Start, Step};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::jrc_case::{self, Front, LEAST_LATERAL_MPS};
+use crate::run::grid::jrc_case::{self, Front, MIN_LATERAL_MPS};
 use crate::scenario::{Case, Category, Tables};
 use crate::{Error, Result};
 
@@ -152,7 +152,7 @@ impl Replay {
 /// 0 or a speed at which the change ends in a number of samples that can be held.
 fn lateral_speed(row: &Row) -> Result<f64> {
     let value = row.not_negative("vlat")?;
-    if value == 0.0 || value >= LEAST_LATERAL_MPS {
+    if value == 0.0 || value >= MIN_LATERAL_MPS {
         return Ok(value);
     }
     Err(Error::input(row.place("vlat"), format!("{value}"), "expected 0 or at least 0.001 m/s"))

@@ -34,7 +34,7 @@ pub struct Row<'a> {
 impl Table {
     /// Reads a whole table; it must have a header and at least one row.
     pub fn read(path: &Path) -> Result<Table> {
-        let text = input_file::read_text(path, input_file::LARGEST_TABLE_BYTES)?;
+        let text = input_file::read_text(path, input_file::MAX_TABLE_BYTES)?;
         let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let broken = |e: csv::Error| {

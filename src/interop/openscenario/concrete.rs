@@ -67,7 +67,7 @@ pub struct Concrete {
 }
 
 /// Vertices of one vehicle at most: a file of some 200 MB.
-pub const MOST_VERTICES: usize = 1_000_000;
+pub const MAX_VERTICES: usize = 1_000_000;
 
 impl Concrete {
     /// End of the scenario, s.
@@ -94,10 +94,10 @@ impl Concrete {
         let place = || Place::item(format!("lane {}", self.key));
         for vehicle in &self.vehicles {
             let count = vehicle.path.len();
-            if !(2..=MOST_VERTICES).contains(&count) {
+            if !(2..=MAX_VERTICES).contains(&count) {
                 let problem = format!("the path of {} has {count} vertices", vehicle.name);
                 let help =
-                    format!("2 to {MOST_VERTICES} can be written: use a longer time step or a shorter --duration");
+                    format!("2 to {MAX_VERTICES} can be written: use a longer time step or a shorter --duration");
                 return Err(Error::input(place(), problem, help));
             }
             let is_finite = |v: &Vertex| v.time_s.is_finite() && v.x_m.is_finite() && v.y_m.is_finite();

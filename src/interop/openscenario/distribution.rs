@@ -44,7 +44,7 @@ pub enum Distribution {
     },
     /// Poisson, cut off at a range.
     Poisson {
-        /// Expected value of the whole distribution, 0 … [`LARGEST_POISSON`].
+        /// Expected value of the whole distribution, 0 … [`MAX_POISSON`].
         mean: f64,
         /// Where it is cut off.
         range: Range,
@@ -56,7 +56,7 @@ pub enum Distribution {
 }
 
 /// Largest expected value of a Poisson distribution: its probabilities are tabulated.
-pub const LARGEST_POISSON: f64 = 1e6;
+pub const MAX_POISSON: f64 = 1e6;
 
 /// A distribution ready to be drawn from, cut off at a range.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,9 +5,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::distribution::{Distribution, LARGEST_POISSON, Range};
+use super::distribution::{Distribution, MAX_POISSON, Range};
 use super::xml_tree::{Node, parse_tree, read_tree};
-use crate::run::grid::{GridAxis, MOST_VALUES};
+use crate::run::grid::{GridAxis, MAX_VALUES};
 use crate::support::near_name;
 use crate::{Error, Place, Result};
 
@@ -176,8 +176,8 @@ fn single(at: At) -> Result<Deterministic> {
         let step = inner.number("stepWidth")?;
         GridAxis::steps((range.low, range.high), step, "DistributionRange").map_err(|e| inner.because(&e))?
     };
-    if values.len() > MOST_VALUES {
-        return Err(inner.wrong(format!("{} values", values.len()), format!("give {MOST_VALUES} at most")));
+    if values.len() > MAX_VALUES {
+        return Err(inner.wrong(format!("{} values", values.len()), format!("give {MAX_VALUES} at most")));
     }
     Ok(Deterministic::Values { name, line: at.node.line, values })
 }
@@ -274,8 +274,8 @@ fn distribution(at: At) -> Result<Distribution> {
         "PoissonDistribution" => {
             inner.attributes(&["expectedValue"])?;
             let mean = at_least_zero(inner, "expectedValue")?;
-            if mean > LARGEST_POISSON {
-                let help = format!("write at most {LARGEST_POISSON}, or a normal distribution, which it nearly is");
+            if mean > MAX_POISSON {
+                let help = format!("write at most {MAX_POISSON}, or a normal distribution, which it nearly is");
                 return Err(inner.wrong(format!("the attribute `expectedValue` is {mean}"), help));
             }
             Distribution::Poisson { mean, range: within()? }

@@ -19,7 +19,7 @@ mod variations;
 mod xml_tree;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle};
-pub use distribution::{Distribution, Draw, LARGEST_POISSON, Range};
+pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
 pub use distribution_file::{
     Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
 };
@@ -27,7 +27,7 @@ pub use folder::{IndexRow, export_folder};
 pub use parameters::{Names, Rename};
 pub use path::{Vertex, paths};
 pub use road::{Road, road_file};
-pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MOST_SAMPLES, Sampled, SampledParameter};
+pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
 pub use scenario_file::scenario_file;
 pub use sizes::{KnownSizes, sizes_of_case};
 pub use variations::{Variations, variations};

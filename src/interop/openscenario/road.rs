@@ -28,7 +28,7 @@ const MARGIN_M: f64 = 100.0;
 const BEYOND_M: f64 = 500.0;
 
 /// Lanes to one side at most: who leaves them is beside the road.
-const MOST_LANES: u32 = 20;
+const MAX_LANES: u32 = 20;
 
 impl Road {
     /// The road that holds every vertex of every vehicle.
@@ -46,7 +46,7 @@ impl Road {
         let start_m = (first - MARGIN_M).floor();
         let width = scenario.lane_width_m;
         // At least one lane to each side: there the others come from and leave to.
-        let lanes = |reach_m: f64| ((reach_m / width - 0.5).ceil().max(1.0) as u32).min(MOST_LANES);
+        let lanes = |reach_m: f64| ((reach_m / width - 0.5).ceil().max(1.0) as u32).min(MAX_LANES);
         Road {
             start_m,
             length_m: (last + MARGIN_M + BEYOND_M).ceil() - start_m,

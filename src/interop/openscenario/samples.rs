@@ -20,7 +20,7 @@ use crate::{Error, Place, Result};
 pub const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
 
 /// Samples at most: their cases are a table in memory, some 400 bytes each.
-pub const MOST_SAMPLES: u64 = 1_000_000;
+pub const MAX_SAMPLES: u64 = 1_000_000;
 
 /// Points drawn for one sample at most.
 pub const ATTEMPTS: u32 = 64;
@@ -167,7 +167,7 @@ impl DistributionSamples {
     /// The plan whose unit `i` is sample `i`, and the draws in all. Headways are those given, or the parameter's own.
     ///
     /// # Errors
-    /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than [`MOST_SAMPLES`], and for headways
+    /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than [`MAX_SAMPLES`], and for headways
     /// beside a parameter.
     pub fn plan(
         &self,
@@ -176,9 +176,9 @@ impl DistributionSamples {
         models: &[ModelId],
         headways: &[Headway],
     ) -> Result<(LanePlan, u64)> {
-        if !(1..=MOST_SAMPLES).contains(&samples) {
+        if !(1..=MAX_SAMPLES).contains(&samples) {
             let problem = format!("{samples} samples of a distribution file cannot be run");
-            let help = format!("give --samples from 1 to {MOST_SAMPLES}: their cases are kept in memory");
+            let help = format!("give --samples from 1 to {MAX_SAMPLES}: their cases are kept in memory");
             return Err(Error::usage(Place::item("--samples"), problem, help));
         }
         let own = [Headway::GapM(0.0)];

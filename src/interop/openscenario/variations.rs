@@ -2,7 +2,7 @@
 
 use super::distribution_file::{Deterministic, DistributionFile, Distributions};
 use super::parameters::Names;
-use crate::run::grid::{GridAxis, MOST_PANELS, Parameter};
+use crate::run::grid::{GridAxis, MAX_PANELS, Parameter};
 use crate::{Error, Place, Result};
 
 /// What a deterministic file varies.
@@ -48,9 +48,9 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
                     found.iter().zip(row).map(|(f, v)| names.value(*f, *v, *line)).collect::<Result<Vec<f64>>>()
                 };
                 let rows = rows.iter().map(row).collect::<Result<Vec<_>>>()?;
-                if all.set_rows.len().saturating_mul(rows.len()) > MOST_PANELS {
+                if all.set_rows.len().saturating_mul(rows.len()) > MAX_PANELS {
                     let place = Place::file(&file.path).row(*line);
-                    let help = format!("a map has {MOST_PANELS} panels at most: give fewer sets");
+                    let help = format!("a map has {MAX_PANELS} panels at most: give fewer sets");
                     return Err(Error::input(place, "the sets make too many combinations", help));
                 }
                 for (at, (parameter, _)) in found.iter().enumerate() {

@@ -26,7 +26,7 @@ pub(super) struct Node {
 /// Elements within elements at most.
 const DEEPEST: usize = 32;
 /// Elements at most.
-const MOST_ELEMENTS: usize = 500_000;
+const MAX_ELEMENTS: usize = 500_000;
 
 const NOT_XML: &str = "write a ParameterValueDistribution file of ASAM OpenSCENARIO XML 1.1 to 1.3";
 
@@ -36,7 +36,7 @@ const NOT_XML: &str = "write a ParameterValueDistribution file of ASAM OpenSCENA
 /// As [`input_file::read_text`]; [`Error::Input`] with the line for what is not well-formed, too deep, too large, or has
 /// a document type.
 pub(super) fn read_tree(path: &Path) -> Result<Node> {
-    let text = input_file::read_text(path, input_file::LARGEST_SETTINGS_BYTES)?;
+    let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
     parse_tree(&text, path)
 }
 
@@ -98,8 +98,8 @@ pub(super) fn parse_tree(text: &str, path: &Path) -> Result<Node> {
             Event::Decl(_) | Event::PI(_) | Event::Comment(_) => {}
             Event::Eof => break,
         }
-        if count > MOST_ELEMENTS {
-            return Err(wrong(line, format!("more than {MOST_ELEMENTS} elements"), "split the file"));
+        if count > MAX_ELEMENTS {
+            return Err(wrong(line, format!("more than {MAX_ELEMENTS} elements"), "split the file"));
         }
     }
     if let Some(node) = open.last() {

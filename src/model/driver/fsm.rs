@@ -163,7 +163,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
     fn safe_gap(&self, v_ego: R, v_other: R) -> R {
         let own_stop = v_ego * self.tau + v_ego * v_ego * self.half_inverse_comf;
         let proactive = own_stop - v_other * v_other * self.half_inverse_lead + self.margin + self.margin;
-        proactive.larger(self.ease_gap(v_ego, v_other))
+        proactive.larger(self.steady_gap(v_ego, v_other))
     }
 
     /// The gate is closed to what is outside and does not come in.
@@ -177,14 +177,14 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
     /// CFS is 0 beyond it at every deceleration of the ego. Without one this is its safe distance, and one after which
     /// v_new is above v_o makes that shorter; a larger one, above dv/τ, stops the closing within half of dv·τ.
     #[inline(always)]
-    fn ease_gap(&self, v_ego: R, v_other: R) -> R {
+    fn steady_gap(&self, v_ego: R, v_other: R) -> R {
         let dv = (v_ego - v_other).larger(R::ZERO);
         dv * self.tau + dv * dv * self.half_inverse_comf
     }
 
     /// PFS alone: demand PFS·b_comf.
     #[inline(always)]
-    fn check_at_ease(&self, view: &View<R>) -> Hazard<R> {
+    fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);
         Hazard { is_unsafe: pfs.is_positive(), demand: pfs * self.b_comf }
     }

@@ -162,17 +162,17 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     const KNOWS_EASE: bool = false;
 
     /// Distance, m ≥ 0, beyond which the driver is at ease with a vehicle that overlaps with the ego across the road
-    /// and keeps its speed: [`DriverModel::check_at_ease`] says what the check says, whatever the ego's deceleration.
+    /// and keeps its speed: [`DriverModel::check_steady`] says what the check says, whatever the ego's deceleration.
     /// Not larger at a smaller speed of the ego, m/s. Rounding may make it too small by a thousandth and a millimetre.
     #[inline(always)]
-    fn ease_gap(&self, _v_ego: R, _v_other: R) -> R {
+    fn steady_gap(&self, _v_ego: R, _v_other: R) -> R {
         R::INFINITY
     }
 
     /// The part of the check that is left at ease: unsafe exactly where the check is, with the same demand there, and
     /// with less work. It sees speeds, gap and lengths; all else of the view is not the lane's.
     #[inline(always)]
-    fn check_at_ease(&self, view: &View<R>) -> Hazard<R> {
+    fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         self.check(view)
     }
 
@@ -229,7 +229,7 @@ mod tests {
             least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
         };
         let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
-        let (mut at_ease, mut uneasy_below) = (0, 0);
+        let (mut is_steady, mut uneasy_below) = (0, 0);
         for _ in 0..200_000 {
             let (v_ego, v_other) = (between(0.0, 45.0), between(0.0, 45.0));
             let view = View {
@@ -257,29 +257,32 @@ mod tests {
                 ignored += 1;
             }
             if !M::KNOWS_EASE {
-                assert_eq!(model.ease_gap(v_ego, v_other), f32::INFINITY, "{name}");
+                assert_eq!(model.steady_gap(v_ego, v_other), f32::INFINITY, "{name}");
                 continue;
             }
-            let (ease_gap, slowing) = (model.ease_gap(v_ego, v_other), View { a_ego: between(-10.0, 0.0), ..view });
+            let (steady_gap, slowing) = (model.steady_gap(v_ego, v_other), View { a_ego: between(-10.0, 0.0), ..view });
             let said =
                 |hazard: Hazard<f32>| (hazard.is_unsafe.holds(), hazard.is_unsafe.holds().then_some(hazard.demand));
             let hazard = model.check(&slowing);
             // All else is not the lane's in batches.
             let seen = View { a_ego: 0.0, lateral_gap: -1.9, lateral_towards: 0.0, ..slowing };
-            let is_same = said(hazard) == said(model.check_at_ease(&seen));
-            if view.gap > 1.001 * ease_gap + 0.001 {
-                assert!(is_same, "{name}: {slowing:?} is not all at ease beyond {ease_gap} m");
+            let is_same = said(hazard) == said(model.check_steady(&seen));
+            if view.gap > 1.001 * steady_gap + 0.001 {
+                assert!(is_same, "{name}: {slowing:?} is not all at ease beyond {steady_gap} m");
                 let state = DriverState { deceleration: -slowing.a_ego, delay_steps: 0 };
                 let (reacting, v_next) = model.react(state, &hazard, v_ego);
                 let reacts_well = v_next <= v_ego && reacting.delay_steps == 0;
                 assert!(!hazard.is_unsafe.holds() || reacts_well, "{name}: {slowing:?}");
-                assert!(model.ease_gap(v_ego - between(0.0, 1.0) * v_ego, v_other) <= ease_gap, "{name}: {slowing:?}");
-                at_ease += 1;
-            } else if !is_same && view.gap > 0.9 * ease_gap {
+                assert!(
+                    model.steady_gap(v_ego - between(0.0, 1.0) * v_ego, v_other) <= steady_gap,
+                    "{name}: {slowing:?}"
+                );
+                is_steady += 1;
+            } else if !is_same && view.gap > 0.9 * steady_gap {
                 uneasy_below += 1;
             }
         }
-        assert!(!M::KNOWS_EASE || at_ease > 1000 && uneasy_below > 100, "{name}: {at_ease}, {uneasy_below}");
+        assert!(!M::KNOWS_EASE || is_steady > 1000 && uneasy_below > 100, "{name}: {is_steady}, {uneasy_below}");
         assert!(safe > 1000 && ignored > 1000, "{name}: {safe} safe, {ignored} ignored");
         assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
     }

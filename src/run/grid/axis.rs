@@ -6,7 +6,7 @@ use crate::{Error, Place, Result};
 use super::parameter::Parameter;
 
 /// Values of one axis at most.
-pub const MOST_VALUES: usize = 100_000;
+pub const MAX_VALUES: usize = 100_000;
 
 /// A parameter with its values.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,8 +96,8 @@ fn range((from, to): (f64, f64), step: f64, text: &str, flag: &str) -> Result<Ve
         return Err(wrong(format!("`{text}` is empty: {to} is below {from}"), "give the smaller end first"));
     }
     let steps = ((to - from) / step + 1e-9).floor();
-    if steps >= MOST_VALUES as f64 {
-        let help = format!("use a longer step: an axis holds {MOST_VALUES} values at most");
+    if steps >= MAX_VALUES as f64 {
+        let help = format!("use a longer step: an axis holds {MAX_VALUES} values at most");
         return Err(wrong(format!("`{text}` has {:.0} values", steps + 1.0), &help));
     }
     Ok((0..=steps as u32).map(|k| decimal(from + f64::from(k) * step)).collect())

@@ -10,10 +10,10 @@ use super::jrc_case::{self, Front};
 use super::parameter::{Parameter, Point, Quantity};
 
 /// Cells of a grid at most.
-pub const MOST_CELLS: usize = 1_000_000;
+pub const MAX_CELLS: usize = 1_000_000;
 
 /// Panels of a grid at most: a sheet shows every one.
-pub const MOST_PANELS: usize = 1000;
+pub const MAX_PANELS: usize = 1000;
 
 /// How a point becomes a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -89,9 +89,9 @@ impl Grid {
             None => combinations(&panel_axes)?,
         };
         let cells = panels.len().saturating_mul(x.len()).saturating_mul(y.len());
-        if cells > MOST_CELLS {
+        if cells > MAX_CELLS {
             let problem = format!("{} panels of {} × {} cells are {cells} cells", panels.len(), x.len(), y.len());
-            let help = format!("use longer steps or fewer panels: {MOST_CELLS} cells at most");
+            let help = format!("use longer steps or fewer panels: {MAX_CELLS} cells at most");
             return Err(Error::usage(Place::item(name), problem, help));
         }
         let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap };
@@ -286,9 +286,9 @@ const FOR_A_MAP: Needing = ("a map", "give it by --x, --y, --panel or --set");
 
 /// Panels that are given one by one, each value within its parameter's range.
 fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
-    if rows.is_empty() || rows.len() > MOST_PANELS {
+    if rows.is_empty() || rows.len() > MAX_PANELS {
         let problem = format!("they make {} panels", rows.len());
-        let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+        let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
         return Err(Error::usage(Place::item("panels"), problem, help));
     }
     if rows.iter().any(|row| row.len() != axes.len()) {
@@ -338,9 +338,9 @@ pub(crate) fn check_complete(
 /// Every combination of the axes' values, the last axis fastest; one empty combination where there is no axis.
 fn combinations(axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     let count = axes.iter().fold(1_usize, |n, axis| n.saturating_mul(axis.len()));
-    if count > MOST_PANELS {
+    if count > MAX_PANELS {
         let problem = format!("they make {count} panels");
-        let help = format!("give fewer values: a sheet has {MOST_PANELS} panels at most");
+        let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
         return Err(Error::usage(Place::item("--panel"), problem, help));
     }
     let mut panels = vec![Vec::new()];

@@ -18,13 +18,13 @@ pub const CUT_IN_LATERAL_M: f64 = 3.5;
 /// Lateral distance that a cut-out covers, m.
 pub const CUT_OUT_LATERAL_M: f64 = 4.0;
 /// Slowest lane change that has a series, m/s: it takes longer than any run.
-pub const LEAST_LATERAL_MPS: f64 = 1e-3;
+pub const MIN_LATERAL_MPS: f64 = 1e-3;
 /// Time headway at which a following Reg157 or CCHDM starts, s.
 pub const NATIVE_THW_S: f64 = 2.0;
 /// Lateral acceleration of the run-up, m/s².
 const RUN_UP_MPS2: f64 = 1.5;
 
-/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`LEAST_LATERAL_MPS`], `run_up` counts the steps before
+/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`MIN_LATERAL_MPS`], `run_up` counts the steps before
 /// the nominal start.
 pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
     Case {

@@ -13,9 +13,9 @@ mod parameter;
 mod plan;
 pub mod presets;
 
-pub use axis::{GridAxis, MOST_VALUES};
+pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
-pub use grid::{CaseStyle, Grid, GridParts, MOST_CELLS, MOST_PANELS};
+pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
 pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
 pub use plan::{GridPart, GridPlan};

@@ -18,11 +18,11 @@ use crate::support::hex::hex;
 use crate::{Error, Place, Result};
 
 /// Records are not written more often.
-const SHORTEST_WAIT: Duration = Duration::from_millis(250);
+const MIN_WAIT: Duration = Duration::from_millis(250);
 /// A record waits this many times as long as the last one took to reach the disk, so that journals cost at most 1 %.
 const PATIENCE: u32 = 100;
 /// Largest journal that is read.
-const LARGEST_BYTES: u64 = 4 << 30;
+const MAX_BYTES: u64 = 4 << 30;
 /// Characters of a checksum in hexadecimal.
 const CHECKSUM: usize = 64;
 
@@ -61,7 +61,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let engine = ENGINE_VERSION;
         let head = Head { lanesweep_journal: 2, engine, run_sha256: run_sha256.to_owned(), units };
-        let due = Instant::now() + SHORTEST_WAIT;
+        let due = Instant::now() + MIN_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
         refuse_link(path)?;
@@ -74,7 +74,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         };
         let io = |e| Error::io(path, "read", e);
         let about = file.metadata().map_err(io)?;
-        if !about.is_file() || about.len() > LARGEST_BYTES {
+        if !about.is_file() || about.len() > MAX_BYTES {
             let help = "move it away; what it holds is then computed again";
             return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
         }
@@ -161,7 +161,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         }
         let took = started.elapsed();
         self.spent += took;
-        self.due = Instant::now() + SHORTEST_WAIT.max(took * PATIENCE);
+        self.due = Instant::now() + MIN_WAIT.max(took * PATIENCE);
         Ok(())
     }
 

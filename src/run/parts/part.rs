@@ -11,7 +11,7 @@ use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Place, Result};
 
 /// Largest part that is read.
-const LARGEST_BYTES: u64 = 4 << 30;
+const MAX_BYTES: u64 = 4 << 30;
 
 /// Counts of an interval of units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,7 @@ pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
 pub fn read_part<T: Countable>(path: &Path, run_sha256: &str, units: &Range<u64>, again: &str) -> Result<Part<T>> {
     let redo = format!("delete it and make it again: {again}");
-    let (part, _): (Part<T>, _) = read_sealed("part", path, LARGEST_BYTES, &redo)?;
+    let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
     if part.run_sha256 != run_sha256 {
         let help = "use one folder per run: move it away, or give another --out";

@@ -81,8 +81,8 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
-pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, most_bytes: u64, again: &str) -> Result<(T, String)> {
-    unseal(kind, &crate::support::input_file::read(path, most_bytes)?, &Place::file(path), again)
+pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, max_bytes: u64, again: &str) -> Result<(T, String)> {
+    unseal(kind, &crate::support::input_file::read(path, max_bytes)?, &Place::file(path), again)
 }
 
 /// What a sealed file calls itself before its content.
@@ -117,7 +117,7 @@ fn head_of(text: &[u8]) -> Option<Head> {
         let digits = rest.find(|c: char| !c.is_ascii_digit())?;
         Some((rest[..digits].parse().ok()?, &rest[digits..]))
     }
-    let text = String::from_utf8_lossy(&text[..text.len().min(LONGEST_HEAD)]);
+    let text = String::from_utf8_lossy(&text[..text.len().min(MAX_HEAD)]);
     let (kind, rest) = text.strip_prefix("{\"lanesweep\":\"")?.split_once('"')?;
     let (version, rest) = number(rest, ",\"version\":")?;
     let engine = number(rest, ",\"engine\":").map(|(engine, _)| engine);
@@ -125,7 +125,7 @@ fn head_of(text: &[u8]) -> Option<Head> {
 }
 
 /// Bytes in which a sealed file tells its kind and versions.
-const LONGEST_HEAD: usize = 256;
+const MAX_HEAD: usize = 256;
 
 /// Reads the first line of a sealed file, behind which more may come: that is left in the reader.
 ///
@@ -134,7 +134,7 @@ const LONGEST_HEAD: usize = 256;
 pub fn read_sealed_line<T: DeserializeOwned>(
     kind: &str,
     path: &Path,
-    most_bytes: u64,
+    max_bytes: u64,
     again: &str,
 ) -> Result<(T, String, BufReader<File>)> {
     let mut file = BufReader::new(crate::support::input_file::open(path)?);
@@ -145,7 +145,7 @@ pub fn read_sealed_line<T: DeserializeOwned>(
         head.check().map_err(wrong)?;
     }
     let mut line = Vec::new();
-    file.by_ref().take(most_bytes).read_until(b'\n', &mut line).map_err(io)?;
+    file.by_ref().take(max_bytes).read_until(b'\n', &mut line).map_err(io)?;
     let (content, sha256) = unseal(kind, &line, &Place::file(path), again)?;
     Ok((content, sha256, file))
 }
@@ -157,7 +157,7 @@ pub fn read_sealed_line<T: DeserializeOwned>(
 pub fn kind_of(path: &Path) -> Result<String> {
     let mut text = Vec::new();
     let file = crate::support::input_file::open(path)?;
-    file.take(LONGEST_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
+    file.take(MAX_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
     head_of(&text).map(|head| head.kind).ok_or_else(|| {
         let help = "give a file or folder that a run in parts has written";
         Error::input(Place::file(path), "this is no whole file of a run in parts", help)

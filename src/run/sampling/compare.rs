@@ -106,7 +106,7 @@ fn units<'a>(
 
 fn failures(confusion: &Confusion<u32>, variant: usize) -> u64 {
     // Variant 0 is S against itself.
-    u64::from(confusion.both) + if variant == 0 { 0 } else { u64::from(confusion.only_s_prime) }
+    u64::from(confusion.tp) + if variant == 0 { 0 } else { u64::from(confusion.fp) }
 }
 
 /// Which of the category's kept scenarios each kernel of a density is.

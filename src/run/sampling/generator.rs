@@ -2,7 +2,7 @@
 
 use crate::engine::attention_rules;
 use crate::engine::generated::{
-    Generator, Lateral, MOST_PARAMETERS, NO_SLOT, Path, PointSource, Points, Quantity, Recipe, ReducedColumns,
+    Generator, Lateral, MAX_PARAMETERS, NO_SLOT, Path, PointSource, Points, Quantity, Recipe, ReducedColumns,
 };
 use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::model::scalar::Real;
@@ -27,7 +27,7 @@ pub enum SampleSource {
 /// The generator that draws from a mixture over a parameter space.
 ///
 /// # Errors
-/// [`Error::Usage`] for more than [`MOST_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
+/// [`Error::Usage`] for more than [`MAX_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
 /// Sobol points that there are not; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
 pub fn generator_of(
     space: &ParameterSpace,
@@ -92,10 +92,10 @@ pub fn generator_of_points(
 
 fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Profile) -> Result<Generator> {
     let d = points.dimensions;
-    if d > MOST_PARAMETERS || d != space.dimensions() {
+    if d > MAX_PARAMETERS || d != space.dimensions() {
         return Err(Error::usage(
             Place::item(name_of(space)),
-            format!("{d} parameters cannot be sampled, {MOST_PARAMETERS} can"),
+            format!("{d} parameters cannot be sampled, {MAX_PARAMETERS} can"),
             "use a parameterization with fewer",
         ));
     }
@@ -127,7 +127,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         (_, lead) => lead.unwrap_or(sizes.target),
     };
     let mut slots = [NO_SLOT; 11];
-    let (mut lower, mut upper) = ([f32::MIN; MOST_PARAMETERS], [f32::MAX; MOST_PARAMETERS]);
+    let (mut lower, mut upper) = ([f32::MIN; MAX_PARAMETERS], [f32::MAX; MAX_PARAMETERS]);
     for (j, (quantity, parameter)) in space.quantities().iter().zip(space.parameters()).enumerate() {
         if let Some(slot) = slot_of(*quantity) {
             slots[slot as usize] = j as u32;
@@ -153,7 +153,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     let frame = &profile.frame;
     let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
     let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
-    let [least_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
+    let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
     Ok(Recipe {
         path: path as u32,
         lateral: lateral as u32,
@@ -167,7 +167,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         columns: columns(space),
         lower,
         upper,
-        least_duration: at_least(least_duration, false),
+        min_duration: at_least(min_duration, false),
         longest_duration: at_most(longest_duration),
         dt: frame.dt_s as f32,
         inverse_dt: (1.0 / frame.dt_s) as f32,

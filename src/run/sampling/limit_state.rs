@@ -7,7 +7,7 @@ use crate::model::profile::Profile;
 /// Far from any failure: nothing ever closed in.
 const FAR: f64 = 1e3;
 /// No demand counts for more: an infinite Brake Threat Number says only that no braking helps.
-const LARGEST_BTN: f64 = 10.0;
+const MAX_BTN: f64 = 10.0;
 /// Values that rounding would put on the wrong side stand this close to the limit.
 const LEAST: f64 = 1e-12;
 
@@ -29,7 +29,7 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
         Criterion::Collision if failed => -outcome.impact_closing_speed.abs(),
         Criterion::Collision => ttc,
         Criterion::Ttc => ttc - profile.criteria.ttc_threshold_s,
-        Criterion::Btn => profile.criteria.btn_threshold - outcome.max_btn.min(LARGEST_BTN),
+        Criterion::Btn => profile.criteria.btn_threshold - outcome.max_btn.min(MAX_BTN),
     };
     if failed { value.min(0.0) } else { value.max(LEAST) }
 }

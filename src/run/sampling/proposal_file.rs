@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::stats::density::{DensityModel, LARGEST_FILE_BYTES, Mixture};
+use crate::stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::{Error, Place, Result};
@@ -62,7 +62,7 @@ pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
 pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
-    proposal_from_text(&input_file::read(path, LARGEST_FILE_BYTES)?, density, &Place::file(path))
+    proposal_from_text(&input_file::read(path, MAX_FILE_BYTES)?, density, &Place::file(path))
 }
 
 /// A proposal for a density from the text of a file.

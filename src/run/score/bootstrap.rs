@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     fn units() -> Vec<UnitCounts> {
-        let cell = |k: u32| Confusion { both: k % 4, only_s: k % 3, only_s_prime: k % 2, neither: 10 };
+        let cell = |k: u32| Confusion { tp: k % 4, fn_: k % 3, fp: k % 2, tn: 10 };
         (0..23).map(|k| UnitCounts { unit: u64::from(k), cells: vec![cell(k), cell(k)], capped: vec![] }).collect()
     }
 
@@ -140,9 +140,9 @@ mod tests {
 
     #[test]
     fn the_counts_of_a_draw_pass_2_to_the_32() {
-        let cell = Confusion { both: u32::MAX, only_s: 1 << 31, only_s_prime: 3, neither: 0 };
+        let cell = Confusion { tp: u32::MAX, fn_: 1 << 31, fp: 3, tn: 0 };
         let units: Vec<_> = (0..5).map(|unit| UnitCounts { unit, cells: vec![cell], capped: vec![] }).collect();
-        let all = Confusion { both: 5 * u64::from(u32::MAX), only_s: 5 << 31, only_s_prime: 15, neither: 0 };
+        let all = Confusion { tp: 5 * u64::from(u32::MAX), fn_: 5 << 31, fp: 15, tn: 0 };
         let draws = bootstrap_draws(&units, 1, Category::Lvd, &ScoreOptions::default());
         assert!(draws.iter().all(|draw| draw[0] == all), "every draw has five units");
     }

@@ -22,7 +22,7 @@ use crate::scenario::Category;
 const NEAR: f64 = 0.05;
 
 /// Share of undefined draws above which a claim is undecided.
-const MOST_UNDEFINED: f64 = 0.05;
+const MAX_UNDEFINED: f64 = 0.05;
 
 /// A claim as data.
 #[derive(Debug, Clone, PartialEq)]
@@ -249,7 +249,7 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         let total: u64 = all.iter().map(failures).sum();
         let verdict = if cells.is_empty() || total < u64::from(least) {
             ClaimVerdict::TooFew
-        } else if f64::from(undefined_draws) > MOST_UNDEFINED * scores.draws.len() as f64 {
+        } else if f64::from(undefined_draws) > MAX_UNDEFINED * scores.draws.len() as f64 {
             ClaimVerdict::Undecided
         } else {
             verdict(&statistic, interval)
@@ -294,12 +294,12 @@ mod tests {
         let variants = ["S", "a", "b", "c", "d", "e", "f", "g"];
         let mut cells = Vec::new();
         for (variant, name) in variants.iter().enumerate() {
-            for (model, &both) in PAPER_MODELS.into_iter().zip(&failures) {
+            for (model, &tp) in PAPER_MODELS.into_iter().zip(&failures) {
                 for criterion in Criterion::ALL {
                     let counts = match *name {
                         "b" => b,
                         "d" => d,
-                        _ => Confusion { both, neither: 1000 - both, ..Confusion::default() },
+                        _ => Confusion { tp, tn: 1000 - tp, ..Confusion::default() },
                     };
                     cells.push(Cell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
                 }
@@ -323,8 +323,8 @@ mod tests {
         judge_claims(table).into_iter().find(|r| r.claim.id == id).map(|r| r.overall.verdict).unwrap()
     }
 
-    const GOOD: Confusion = Confusion { both: 90, only_s: 10, only_s_prime: 10, neither: 890 };
-    const BAD: Confusion = Confusion { both: 20, only_s: 80, only_s_prime: 0, neither: 900 };
+    const GOOD: Confusion = Confusion { tp: 90, fn_: 10, fp: 10, tn: 890 };
+    const BAD: Confusion = Confusion { tp: 20, fn_: 80, fp: 0, tn: 900 };
 
     #[test]
     fn equal_scores_are_nearly_the_same_and_distant_ones_contradict_it() {

@@ -30,16 +30,16 @@ fn of_unit(unit: &UnitCounts, plan: &LanePlan) -> Option<String> {
         return Some(format!("{capped} of {headways} lanes ended at the time cap"));
     }
     unit.cells.iter().enumerate().find_map(|(at, cell)| {
-        let Confusion { both, only_s, only_s_prime, neither } = *cell;
-        let lanes = sum(&[both, only_s, only_s_prime, neither]);
+        let Confusion { tp, fn_, fp, tn } = *cell;
+        let lanes = sum(&[tp, fn_, fp, tn]);
         if lanes != headways {
             return Some(format!("{lanes} lanes of {headways} headways"));
         }
-        if at < per_variant && (only_s > 0 || only_s_prime > 0) {
+        if at < per_variant && (fn_ > 0 || fp > 0) {
             return Some("S does not agree with itself".to_owned());
         }
-        let failures = u64::from(unit.cells[at % per_variant].both);
-        let here = sum(&[both, only_s]);
+        let failures = u64::from(unit.cells[at % per_variant].tp);
+        let here = sum(&[tp, fn_]);
         (here != failures).then(|| format!("S fails {failures} times by itself and {here} times beside S'"))
     })
 }

@@ -39,7 +39,7 @@ impl Statistic {
         };
         let f1_of = |variant: &&str| f1(&cell(variant, model, criterion)?);
         let mean = |values: Option<Vec<f64>>| values.map(|v| v.iter().sum::<f64>() / v.len() as f64);
-        let rate = |c: Confusion| c.both as f64 / (c.both as f64 + c.neither as f64).max(1.0);
+        let rate = |c: Confusion| c.tp as f64 / (c.tp as f64 + c.tn as f64).max(1.0);
         match *self {
             Statistic::F1Above(better, worse) => {
                 let better = better.iter().map(f1_of).collect::<Option<Vec<f64>>>()?;
@@ -71,7 +71,7 @@ impl Statistic {
     /// Failures of S that this cell has to judge the claim by: those of every model and criterion compared.
     pub fn failures(&self, scores: &CategoryScores, model: ModelId, criterion: Criterion) -> u64 {
         let of = |model: ModelId, criterion: Criterion| {
-            scores.index(0, model, criterion).map_or(0, |at| scores.cells[at].counts.both)
+            scores.index(0, model, criterion).map_or(0, |at| scores.cells[at].counts.tp)
         };
         match *self {
             Statistic::FailsMoreOften(often, seldom) => often.iter().chain(seldom).map(|m| of(*m, criterion)).sum(),
@@ -102,9 +102,9 @@ impl Statistic {
 
 /// (FP − FN)/(2TP + FP + FN); `None` where neither S nor S' ever fails.
 fn excess(c: &Confusion) -> Option<f64> {
-    let (only_s, only_s_prime) = (c.only_s as f64, c.only_s_prime as f64);
-    let all = 2.0 * c.both as f64 + only_s + only_s_prime;
-    (all > 0.0).then(|| (only_s_prime - only_s) / all)
+    let (fn_, fp) = (c.fn_ as f64, c.fp as f64);
+    let all = 2.0 * c.tp as f64 + fn_ + fp;
+    (all > 0.0).then(|| (fp - fn_) / all)
 }
 
 #[cfg(test)]
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn an_excess_past_2_to_the_32_is_that_of_its_shares() {
-        let c = Confusion { both: 3 << 31, only_s: 1 << 31, only_s_prime: 5 << 31, neither: 0 };
+        let c = Confusion { tp: 3 << 31, fn_: 1 << 31, fp: 5 << 31, tn: 0 };
         assert_eq!(excess(&c), Some(4.0 / 12.0));
     }
 }

@@ -14,12 +14,12 @@ use crate::{Error, Place, Result};
 
 /// Recall TP/(TP + FN); `None` where S never fails.
 pub fn recall(c: &Confusion) -> Option<f64> {
-    ratio(c.both as f64, c.both as f64 + c.only_s as f64)
+    ratio(c.tp as f64, c.tp as f64 + c.fn_ as f64)
 }
 
 /// Precision TP/(TP + FP); `None` where S' never fails.
 pub fn precision(c: &Confusion) -> Option<f64> {
-    ratio(c.both as f64, c.both as f64 + c.only_s_prime as f64)
+    ratio(c.tp as f64, c.tp as f64 + c.fp as f64)
 }
 
 /// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
@@ -29,13 +29,13 @@ pub fn precision(c: &Confusion) -> Option<f64> {
 /// use lanesweep::engine::Confusion;
 ///
 /// // S and S' fail together 8 times, S alone twice, S' alone never.
-/// let counts = Confusion { both: 8, only_s: 2, only_s_prime: 0, neither: 90 };
+/// let counts = Confusion { tp: 8, fn_: 2, fp: 0, tn: 90 };
 /// assert_eq!(f1(&counts), Some(16.0 / 18.0));
-/// assert_eq!(f1(&Confusion { both: 0, only_s: 0, only_s_prime: 0, neither: 100 }), None);
+/// assert_eq!(f1(&Confusion { tp: 0, fn_: 0, fp: 0, tn: 100 }), None);
 /// ```
 pub fn f1(c: &Confusion) -> Option<f64> {
-    let twice = 2.0 * c.both as f64;
-    ratio(twice, twice + c.only_s as f64 + c.only_s_prime as f64)
+    let twice = 2.0 * c.tp as f64;
+    ratio(twice, twice + c.fn_ as f64 + c.fp as f64)
 }
 
 /// In f64, where no sum wraps; sums below 2^53 are exact.
@@ -51,13 +51,13 @@ pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
 ) -> Option<Interval> {
-    let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.both) + u64::from(c.only_s)).sum();
+    let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.tp) + u64::from(c.fn_)).sum();
     if failures_of_s < u64::from(options.least_failures.max(1)) {
         return None;
     }
-    let any = |c: &Confusion<u32>| u64::from(c.both) + u64::from(c.only_s) + u64::from(c.only_s_prime);
+    let any = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
     let (runs, agreed): (Vec<u64>, Vec<u64>) =
-        scenarios.map(|c| (any(c), u64::from(c.both))).filter(|(any, _)| *any > 0).unzip();
+        scenarios.map(|c| (any(c), u64::from(c.tp))).filter(|(any, _)| *any > 0).unzip();
     let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
     let f1 = |j: f64| 2.0 * j / (1.0 + j);
     Some(Interval { low: f1(share.low), high: f1(share.high) })
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_confusion_by_hand() {
-        let c = Confusion { both: 6, only_s: 2, only_s_prime: 4, neither: 88 };
+        let c = Confusion { tp: 6, fn_: 2, fp: 4, tn: 88 };
         assert_eq!(recall(&c), Some(0.75));
         assert_eq!(precision(&c), Some(0.6));
         assert_eq!(f1(&c), Some(12.0 / 18.0));
@@ -199,21 +199,21 @@ mod tests {
 
     #[test]
     fn counts_past_2_to_the_32_score_as_their_shares_do() {
-        let c = Confusion { both: 6 << 40, only_s: 2 << 40, only_s_prime: 4 << 40, neither: 88 << 40 };
+        let c = Confusion { tp: 6 << 40, fn_: 2 << 40, fp: 4 << 40, tn: 88 << 40 };
         assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
-        let most = Confusion { both: u64::MAX, ..Confusion::default() };
+        let most = Confusion { tp: u64::MAX, ..Confusion::default() };
         assert_eq!(f1(&most), Some(1.0));
     }
 
     #[test]
     fn where_nothing_ever_fails_there_is_no_score() {
-        let c = Confusion { neither: 100, ..Confusion::default() };
+        let c = Confusion { tn: 100, ..Confusion::default() };
         assert_eq!((recall(&c), precision(&c), f1(&c)), (None, None, None));
     }
 
     #[test]
     fn a_parameterization_that_misses_every_failure_scores_0_and_has_no_precision() {
-        let c = Confusion { only_s: 3, neither: 7, ..Confusion::default() };
+        let c = Confusion { fn_: 3, tn: 7, ..Confusion::default() };
         assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.0), None, Some(0.0)));
     }
 }

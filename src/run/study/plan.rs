@@ -275,7 +275,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         let recorded = if category == Category::Lvd { 1.0 } else { 2.0 };
         values += kept.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * recorded;
         check_size(entries, values, dt_s)?;
-        held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::most_bytes(scenario)).sum());
+        held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::max_bytes(scenario)).sum());
         for scenario in &kept {
             if category == Category::CutOut {
                 vehicle_ahead(scenario)?;

@@ -7,10 +7,10 @@ use crate::scenario::{Category, Ego, Other, Scenario, Side};
 const RIGHT: u8 = 1;
 const HAS_LEAD: u8 = 2;
 /// Largest record: hours at 1000 samples a second fit.
-pub(crate) const LARGEST_RECORD: usize = 256 << 20;
+pub(crate) const MAX_RECORD: usize = 256 << 20;
 
 /// Bytes that the record of a scenario has at most.
-pub(crate) fn most_bytes(scenario: &Scenario) -> usize {
+pub(crate) fn max_bytes(scenario: &Scenario) -> usize {
     let series = if scenario.category == Category::Lvd { 1 } else { 2 + usize::from(scenario.lead.is_some()) };
     13 + scenario.id.len() + 8 * (9 + series * scenario.target.v.len())
 }
@@ -66,7 +66,7 @@ impl<'a> Parts<'a> {
 /// Number of bytes of the record that these bytes begin with, if it is whole.
 pub(crate) fn length(bytes: &[u8]) -> Option<usize> {
     let size = Parts(bytes).word()? as usize;
-    (size <= LARGEST_RECORD && 4 + size <= bytes.len()).then_some(4 + size)
+    (size <= MAX_RECORD && 4 + size <= bytes.len()).then_some(4 + size)
 }
 
 /// The id in a whole record.
@@ -152,7 +152,7 @@ mod tests {
         assert!(Category::ALL.iter().all(|category| records.iter().any(|(s, _)| s.category == *category)));
         for (scenario, bytes) in &records {
             assert_eq!(length(bytes), Some(bytes.len()));
-            assert!(bytes.len() <= most_bytes(scenario));
+            assert!(bytes.len() <= max_bytes(scenario));
             let read = read(bytes, scenario.category).unwrap();
             let mut again = Vec::new();
             write(&read, &mut again);

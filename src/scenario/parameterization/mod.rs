@@ -25,7 +25,7 @@ pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };
 pub use recorded::recorded_case;
-pub use reduction::{LEAST_DURATION_S, ReducedScenario, Reduction};
+pub use reduction::{MIN_DURATION_S, ReducedScenario, Reduction};
 pub use series::TimeGrid;
 pub(crate) use series::steps_of;
 pub use sizes::{Sizes, VehicleSize};

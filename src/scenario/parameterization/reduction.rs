@@ -9,7 +9,7 @@ use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario};
 use crate::{Error, Result};
 
 /// Shortest duration of a reconstruction, s.
-pub const LEAST_DURATION_S: f64 = 0.1;
+pub const MIN_DURATION_S: f64 = 0.1;
 
 /// A decomposition of one category's scenarios.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,7 +147,7 @@ impl Reduction {
         };
         let lateral = |part: &[f64]| part.iter().map(|y| y * mirror).collect::<Vec<_>>();
         let extras = &z[series_count(self.category) * n..];
-        let duration_s = extras[extras.len() - 1].max(LEAST_DURATION_S);
+        let duration_s = extras[extras.len() - 1].max(MIN_DURATION_S);
         match self.category {
             Category::CutIn => ReducedScenario {
                 y: lateral(&z[..n]),

@@ -82,7 +82,7 @@ impl ExposureFile {
     /// belongs to other scenarios than those with `scenarios_sha256`.
     pub fn read_beside(scenarios: &Path, scenarios_sha256: &str) -> Result<Option<ExposureFile>> {
         let path = Self::path_of(scenarios);
-        let text = match input_file::read(&path, input_file::LARGEST_SETTINGS_BYTES) {
+        let text = match input_file::read(&path, input_file::MAX_SETTINGS_BYTES) {
             Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             read => read?,
         };

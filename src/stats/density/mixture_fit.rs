@@ -10,7 +10,7 @@ use crate::{Error, Place, Result};
 /// Purpose of the words that choose first centres.
 const PURPOSE: u32 = 0x464D_0001;
 /// A component below this weight is dropped.
-const LEAST_WEIGHT: f64 = 1e-3;
+const MIN_WEIGHT: f64 = 1e-3;
 /// Added to every variance, as a share of the points' variance of that parameter.
 const JITTER: f64 = 1e-6;
 
@@ -190,7 +190,7 @@ impl<'a> Weighted<'a> {
         for share in shares {
             let own = self.points.iter().zip(share).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
             let weight: f64 = own.clone().map(|p| p.1).sum();
-            if weight < LEAST_WEIGHT {
+            if weight < MIN_WEIGHT {
                 continue;
             }
             let effective = weight * weight / own.clone().map(|p| p.1 * p.1).sum::<f64>();

@@ -30,7 +30,7 @@ use crate::{Error, Place, Result};
 const VERSION: u64 = 1;
 
 /// Largest file that is read: 10⁶ kernels of ten parameters fit.
-pub const LARGEST_FILE_BYTES: u64 = 256 << 20;
+pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// Bandwidths of kernels whose scales are those of the parameters.
 const BANDWIDTHS: RangeInclusive<f64> = 1e-9..=1e3;
@@ -279,17 +279,17 @@ fn broken(place: &Place, error: &serde_json::Error) -> Error {
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] naming file, line or field: not JSON, another version, a
 /// missing or unknown field, a number that is not finite, lengths that do not fit, a content that does not have
-/// the SHA-256 in the file, or more than [`LARGEST_FILE_BYTES`].
+/// the SHA-256 in the file, or more than [`MAX_FILE_BYTES`].
 pub fn read_density(path: &Path) -> Result<DensityModel> {
     let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
-    if bytes > LARGEST_FILE_BYTES {
+    if bytes > MAX_FILE_BYTES {
         return Err(Error::input(
             Place::file(path),
-            format!("{} MiB, but a density file has at most {}", bytes >> 20, LARGEST_FILE_BYTES >> 20),
+            format!("{} MiB, but a density file has at most {}", bytes >> 20, MAX_FILE_BYTES >> 20),
             "fit on fewer scenarios, or check that this is the right file",
         ));
     }
-    DensityModel::from_json(&input_file::read(path, LARGEST_FILE_BYTES)?, &Place::file(path))
+    DensityModel::from_json(&input_file::read(path, MAX_FILE_BYTES)?, &Place::file(path))
 }
 
 /// Writes a density file: whole or not at all.

@@ -15,9 +15,9 @@
 //! reconstructed series are no reason to refuse a point: below 0 they are set to 0, as in a study. The filters of
 //! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
-use super::quantity::{LONGEST_DURATION_S, Parameter, Quantity};
+use super::quantity::{MAX_DURATION_S, Parameter, Quantity};
 use crate::scenario::parameterization::{
-    CutInParameters, CutOutParameters, Kind, LEAST_DURATION_S, LateralStart, LvdParameters, ParameterizationId,
+    CutInParameters, CutOutParameters, Kind, LateralStart, LvdParameters, MIN_DURATION_S, ParameterizationId,
     ParameterizationOptions, ReducedScenario, Reduction, Sizes,
 };
 use crate::scenario::{Case, Category, Scenario};
@@ -72,7 +72,7 @@ fn in_range(parameter: &str, value: f64, lower: f64, upper: f64) -> std::result:
 
 impl ParameterSpace {
     /// Range of a valid T, s.
-    pub const DURATION_RANGE_S: [f64; 2] = [LEAST_DURATION_S, LONGEST_DURATION_S];
+    pub const DURATION_RANGE_S: [f64; 2] = [MIN_DURATION_S, MAX_DURATION_S];
 
     /// The space of a parameterization; `reduction` is needed for one by SVD and ignored else.
     ///
@@ -289,7 +289,7 @@ impl ParameterSpace {
                     let bound = format!("< v0_mps = {v0}");
                     return Err(Invalid { parameter: "v1_mps".to_owned(), value: v1, bound });
                 }
-                in_range("duration_s", (v0 - v1) / point[2], LEAST_DURATION_S, LONGEST_DURATION_S)
+                in_range("duration_s", (v0 - v1) / point[2], MIN_DURATION_S, MAX_DURATION_S)
             }
             _ => Ok(()),
         }
@@ -353,7 +353,7 @@ impl ParameterSpace {
 
 fn check_rebuilt(reduction: &Reduction, coefficients: &[f64]) -> std::result::Result<(), Invalid> {
     let column = |c| reduction.rebuilt_column(coefficients, c);
-    in_range("duration_s", column(reduction.duration_column()), LEAST_DURATION_S, LONGEST_DURATION_S)?;
+    in_range("duration_s", column(reduction.duration_column()), MIN_DURATION_S, MAX_DURATION_S)?;
     in_range("v_ego_mps", column(reduction.ego_speed_column()), 0.0, f64::INFINITY)?;
     match reduction.lead_gap_column() {
         Some(gap) => in_range("gap_lead_m", column(gap), 0.0, f64::INFINITY),

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::parameterization::{LEAST_DURATION_S, ParameterizationOptions};
+use crate::scenario::parameterization::{MIN_DURATION_S, ParameterizationOptions};
 
 /// Longest duration T of a valid point, s: five times the longest run, which ends after 120 s. It keeps sampled
 /// series short where a deceleration comes out near 0.
-pub const LONGEST_DURATION_S: f64 = 600.0;
+pub const MAX_DURATION_S: f64 = 600.0;
 
 /// Physical ranges of a density's numbers: unit, smallest scale of a parameter, largest size of a value or scale. Beyond,
 /// nothing drives, and the lane arithmetic (binary32) has no normal number.
@@ -101,7 +101,7 @@ impl Quantity {
             Quantity::LeadSpeed => ("v_lead_mps", "m/s", Some(0.0), false, None),
             Quantity::LeadAcceleration => ("acceleration_lead_mps2", "m/s²", None, false, None),
             Quantity::LeadGap => ("gap_lead_m", "m", Some(0.0), false, None),
-            Quantity::Duration => ("duration_s", "s", Some(LEAST_DURATION_S), false, Some(LONGEST_DURATION_S)),
+            Quantity::Duration => ("duration_s", "s", Some(MIN_DURATION_S), false, Some(MAX_DURATION_S)),
             Quantity::InitialSpeed => ("v0_mps", "m/s", Some(0.0), false, None),
             Quantity::FinalSpeed => ("v1_mps", "m/s", Some(0.0), false, None),
             Quantity::MeanDeceleration => ("mean_deceleration_mps2", "m/s²", Some(0.0), true, None),

@@ -8,7 +8,7 @@
 //! compared; kinematic parameterizations are compared as points divided by their scales, so their M say
 //! something among runs of the same parameterization only.
 //!
-//! W is exact. Of sets larger than [`LARGEST_SET`] a random part of that size is taken, which shortens neither
+//! W is exact. Of sets larger than [`MAX_SET`] a random part of that size is taken, which shortens neither
 //! side alone: W of small sets is larger, for all terms of one table alike.
 
 use rayon::prelude::*;
@@ -28,11 +28,11 @@ use crate::{Error, Place, Result};
 /// β of the metric.
 pub const BETA: f64 = 0.25;
 /// Points of a set beyond which a random part is taken.
-pub const LARGEST_SET: usize = 256;
+pub const MAX_SET: usize = 256;
 /// Random splits.
 pub const REPETITIONS: usize = 5;
 /// Draws after which a split gives up on finding as many valid scenarios as it needs, per scenario.
-const MOST_TRIES: u64 = 1000;
+const MAX_TRIES: u64 = 1000;
 /// [`Stream::purpose`] of splits and draws; the repetition is added.
 const PURPOSE: u32 = 0x7265_7000;
 
@@ -123,8 +123,8 @@ fn one_split(
     let train_points = points(train)?;
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
     let kde = Kde::fit(train_points.clone(), &names, rule)?;
-    let (train, test) = (&train[..train.len().min(LARGEST_SET)], &test[..test.len().min(LARGEST_SET)]);
-    let most = MOST_TRIES * train.len() as u64;
+    let (train, test) = (&train[..train.len().min(MAX_SET)], &test[..test.len().min(MAX_SET)]);
+    let most = MAX_TRIES * train.len() as u64;
     let valid = (1..=most).map(|index| kde.draw(&stream, index)).filter(|x| fitted.is_valid(x)).take(train.len());
     let generated: Vec<Vec<f64>> = valid.collect();
     if generated.len() < train.len() {

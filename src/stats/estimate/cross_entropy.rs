@@ -23,7 +23,7 @@ const WIDENING: f64 = 0.25;
 const WIDENED_SHARE: f64 = 0.5;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
-const LEAST_WEIGHT: f64 = 0.02;
+const MIN_WEIGHT: f64 = 0.02;
 
 /// How to find a proposal and sample it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,7 +166,7 @@ pub fn cross_entropy(
 /// stands for smoothing the parameters, which has no meaning where the numbers of components differ.
 fn smoothed(new: &Mixture, old: &Mixture, share: f64) -> Result<Mixture> {
     let both = Mixture::join(&[(share, new), (1.0 - share, old)])?;
-    let kept: Vec<usize> = (0..both.weights().len()).filter(|k| both.weights()[*k] >= LEAST_WEIGHT).collect();
+    let kept: Vec<usize> = (0..both.weights().len()).filter(|k| both.weights()[*k] >= MIN_WEIGHT).collect();
     if kept.is_empty() {
         return Ok(both);
     }

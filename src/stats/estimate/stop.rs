@@ -42,7 +42,7 @@ pub struct StopRule {
     /// Most samples, ≥ 1. Always a limit.
     pub samples: u64,
     /// End at the first checkpoint at which half the interval's width over the estimate is at most this, there
-    /// being at least [`StopRule::LEAST_FAILURES`] failures.
+    /// being at least [`StopRule::MIN_FAILURES`] failures.
     pub relative_half_width: Option<f64>,
     /// End at the first checkpoint after this time. The result then depends on the machine and says so.
     pub time_limit: Option<Duration>,
@@ -71,7 +71,7 @@ impl StopReason {
 
 impl StopRule {
     /// Failures before a narrow interval is believed: fewer make intervals narrow by luck.
-    pub const LEAST_FAILURES: u64 = 10;
+    pub const MIN_FAILURES: u64 = 10;
 
     /// So many samples and no other rule.
     pub fn samples(samples: u64) -> StopRule {
@@ -95,7 +95,7 @@ impl StopRule {
         started: Instant,
     ) -> Option<StopReason> {
         let is_narrow = self.relative_half_width.is_some_and(|goal| relative_half_width <= goal);
-        if is_narrow && failures >= Self::LEAST_FAILURES {
+        if is_narrow && failures >= Self::MIN_FAILURES {
             Some(StopReason::RelativeHalfWidth)
         } else if samples >= self.samples {
             Some(StopReason::Samples)

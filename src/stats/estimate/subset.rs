@@ -169,9 +169,9 @@ fn conclude(
     estimate.trust.about_voids(voids, options.samples_per_level);
     for (i, level) in levels.iter().enumerate().skip(1) {
         let stuck = Warning::ChainsStuck { level: i + 1, acceptance: level.acceptance };
-        estimate.trust.warn_if(level.acceptance < Warning::LEAST_ACCEPTANCE, stuck);
+        estimate.trust.warn_if(level.acceptance < Warning::MIN_ACCEPTANCE, stuck);
     }
-    estimate.trust.warn_if(reached && lineages < Warning::LEAST_LINEAGES, Warning::FewLineages { lineages });
+    estimate.trust.warn_if(reached && lineages < Warning::MIN_LINEAGES, Warning::FewLineages { lineages });
     let threshold = levels.last().map_or(f64::INFINITY, |l| l.threshold);
     estimate.trust.warn_if(!reached, Warning::LevelsNotReached { levels: levels.len(), threshold });
     estimate

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum Warning {
     /// No failure in the sample: the probability is only bounded from above.
     NoFailures,
-    /// Fewer than [`Warning::LEAST_FAILURES`] failures: normal intervals do not hold.
+    /// Fewer than [`Warning::MIN_FAILURES`] failures: normal intervals do not hold.
     FewFailures {
         /// How many.
         failures: u64,
@@ -23,13 +23,13 @@ pub enum Warning {
     },
     /// The interval is that of the draws alone, but the density rests on data.
     DataLeftOut,
-    /// Effective sample size over the failures below [`Warning::LEAST_EFFECTIVE_SIZE`]: the variance itself is
+    /// Effective sample size over the failures below [`Warning::MIN_EFFECTIVE_SIZE`]: the variance itself is
     /// badly known.
     LowEffectiveSize {
         /// (Σw)²/Σw² over failures.
         effective_size: f64,
     },
-    /// One failure carries more than [`Warning::LARGEST_SHARE`] of the estimate.
+    /// One failure carries more than [`Warning::MAX_FRACTION`] of the estimate.
     OneWeightDominates {
         /// Its share.
         share: f64,
@@ -58,14 +58,14 @@ pub enum Warning {
         /// Failures that the estimate lets expect.
         expected: f64,
     },
-    /// Markov chains moved in less than [`Warning::LEAST_ACCEPTANCE`] of their steps.
+    /// Markov chains moved in less than [`Warning::MIN_ACCEPTANCE`] of their steps.
     ChainsStuck {
         /// Level, counted from 1.
         level: usize,
         /// Share of steps that moved.
         acceptance: f64,
     },
-    /// The surviving samples descend from effectively fewer than [`Warning::LEAST_LINEAGES`] independent ones.
+    /// The surviving samples descend from effectively fewer than [`Warning::MIN_LINEAGES`] independent ones.
     FewLineages {
         /// Effective number.
         lineages: f64,
@@ -89,13 +89,13 @@ pub enum Warning {
 
 impl Warning {
     /// Failures below which [`Warning::FewFailures`] is raised.
-    pub const LEAST_FAILURES: u64 = 10;
+    pub const MIN_FAILURES: u64 = 10;
     /// Effective number of failing scenarios below which [`Warning::FewScenarios`] is raised.
     pub const MIN_SCENARIOS: f64 = 10.0;
     /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
-    pub const LEAST_EFFECTIVE_SIZE: f64 = 30.0;
+    pub const MIN_EFFECTIVE_SIZE: f64 = 30.0;
     /// Share of the estimate above which [`Warning::OneWeightDominates`] is raised.
-    pub const LARGEST_SHARE: f64 = 0.1;
+    pub const MAX_FRACTION: f64 = 0.1;
     /// Standard errors above which [`Warning::MeanWeightOff`] is raised.
     pub const MEAN_WEIGHT_ERRORS: f64 = 4.0;
     /// Distance from 1 above which [`Warning::MeanWeightOff`] is raised.
@@ -108,9 +108,9 @@ impl Warning {
     /// Two-sided likelihood below which [`Warning::DisagreesWithPilot`] is raised.
     pub const PILOT_LIKELIHOOD: f64 = 0.001;
     /// Acceptance below which [`Warning::ChainsStuck`] is raised.
-    pub const LEAST_ACCEPTANCE: f64 = 0.1;
+    pub const MIN_ACCEPTANCE: f64 = 0.1;
     /// Lineages below which [`Warning::FewLineages`] is raised.
-    pub const LEAST_LINEAGES: f64 = 10.0;
+    pub const MIN_LINEAGES: f64 = 10.0;
     /// Share of void indices above which [`Warning::VoidDraws`] is raised.
     pub const VOID_SHARE: f64 = 0.001;
 
@@ -225,7 +225,7 @@ impl Trust {
     /// The warnings about the number of failures.
     pub(crate) fn about_failures(&mut self, failures: u64) {
         self.warn_if(failures == 0, Warning::NoFailures);
-        self.warn_if((1..Warning::LEAST_FAILURES).contains(&failures), Warning::FewFailures { failures });
+        self.warn_if((1..Warning::MIN_FAILURES).contains(&failures), Warning::FewFailures { failures });
     }
 
     /// The warning about void indices.

@@ -170,9 +170,9 @@ impl Trust {
             return;
         }
         let effective_size = figures.effective_size_failures;
-        self.warn_if(effective_size < Warning::LEAST_EFFECTIVE_SIZE, Warning::LowEffectiveSize { effective_size });
+        self.warn_if(effective_size < Warning::MIN_EFFECTIVE_SIZE, Warning::LowEffectiveSize { effective_size });
         let share = figures.largest_share_failures;
-        self.warn_if(share > Warning::LARGEST_SHARE, Warning::OneWeightDominates { share });
+        self.warn_if(share > Warning::MAX_FRACTION, Warning::OneWeightDominates { share });
         let (share, failures) = (figures.thin_share, figures.thin_failures);
         self.warn_if(share > Warning::THIN_SHARE, Warning::ModeMissed { share, failures });
     }

@@ -14,7 +14,7 @@ use crate::support::input_file;
 use crate::{Error, Place, Result};
 
 /// Longest row: no table here has any near it, and a quote that is never closed makes the rest of a file one row.
-const LONGEST_ROW_BYTES: u64 = 16 << 20;
+const MAX_ROW_BYTES: u64 = 16 << 20;
 
 pub(super) struct CsvRows {
     path: PathBuf,
@@ -43,7 +43,7 @@ impl Read for Rationed {
 
 impl CsvRows {
     pub(super) fn open(path: &Path) -> Result<(Vec<String>, CsvRows)> {
-        let ration = Rc::new(Cell::new(LONGEST_ROW_BYTES));
+        let ration = Rc::new(Cell::new(MAX_ROW_BYTES));
         let file = Rationed { file: BufReader::new(input_file::open(path)?), left: ration.clone() };
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
         let mut rows =
@@ -71,7 +71,7 @@ impl CsvRows {
     }
 
     pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
-        self.ration.set(LONGEST_ROW_BYTES);
+        self.ration.set(MAX_ROW_BYTES);
         if !self.reader.read_record(&mut self.record).map_err(|e| told(&self.path, e))? {
             return Ok(None);
         }
@@ -92,7 +92,7 @@ fn told(path: &Path, error: csv::Error) -> Error {
     match error.into_kind() {
         csv::ErrorKind::Io(source) if source.kind() == std::io::ErrorKind::OutOfMemory => Error::input(
             line.map_or(Place::file(path), |line| Place::file(path).row(line)),
-            format!("a row is longer than {} MiB", LONGEST_ROW_BYTES >> 20),
+            format!("a row is longer than {} MiB", MAX_ROW_BYTES >> 20),
             "look for a quote that is not closed",
         ),
         csv::ErrorKind::Io(source) => Error::io(path, "read", source),

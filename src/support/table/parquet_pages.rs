@@ -10,11 +10,11 @@ use parquet::file::metadata::ColumnChunkMetaData;
 /// Deepest nesting of groups: a list in a record in the root has four.
 const DEEPEST: usize = 8;
 /// Largest footer, bytes.
-const LARGEST_FOOTER: u64 = 64 << 20;
+const MAX_FOOTER: u64 = 64 << 20;
 /// Longest page header, bytes.
-const LONGEST_HEADER: u64 = 1 << 20;
+const MAX_HEADER: u64 = 1 << 20;
 /// Largest page, bytes.
-const LARGEST_PAGE: i64 = 256 << 20;
+const MAX_PAGE: i64 = 256 << 20;
 /// Bytes that may come of a file of any size, and more for each of its bytes.
 const BYTES: u64 = 16 << 20;
 const BYTES_PER_BYTE: u64 = 256;
@@ -38,7 +38,7 @@ pub(super) fn check_footer(file: &mut File, size: u64) -> Result<(), Refusal> {
         return Err(if &tail[4..] == b"PARE" { "it is encrypted" } else { "it does not end as a Parquet file does" });
     }
     let length = u64::from(u32::from_le_bytes([tail[0], tail[1], tail[2], tail[3]]));
-    if length > size - 8 || length > LARGEST_FOOTER {
+    if length > size - 8 || length > MAX_FOOTER {
         return Err(DAMAGED);
     }
     let mut footer = vec![0; length as usize];
@@ -93,7 +93,7 @@ pub(super) fn check_pages<'a>(
         let end = start.checked_add(length).filter(|end| *end <= size).ok_or(DAMAGED)?;
         let mut at = start;
         while at < end {
-            let page = page(file, at, (end - at).min(LONGEST_HEADER))?;
+            let page = page(file, at, (end - at).min(MAX_HEADER))?;
             bytes += page.uncompressed;
             values += page.values;
             largest = largest.max(page.uncompressed);
@@ -148,7 +148,7 @@ fn header(bytes: &[u8]) -> Option<Page> {
         }
         _ => Some(false),
     })?;
-    let fits = (0..=LARGEST_PAGE).contains(&uncompressed) && compressed >= 0;
+    let fits = (0..=MAX_PAGE).contains(&uncompressed) && compressed >= 0;
     fits.then(|| Page {
         length: compact.at as u64 + compressed as u64,
         uncompressed: uncompressed as u64,

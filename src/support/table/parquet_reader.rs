@@ -28,9 +28,9 @@ use crate::{Error, Place, Result};
 const BATCH_ROWS: u64 = 64;
 const BATCH_BYTES: u64 = 8 << 20;
 /// Longest series: eleven hours at 25 Hz.
-const LONGEST_SERIES: usize = 1 << 20;
+const MAX_SERIES: usize = 1 << 20;
 /// Longest text, bytes: every row may repeat it.
-const LONGEST_TEXT: usize = 1 << 16;
+const MAX_TEXT: usize = 1 << 16;
 
 pub(super) struct ParquetRows {
     path: PathBuf,
@@ -239,8 +239,8 @@ fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
     }
     Ok(match array.data_type() {
         DataType::Utf8 => match array.as_string::<i32>().value(at) {
-            text if text.len() > LONGEST_TEXT => {
-                return Err(format!("a text has {} bytes; at most {LONGEST_TEXT} can be read", text.len()));
+            text if text.len() > MAX_TEXT => {
+                return Err(format!("a text has {} bytes; at most {MAX_TEXT} can be read", text.len()));
             }
             text => Value::from(text),
         },
@@ -249,8 +249,8 @@ fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
         DataType::Float64 => Value::from(array.as_primitive::<Float64Type>().value(at)),
         DataType::List(_) => {
             let items = array.as_list::<i32>().value(at);
-            if items.len() > LONGEST_SERIES {
-                return Err(format!("a series has {} values; at most {LONGEST_SERIES} can be read", items.len()));
+            if items.len() > MAX_SERIES {
+                return Err(format!("a series has {} values; at most {MAX_SERIES} can be read", items.len()));
             }
             let items = Leaf { record: None, values: items };
             Value::Array((0..items.values.len()).map(|at| value(&items, at)).collect::<std::result::Result<_, _>>()?)

@@ -100,7 +100,7 @@ struct Profile<'a> {
     least: Vec<f64>,
     window: usize,
     reach: usize,
-    calm_m: f64,
+    quiescent_gap_m: f64,
     far_m: f64,
     near_m: f64,
     lc_end: LaneChangeEnd,
@@ -114,7 +114,7 @@ impl<'a> Profile<'a> {
             least: trailing_min(s, window),
             window,
             reach: samples(options.search_s, frame_rate_hz),
-            calm_m: options.calm_speed_mps * options.window_s,
+            quiescent_gap_m: options.calm_speed_mps * options.window_s,
             far_m: options.far_share * lane_width_m,
             near_m: options.near_share * lane_width_m,
             lc_end: options.lc_end,
@@ -123,7 +123,7 @@ impl<'a> Profile<'a> {
 
     /// Progress over the window that ends at `k` is small. A window that is not complete is not calm.
     fn calm(&self, k: usize) -> bool {
-        k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.calm_m - TOLERANCE
+        k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.quiescent_gap_m - TOLERANCE
     }
 
     /// Last sample before the crossing `k` at which the change had not begun.

@@ -41,8 +41,8 @@ struct Rise {
     x: Vec<f64>,
     /// Least value over the trailing window.
     least: Vec<f64>,
-    /// `calm_from[j]`: first sample ≥ j from which the next window rises by less than the threshold.
-    calm_from: Vec<Option<usize>>,
+    /// `quiescent_from[j]`: first sample ≥ j from which the next window rises by less than the threshold.
+    quiescent_from: Vec<Option<usize>>,
     window: usize,
     threshold: f64,
 }
@@ -50,12 +50,12 @@ struct Rise {
 impl Rise {
     fn new(x: Vec<f64>, window: usize, threshold: f64) -> Self {
         let least = trailing_min(&x, window);
-        let mut calm_from = vec![None; x.len() + 1];
+        let mut quiescent_from = vec![None; x.len() + 1];
         for j in (0..x.len().saturating_sub(window)).rev() {
             let end = j + window;
-            calm_from[j] = if x[end] - least[end] < threshold { Some(j) } else { calm_from[j + 1] };
+            quiescent_from[j] = if x[end] - least[end] < threshold { Some(j) } else { quiescent_from[j + 1] };
         }
-        Rise { x, least, calm_from, window, threshold }
+        Rise { x, least, quiescent_from, window, threshold }
     }
 
     /// If an activity starts at `k`: its end, `None` inside for the end of the track.
@@ -69,7 +69,7 @@ impl Rise {
         if !starts {
             return None;
         }
-        let end = self.calm_from[k + 1];
+        let end = self.quiescent_from[k + 1];
         let last = end.unwrap_or(self.x.len() - 1);
         ((self.x[last] - self.x[k]).abs() > min_change).then_some(end)
     }

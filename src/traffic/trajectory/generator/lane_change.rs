@@ -27,15 +27,15 @@ const NO_HURRY: f64 = 0.35;
 /// many cut-ins are slower than the ego (published: 362 of 2,992 below 0.95 of its speed).
 const LAG_BRAKING_MPS2: f64 = 0.10;
 /// Shortest time to collision with the new neighbours at the start of a change, s.
-const SHORTEST_TTC_S: f64 = 3.5;
+const MIN_TTC_S: f64 = 3.5;
 /// Shortest gap to the new neighbours at the start, m.
-const SHORTEST_GAP_M: f64 = 4.0;
+const MIN_GAP_M: f64 = 4.0;
 /// Headway to the new leader at which half of the drivers accept, s.
 const LEAD_HALF_S: f64 = 0.55;
 /// Own braking behind the new leader that makes acceptance fall by a factor e, m/s².
 const LEAD_BRAKING_MPS2: f64 = 0.5;
 /// Least sum of the gaps before and behind, m.
-const SHORTEST_ROOM_M: f64 = 15.0;
+const MIN_ROOM_M: f64 = 15.0;
 /// A leader that is this much further away than the own headway holds nobody up, s.
 const LOOK_AHEAD_S: f64 = 8.0;
 /// Keeping right may cost this much speed, m/s.
@@ -104,9 +104,8 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
         let squared = (value / half) * (value / half);
         squared * squared / (1.0 + squared * squared)
     };
-    let too_close = |gap_m: f64, closing_mps: f64| {
-        gap_m < SHORTEST_GAP_M || (closing_mps > 0.0 && gap_m < SHORTEST_TTC_S * closing_mps)
-    };
+    let too_close =
+        |gap_m: f64, closing_mps: f64| gap_m < MIN_GAP_M || (closing_mps > 0.0 && gap_m < MIN_TTC_S * closing_mps);
     let mut accepted = if there.behind.is_some() { 1.0 } else { NO_HURRY };
     if let Some(lag) = there.behind {
         let closing_mps = lag.speed_mps - speed_mps;
@@ -135,7 +134,7 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
         }
     }
     if let (Some(lag), Some(lead)) = (there.behind, there.ahead)
-        && lag.gap_m + lead.gap_m < SHORTEST_ROOM_M
+        && lag.gap_m + lead.gap_m < MIN_ROOM_M
     {
         return 0.0;
     }

@@ -53,7 +53,7 @@ const READ_AHEAD_BYTES: usize = 1 << 18;
 
 /// A line of the format has a few hundred bytes. Where none ends within this, the file is another one, or a quotation
 /// mark is not closed.
-const LONGEST_LINE_BYTES: u64 = 1 << 20;
+const MAX_LINE_BYTES: u64 = 1 << 20;
 
 impl Table {
     /// Opens a file and reads its header. `known` are the names that the format gives its columns: a
@@ -266,7 +266,7 @@ impl Table {
         match error.into_kind() {
             csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
                 Place::file(&self.path).row(self.last_line + 1),
-                format!("no line ends here within {} MiB, nor a quotation mark", LONGEST_LINE_BYTES >> 20),
+                format!("no line ends here within {} MiB, nor a quotation mark", MAX_LINE_BYTES >> 20),
                 "remove a quotation mark that is not closed; or copy or export the file again",
             ),
             csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
@@ -409,7 +409,7 @@ impl<R> Hashing<R> {
 impl<R: Read> Read for Hashing<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         // More is asked for where all that came belongs to the line: it would be held in memory as a whole.
-        if self.bytes - self.line_from.min(self.bytes) > LONGEST_LINE_BYTES {
+        if self.bytes - self.line_from.min(self.bytes) > MAX_LINE_BYTES {
             self.is_endless = true;
             return Err(io::Error::from(io::ErrorKind::InvalidData));
         }

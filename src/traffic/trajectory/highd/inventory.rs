@@ -82,7 +82,7 @@ pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 
 /// What the marker of a folder says of its recordings, in one line; `None` without a marker.
 pub fn made_up(dir: &Path) -> Option<String> {
-    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::LARGEST_SETTINGS_BYTES).ok()?;
+    let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::MAX_SETTINGS_BYTES).ok()?;
     text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
 }
 
