@@ -6,6 +6,7 @@
 //! [`model`](crate::model).
 
 mod backend;
+mod confusion;
 pub(crate) mod cpu;
 mod drivers;
 mod forecast;
@@ -29,6 +30,7 @@ pub mod verify;
 pub(crate) mod version;
 
 pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+pub use confusion::Confusion;
 pub use cpu::backend::CpuBackend;
 pub(crate) use cpu::backend::lanes_within_seconds;
 pub use cpu::instructions::Instructions;
@@ -42,7 +44,7 @@ pub(crate) use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther};
 pub use lane_step::Seen;
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
-pub use partial::{Confusion, Partial, UnitCounts, WORST_LANES, WorstLane};
+pub use partial::{Partial, UnitCounts, WORST_LANES, WorstLane};
 pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, Recheck, same_words, words};
 pub use scene::Scene;

@@ -15,7 +15,7 @@ use crate::{Error, Place, Result};
 
 use super::generated::Generator;
 use super::lane_case::LaneCase;
-use super::time_step::check_cases;
+use super::time_step::check_time_step;
 use super::units::Units;
 use super::version::Canonical;
 
@@ -329,4 +329,31 @@ impl LanePlan {
         }
         Ok(canonical.finish())
     }
+}
+
+/// Checks the cases of these units of blocks, where they are known before their lanes run. What a [generator](crate::engine::generated) makes
+/// ends or begins in the ego's lane and passes nobody.
+///
+/// # Errors
+/// As [`check_time_step`].
+pub(crate) fn check_cases(
+    profile: &Profile,
+    blocks: &[Block],
+    source: &dyn CaseSource,
+    segments: Vec<(usize, Range<u64>)>,
+) -> Result<()> {
+    if source.generator().is_some() {
+        return Ok(());
+    }
+    let (tables, dt_s) = (source.tables(), profile.frame.dt_s);
+    for (at, units) in segments {
+        let block = &blocks[at];
+        for unit in units {
+            for (variant, name) in block.variants.iter().enumerate() {
+                let place = || Place::item(format!("{}/{name}", block.units.name(unit)));
+                check_time_step(&source.case(at, unit, variant), tables, dt_s, place)?;
+            }
+        }
+    }
+    Ok(())
 }

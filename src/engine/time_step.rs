@@ -2,41 +2,10 @@
 //! vehicle is looked at once per step, and must not get from one side of the ego to the other unseen.
 //! Derivation: docs/src/methods/lane.md, time step.
 
-use std::ops::Range;
-
-use crate::model::profile::Profile;
 use crate::scenario::{LATERAL_SAMPLED, Motion, Tables};
 use crate::{Error, Place, Result};
 
 use super::lane_case::LaneCase;
-use super::plan::{Block, CaseSource};
-
-/// Checks the cases of these units of blocks, where they are known before their lanes run. What a [generator](crate::engine::generated) makes
-/// ends or begins in the ego's lane and passes nobody.
-///
-/// # Errors
-/// As [`check_time_step`].
-pub(crate) fn check_cases(
-    profile: &Profile,
-    blocks: &[Block],
-    source: &dyn CaseSource,
-    segments: Vec<(usize, Range<u64>)>,
-) -> Result<()> {
-    if source.generator().is_some() {
-        return Ok(());
-    }
-    let (tables, dt_s) = (source.tables(), profile.frame.dt_s);
-    for (at, units) in segments {
-        let block = &blocks[at];
-        for unit in units {
-            for (variant, name) in block.variants.iter().enumerate() {
-                let place = || Place::item(format!("{}/{name}", block.units.name(unit)));
-                check_time_step(&source.case(at, unit, variant), tables, dt_s, place)?;
-            }
-        }
-    }
-    Ok(())
-}
 
 /// Does the time step show every vehicle of a case that passes across the ego's lane? `place` is the case's.
 ///
@@ -79,6 +48,7 @@ fn passes(motion: &Motion<f64>, tables: &Tables<f64>, half_widths: f64) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::profile::Profile;
     use crate::scenario::{Case, Category, Lateral, Participant, Speed};
 
     fn check(lateral: Lateral, dt_s: f64) -> Result<()> {

@@ -6,6 +6,7 @@
 
 mod case_parameters;
 mod check;
+mod columns;
 mod file;
 mod found;
 mod jsonl;

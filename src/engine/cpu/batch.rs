@@ -11,12 +11,13 @@ use crate::model::driver::DriverModel;
 use crate::model::flag::Flag;
 use crate::model::scalar::Real;
 
-use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LANES, LaneArrays, ROWS, StateArrays, TrackArrays, Words};
+use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;
 use crate::engine::cpu::pending::{Lanes, ROOM, Waiting};
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::steady_following::steady_steps;
 use crate::engine::cpu::transpose::Window;
+use crate::engine::cpu::{LANES, ROWS};
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
 
@@ -30,9 +31,6 @@ const LOOK_AGAIN_SHARE: u32 = 4;
 
 /// Fewer steps at ease are sooner made where the lane is.
 const FEWEST_AT_EASE: u32 = 6 * ROWS as u32;
-
-/// Slots of a batch: one bit each.
-pub(in crate::engine) type Slots = u16;
 
 /// The batches in flight, and the series that their lanes read.
 pub(in crate::engine) struct Fleet<'c> {

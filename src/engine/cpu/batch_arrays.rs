@@ -9,18 +9,17 @@ use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
 use crate::model::flag::Flag;
 
+use crate::engine::cpu::LANES;
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
 
-/// Lanes of a batch: one AVX-512 register of binary32.
-pub(in crate::engine) const LANES: usize = 16;
-/// Steps of a burst: a square of lanes and rows is turned in registers.
-pub(in crate::engine) const ROWS: usize = 16;
-
 /// Where a lane leaves its batch at no step.
 pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
+
+/// Slots of a batch: one bit each.
+pub(in crate::engine) type Slots = u16;
 
 /// Parts of [`LaneArrays`].
 const PARTS: usize = 6;

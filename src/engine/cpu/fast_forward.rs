@@ -13,7 +13,7 @@ use crate::model::driver::{DriverModel, DriverState};
 use crate::model::flag::Flag;
 use crate::model::scalar::Real;
 
-use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{
     Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, judge, see,

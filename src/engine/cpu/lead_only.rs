@@ -7,7 +7,8 @@
 use crate::model::driver::DriverModel;
 use crate::model::flag::Flag;
 
-use crate::engine::cpu::batch_arrays::{NEVER_LEAVES, ROWS};
+use crate::engine::cpu::ROWS;
+use crate::engine::cpu::batch_arrays::NEVER_LEAVES;
 use crate::engine::cpu::fast_forward::is_out_of_the_way;
 use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::frame::Simulation;

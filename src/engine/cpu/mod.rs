@@ -16,3 +16,8 @@ mod simd;
 mod steady_following;
 pub(in crate::engine) mod stream;
 mod transpose;
+
+/// Lanes of a batch: one AVX-512 register of binary32.
+pub(in crate::engine) const LANES: usize = 16;
+/// Steps of a burst: a square of lanes and rows is turned in registers.
+pub(in crate::engine) const ROWS: usize = 16;

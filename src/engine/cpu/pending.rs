@@ -3,8 +3,8 @@
 
 use crate::model::driver::DriverModel;
 
-use crate::engine::cpu::batch::Slots;
-use crate::engine::cpu::batch_arrays::{LANES, LaneArrays, NEVER_LEAVES, Words, steady_from};
+use crate::engine::cpu::LANES;
+use crate::engine::cpu::batch_arrays::{LaneArrays, NEVER_LEAVES, Slots, Words, steady_from};
 use crate::engine::cpu::lead_only::lead_only_from;
 use crate::engine::cpu::series::VehicleTracks;
 use crate::engine::frame::{Simulation, Start};

@@ -5,7 +5,7 @@
 use crate::model::scalar::Real;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
-use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::cpu::ROWS;
 use crate::engine::lane_case::LaneCase;
 
 /// The pool that series lie in.

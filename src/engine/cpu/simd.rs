@@ -7,8 +7,8 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::{
-    batch::Slots,
-    batch_arrays::{LANES, ROWS, TrackArrays, Words},
+    LANES, ROWS,
+    batch_arrays::{Slots, TrackArrays, Words},
     pending::ROOM,
     transpose::{goes_on, places},
 };

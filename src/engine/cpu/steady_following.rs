@@ -8,7 +8,7 @@
 use crate::model::driver::DriverModel;
 use crate::model::scalar::Real;
 
-use crate::engine::cpu::batch_arrays::ROWS;
+use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
 

@@ -5,8 +5,8 @@
 
 use crate::model::driver::DriverModel;
 
+use crate::engine::cpu::LANES;
 use crate::engine::cpu::batch::{BATCHES, Fleet};
-use crate::engine::cpu::batch_arrays::LANES;
 use crate::engine::cpu::instructions::Instructions;
 use crate::engine::cpu::lane_result::Ending;
 use crate::engine::cpu::pending::{Lanes, Waiting};

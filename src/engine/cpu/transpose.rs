@@ -1,7 +1,8 @@
 //! What all lanes of a batch see of one quantity over the rows of a burst: their series, turned.
 
-use crate::engine::cpu::batch_arrays::{Floats, LANES, ROWS, TrackArrays, Words};
+use crate::engine::cpu::batch_arrays::{Floats, TrackArrays, Words};
 use crate::engine::cpu::series::Track;
+use crate::engine::cpu::{LANES, ROWS};
 
 /// Rows of one quantity of one vehicle.
 #[derive(Debug, Clone, Copy)]

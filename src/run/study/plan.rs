@@ -6,8 +6,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::engine::lane_case::LaneCase;
+use crate::engine::plan::check_cases;
 use crate::engine::plan::{Block, CaseSource, Headway, LanePlan};
-use crate::engine::time_step::check_cases;
 use crate::engine::units::Units;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;

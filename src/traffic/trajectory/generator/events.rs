@@ -5,6 +5,7 @@
 //! hazard makes an event come sooner or more often; what the event is like is drawn as always.
 
 use super::braking::Braking;
+use super::hazards::{DECISION_S, Hazards};
 use super::lane_change::{Way, acceptance, motive_per_s};
 use super::lateral::LaneChange;
 use super::traffic::{Traffic, centre_of};
@@ -13,16 +14,6 @@ use crate::traffic::trajectory::VehicleClass;
 
 /// The raised event rates begin this far before the view, so that changes are under way at its edge.
 const RAISED_BEFORE_M: f64 = 120.0;
-/// Time between two decisions of one driver, s.
-pub(super) const DECISION_S: f64 = 0.2;
-/// Shortest time from the end of a lane change to the thought of another, s.
-pub(super) const SETTLE_S: f64 = 4.0;
-/// Lane changes get in each other's way: to raise their rate by a factor f, their hazard is raised by f
-/// to this power.
-const CROWDING: f64 = 1.85;
-/// Raised lane changes provoke brakings by themselves: to raise the rate of hard brakings by a factor f,
-/// the hazard of the scheduled ones is raised by f to this power.
-const PROVOKED: f64 = 0.5;
 /// Scheduled hard brakings of one vehicle with a follower, 1/s, at rate factor 1. Calibrates the
 /// published 482 decelerations above 2 m/s² of 109,986 egos' leaders.
 const BRAKING_PER_S: f64 = 0.0012;
@@ -32,25 +23,6 @@ const FOLLOWER_WITHIN_S: f64 = 2.2;
 const BRAKING_FROM_MPS: f64 = 17.0;
 /// Who already slows down more than this is not made to brake on top of it, m/s².
 const BRAKING_ALREADY_MPS2: f64 = -0.6;
-
-/// By how much the hazards are multiplied.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hazards {
-    brakings: f64,
-    lane_changes: f64,
-}
-
-impl Hazards {
-    /// As published.
-    const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
-
-    /// What raises the rates of both by this factor.
-    pub fn raised(factor: f64) -> Hazards {
-        // Both powers come from crowding, which there is none of below the published rates.
-        let power = |exponent| if factor > 1.0 { libm::pow(factor, exponent) } else { factor };
-        Hazards { brakings: power(PROVOKED), lane_changes: power(CROWDING) }
-    }
-}
 
 impl Traffic {
     /// Lane changes and brakings that begin now.

@@ -46,6 +46,7 @@
 
 mod braking;
 mod events;
+mod hazards;
 mod idm;
 mod inflow;
 mod lane_change;

@@ -2,7 +2,7 @@
 //! arrive upstream, follow, change lanes, brake and leave downstream. All decisions and accelerations of
 //! a step read the state at its start; then every vehicle moves.
 
-use super::events::{DECISION_S, Hazards, SETTLE_S};
+use super::hazards::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
