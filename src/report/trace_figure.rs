@@ -10,17 +10,9 @@ use super::axis::{Axis, number};
 use super::drawing::{
     self, FONTS, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, rect, text,
 };
+pub use super::trace_panels::TraceSeries;
 use super::trace_panels::{Curve, Level, Owner, Panel, PanelMark, Reach, Shown};
-use crate::engine::{Mark, Trace};
-
-/// One lane on the sheet.
-#[derive(Debug, Clone)]
-pub struct TraceSeries<'a> {
-    /// What tells it from the others: driver model, variant.
-    pub name: String,
-    /// The lane.
-    pub trace: &'a Trace,
-}
+use crate::engine::Mark;
 
 /// Lanes of one case, or of variants of one, on one sheet.
 #[derive(Debug, Clone)]

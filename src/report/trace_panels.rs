@@ -2,8 +2,16 @@
 //! on the sheet is the figure's business.
 
 use super::axis::plain_end;
-use super::trace_figure::TraceSeries;
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
+
+/// One lane on the sheet.
+#[derive(Debug, Clone)]
+pub struct TraceSeries<'a> {
+    /// What tells it from the others: driver model, variant.
+    pub name: String,
+    /// The lane.
+    pub trace: &'a Trace,
+}
 
 /// Half the width of the lane that is drawn, m: that of the paper's cut-ins and cut-outs, which start or end 3.5 m off.
 const HALF_LANE_M: f64 = 1.75;

@@ -1,7 +1,8 @@
 //! What must hold for every figure and table of a case, the strangest ones too.
 
 use super::drawing::tests::words;
-use super::trace_figure::{TraceFigure, TraceSeries};
+use super::trace_figure::TraceFigure;
+use super::trace_panels::TraceSeries;
 use super::trace_table::csv;
 use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, Mark, Trace};
 use crate::model::driver::ModelId;

@@ -7,7 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::device::Device;
-use super::ring::Inputs;
+use super::inputs::{GeneratorInputs, Inputs};
+use super::records::Generation;
 use crate::Result;
 use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, MAX_PARAMETERS, PointSource, Recipe, ReducedColumns};
@@ -22,40 +23,6 @@ const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETER
 unsafe impl Zeroable for Recipe {}
 // SAFETY: as above.
 unsafe impl Pod for Recipe {}
-
-/// One dispatch of the generator.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct Generation {
-    /// First sample index, low word.
-    pub index_low: u32,
-    /// Its high word.
-    pub index_high: u32,
-    /// Samples.
-    pub count: u32,
-    /// 0 random, 1 Sobol, 2 given.
-    pub source: u32,
-    /// Seed, low word.
-    pub seed_low: u32,
-    /// Its high word.
-    pub seed_high: u32,
-    /// Purpose of the stream.
-    pub purpose: u32,
-    /// Components of the mixture, or points given.
-    pub components: u32,
-    /// 1 where components have weights.
-    pub weighted: u32,
-    /// Place of the first mean among the numbers.
-    pub first_mean: u32,
-    /// Place of the first factor.
-    pub first_factor: u32,
-    /// Place of the components' indices of factors.
-    pub first_factor_of: u32,
-    /// Entries of each sample in the table of speeds.
-    pub speed_stride: u32,
-    /// Entries of each sample in the table of lateral states.
-    pub lateral_stride: u32,
-}
 
 /// What a device needs to make cases.
 pub(super) struct GeneratorSetup {
@@ -125,17 +92,6 @@ impl GeneratorSetup {
             normal: device.upload("normal deviates", normal_table())?,
         })
     }
-}
-
-/// The generator's buffers of one session.
-pub(super) struct GeneratorInputs {
-    template: Generation,
-    generation: wgpu::Buffer,
-    recipe: wgpu::Buffer,
-    numbers: wgpu::Buffer,
-    aliases: wgpu::Buffer,
-    sobol: wgpu::Buffer,
-    normal: wgpu::Buffer,
 }
 
 /// Fills cases and tables with the samples from `first` on. Jobs that were submitted before still read the old ones:

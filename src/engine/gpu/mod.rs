@@ -10,6 +10,7 @@ mod backend;
 mod choice;
 mod device;
 mod generator;
+mod inputs;
 mod owner;
 mod pacing;
 mod records;
@@ -23,7 +24,7 @@ pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind, pci_bu
 pub use backend::GpuBackend;
 pub use choice::{BackendChoice, DeviceName, choose};
 pub use device::{Fault, FaultKind, GpuOptions};
-pub use generator::Generation;
+pub use records::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};
 pub use spirv::{Checks, exact_spirv};
 pub use visible::{visible, visible_here};

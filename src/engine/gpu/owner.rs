@@ -9,8 +9,9 @@ use std::time::Instant;
 use super::adapters::AdapterCard;
 use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
 use super::generator::{GeneratorSetup, generate};
+use super::inputs::Inputs;
 use super::records::StartRecord;
-use super::ring::{Answer, Flight, Inputs, Job, RING, Slot};
+use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::engine::LaneCase;
 use crate::{Error, Result};
 

@@ -148,3 +148,37 @@ pub const EMPTY_CELL: [u32; CELL_WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0]
 pub fn from_ordered(key: u32) -> f32 {
     f32::from_bits(if key & 0x8000_0000 != 0 { key & 0x7fff_ffff } else { !key })
 }
+
+/// One dispatch of the generator.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct Generation {
+    /// First sample index, low word.
+    pub index_low: u32,
+    /// Its high word.
+    pub index_high: u32,
+    /// Samples.
+    pub count: u32,
+    /// 0 random, 1 Sobol, 2 given.
+    pub source: u32,
+    /// Seed, low word.
+    pub seed_low: u32,
+    /// Its high word.
+    pub seed_high: u32,
+    /// Purpose of the stream.
+    pub purpose: u32,
+    /// Components of the mixture, or points given.
+    pub components: u32,
+    /// 1 where components have weights.
+    pub weighted: u32,
+    /// Place of the first mean among the numbers.
+    pub first_mean: u32,
+    /// Place of the first factor.
+    pub first_factor: u32,
+    /// Place of the components' indices of factors.
+    pub first_factor_of: u32,
+    /// Entries of each sample in the table of speeds.
+    pub speed_stride: u32,
+    /// Entries of each sample in the table of lateral states.
+    pub lateral_stride: u32,
+}

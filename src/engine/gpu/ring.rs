@@ -6,7 +6,7 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
-use super::generator::GeneratorInputs;
+use super::inputs::Inputs;
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
 use crate::engine::Wanted;
 use crate::{Error, Result};
@@ -59,16 +59,6 @@ pub(super) struct Answer {
     pub slowest_s: f64,
     /// Time of all dispatches, s.
     pub device_s: f64,
-}
-
-/// The tables of a session.
-pub(super) struct Inputs {
-    pub starts: wgpu::Buffer,
-    pub speed: wgpu::Buffer,
-    pub lateral: wgpu::Buffer,
-    pub cases: wgpu::Buffer,
-    /// Makes cases and tables, where the host does not.
-    pub generator: Option<GeneratorInputs>,
 }
 
 /// The buffers of one job; they grow and stay.

@@ -1,7 +1,6 @@
 //! A concrete scenario as it is played: vehicles with their paths, the road they need, and what is said about them.
 
 use super::path::Vertex;
-use super::road::Road;
 use crate::scenario::{Category, Side};
 use crate::{Error, Place, Result};
 
@@ -79,11 +78,6 @@ impl Concrete {
     pub fn world_y_m(&self, y_m: f64) -> f64 {
         // No negative zero.
         self.side.sign() * y_m + 0.0
-    }
-
-    /// The road that holds every vehicle.
-    pub fn road(&self) -> Road {
-        Road::around(self)
     }
 
     /// Checks what no type says.

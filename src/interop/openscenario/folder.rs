@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::concrete::Concrete;
-use super::road::road_file;
+use super::road::{Road, road_file};
 use super::scenario_file::scenario_file;
 use crate::Result;
 use crate::report::csv;
@@ -33,7 +33,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     for (at, scenario) in scenarios.iter().enumerate() {
         let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
         let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
-        made.push((scenario_file(scenario, &row.road)?, road_file(&scenario.road())?, row));
+        made.push((scenario_file(scenario, &row.road)?, road_file(&Road::around(scenario))?, row));
     }
     let folder = RunFolder::open(dir, INDEX)?;
     let mut results = folder.results()?;

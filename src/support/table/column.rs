@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use serde_json::Value;
+
 /// How the values of a column are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -90,4 +92,24 @@ impl<'a> Cell<'a> {
     pub fn number(value: Option<f64>) -> Cell<'a> {
         value.map_or(Cell::Null, Cell::Number)
     }
+}
+
+/// What a file says of its table; only Parquet has a place for it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TableFacts {
+    /// Kind of rows: `lanes`, `samples`, `scenarios`.
+    pub table: &'static str,
+    /// Name of the profile, where lanes were run.
+    pub profile: Option<String>,
+    /// SHA-256 of the plan of lanes, where there is one.
+    pub plan_sha256: Option<String>,
+    /// Known to be made up by the program: no statement about real traffic.
+    pub synthetic: bool,
+}
+
+/// A row; one value per column that was asked for. CSV has texts only; a field that is empty is null.
+pub(crate) struct Row {
+    /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
+    pub number: u64,
+    pub values: Vec<Value>,
 }

@@ -20,14 +20,15 @@ mod reader;
 mod spreadsheet;
 mod writer;
 
-pub use column::{Cell, Column, Kind};
+pub(crate) use column::Row;
+pub use column::{Cell, Column, Kind, TableFacts};
 pub use format::TableFormat;
 pub(crate) use names::{Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
-pub(crate) use reader::{Row, TableReader};
+pub(crate) use reader::TableReader;
 pub(crate) use spreadsheet::{cell_text, quoted, text_of_cell};
-pub use writer::{TableFacts, TableWriter};
+pub use writer::TableWriter;
 
 /// No reader here panics without Parquet; see the function of this name with it.
 #[cfg(not(feature = "parquet"))]

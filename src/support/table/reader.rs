@@ -2,20 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use super::Row;
 
 use super::TableFormat;
 use super::csv_reader::CsvRows;
 #[cfg(feature = "parquet")]
 use super::parquet_reader::ParquetRows;
 use crate::{Error, Place, Result};
-
-/// A row; one value per column that was asked for. CSV has texts only; a field that is empty is null.
-pub(crate) struct Row {
-    /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
-    pub number: u64,
-    pub values: Vec<Value>,
-}
 
 /// A table that is being read.
 pub(crate) struct TableReader {

@@ -6,22 +6,9 @@ use std::path::Path;
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
 use super::spreadsheet::quoted;
-use super::{Cell, Column, Kind, TableFormat, jsonl};
+use super::{Cell, Column, Kind, TableFacts, TableFormat, jsonl};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
-
-/// What a file says of its table; only Parquet has a place for it.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct TableFacts {
-    /// Kind of rows: `lanes`, `samples`, `scenarios`.
-    pub table: &'static str,
-    /// Name of the profile, where lanes were run.
-    pub profile: Option<String>,
-    /// SHA-256 of the plan of lanes, where there is one.
-    pub plan_sha256: Option<String>,
-    /// Known to be made up by the program: no statement about real traffic.
-    pub synthetic: bool,
-}
 
 /// A table that is being written. Memory does not grow with its rows. Dropped before [`TableWriter::finish`], it leaves
 /// nothing behind.
