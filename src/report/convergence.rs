@@ -9,8 +9,7 @@ use super::drawing::{
     self, BORDER_PX, GREY, Look, NAME_BOLD, NOTE, TEXT_WIDTH_PX, TICK, area, group, paragraph, path_data, plain, rect,
     text,
 };
-use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+use super::svg::{Canvas, Color, Shape, TextAnchor};
 
 /// The estimate after so many samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,25 +81,31 @@ impl ConvergenceFigure {
     /// upper limit) is not drawn but counted in a note. Texts are XML-escaped; control characters become U+FFFD. The
     /// same figure gives the same bytes. Nothing fails: without points only the texts remain, and say so.
     pub fn svg(&self) -> String {
-        let (mut scene, mut y) = drawing::page(&self.title, self.subtitle.as_deref());
+        let (mut canvas, mut y) = drawing::page(&self.title, self.subtitle.as_deref());
         let drawn: Vec<Vec<ConvergencePoint>> = self.series.iter().map(drawable).collect();
         let names = distinct(self.series.iter().map(|s| s.name.as_str()));
         let look = |name: &str| look(names.iter().position(|n| *n == name).unwrap_or(0), names.len());
-        y = self.panels(&mut scene, &drawn, &look, y + 14.0);
+        y = self.panels(&mut canvas, &drawn, &look, y + 14.0);
         if drawn.iter().any(|points| !points.is_empty()) {
             let legend: Vec<(&str, Look)> = names.iter().map(|name| (*name, look(name))).collect();
-            y = drawing::legend(&mut scene, &legend, y + 8.0);
-            y = paragraph(&mut scene, (BORDER_PX, y + 6.0), &caption(&drawn), NOTE, TEXT_WIDTH_PX);
+            y = drawing::legend(&mut canvas, &legend, y + 8.0);
+            y = paragraph(&mut canvas, (BORDER_PX, y + 6.0), &caption(&drawn), NOTE, TEXT_WIDTH_PX);
         } else {
             let words = "There is no estimate to draw.";
-            y = paragraph(&mut scene, (BORDER_PX, y), words, NOTE, TEXT_WIDTH_PX);
+            y = paragraph(&mut canvas, (BORDER_PX, y), words, NOTE, TEXT_WIDTH_PX);
         }
-        y = drawing::notes(&mut scene, "Not drawn:", &self.refused(), y + 10.0);
-        drawing::document(scene, y)
+        y = drawing::notes(&mut canvas, "Not drawn:", &self.refused(), y + 10.0);
+        drawing::document(canvas, y)
     }
 
     /// All panels below `top`, side by side as their number allows; returns the y below.
-    fn panels(&self, scene: &mut Scene, drawn: &[Vec<ConvergencePoint>], look: &dyn Fn(&str) -> Look, top: f64) -> f64 {
+    fn panels(
+        &self,
+        canvas: &mut Canvas,
+        drawn: &[Vec<ConvergencePoint>],
+        look: &dyn Fn(&str) -> Look,
+        top: f64,
+    ) -> f64 {
         let panels = distinct(self.series.iter().map(|s| s.panel.as_str()));
         let (columns, height_px) = match panels.len() {
             0 | 1 => (1, 430.0),
@@ -119,17 +124,17 @@ impl ConvergenceFigure {
                 let across = (left + LEFT_PX, left + width_px - RIGHT_PX);
                 let down = (plot_top, plot_top + height_px);
                 let Some(axes) = Axes::around(drawn, across, down) else { return top };
-                paragraph(scene, (left, y), &head.join(" "), NAME_BOLD, width_px);
-                text(scene, (left, plot_top - 13.0), "Failure probability", TICK, TextAnchor::Start);
-                bottom = axes.frame(scene, across, down, most_x);
+                paragraph(canvas, (left, y), &head.join(" "), NAME_BOLD, width_px);
+                text(canvas, (left, plot_top - 13.0), "Failure probability", TICK, TextAnchor::Start);
+                bottom = axes.frame(canvas, across, down, most_x);
                 if panels.len() <= row * columns + column + columns {
-                    text(scene, (across.1, bottom + 14.0), "Samples", TICK, TextAnchor::End);
+                    text(canvas, (across.1, bottom + 14.0), "Samples", TICK, TextAnchor::End);
                 }
                 let here = || self.series.iter().zip(drawn).filter(|(s, _)| s.panel == *panel);
                 // All bands below all lines below all markers: a band never hides an estimate.
-                here().for_each(|(series, points)| axes.band(scene, points, &look(&series.name)));
-                here().for_each(|(series, points)| axes.line(scene, points, &look(&series.name)));
-                here().for_each(|(series, points)| axes.markers(scene, points, &look(&series.name), series));
+                here().for_each(|(series, points)| axes.band(canvas, points, &look(&series.name)));
+                here().for_each(|(series, points)| axes.line(canvas, points, &look(&series.name)));
+                here().for_each(|(series, points)| axes.markers(canvas, points, &look(&series.name), series));
             }
             y = bottom + 22.0;
         }
@@ -172,10 +177,10 @@ impl Axes {
     }
 
     /// Grid, numbers and frame; returns the y below the numbers.
-    fn frame(&self, scene: &mut Scene, across: (f64, f64), down: (f64, f64), most_x: usize) -> f64 {
-        self.y.draw_left(scene, across, 8, true);
-        let bottom = self.x.draw_below(scene, down, most_x, true);
-        rect(scene, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
+    fn frame(&self, canvas: &mut Canvas, across: (f64, f64), down: (f64, f64), most_x: usize) -> f64 {
+        self.y.draw_left(canvas, across, 8, true);
+        let bottom = self.x.draw_below(canvas, down, most_x, true);
+        rect(canvas, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
         bottom
     }
 
@@ -185,27 +190,27 @@ impl Axes {
 
     /// The intervals of neighbouring estimates as an area, of a single one as a whisker. Those of zeros are left to
     /// the arrows: as areas down to the edge they would cover half of the panel and say no more.
-    fn band(&self, scene: &mut Scene, points: &[ConvergencePoint], look: &Look) {
+    fn band(&self, canvas: &mut Canvas, points: &[ConvergencePoint], look: &Look) {
         for run in points.split(|p| p.probability == 0.0) {
             let upper = run.iter().map(|p| self.at(p.samples, p.upper));
             let outline: Vec<_> = upper.chain(run.iter().rev().map(|p| self.at(p.samples, p.lower))).collect();
             match run.len() {
                 0 => {}
-                1 => scene.add(Look { dash: None, line_px: 1.2, ..look.clone() }.line(path_data(&outline, false))),
-                _ => area(scene, &outline, look.colour.clone(), 0.15),
+                1 => canvas.add(Look { dash: None, line_px: 1.2, ..look.clone() }.line(path_data(&outline, false))),
+                _ => area(canvas, &outline, look.colour.clone(), 0.15),
             }
         }
     }
 
     /// The line through the estimates, broken where one is zero.
-    fn line(&self, scene: &mut Scene, points: &[ConvergencePoint], look: &Look) {
+    fn line(&self, canvas: &mut Canvas, points: &[ConvergencePoint], look: &Look) {
         for run in points.split(|p| p.probability == 0.0).filter(|run| run.len() > 1) {
             let run: Vec<_> = run.iter().map(|p| self.at(p.samples, p.probability)).collect();
-            scene.add(look.line(path_data(&run, false)));
+            canvas.add(look.line(path_data(&run, false)));
         }
     }
 
-    fn markers(&self, scene: &mut Scene, points: &[ConvergencePoint], look: &Look, series: &ConvergenceSeries) {
+    fn markers(&self, canvas: &mut Canvas, points: &[ConvergencePoint], look: &Look, series: &ConvergenceSeries) {
         let alone = |k: usize| {
             let beside = [k.checked_sub(1), Some(k + 1)].into_iter().flatten().filter_map(|i| points.get(i));
             beside.into_iter().all(|p| p.probability == 0.0)
@@ -218,25 +223,25 @@ impl Axes {
             let name = plain(&[series.panel.as_str(), series.name.as_str()].join(" "));
             let tip = format!("{name}: {estimate} [{lower}, {upper}] after {} samples", p.samples);
             if p.probability > 0.0 {
-                group(scene, "class=\"estimate\"", Some(tip));
-                scene.elements.push(look.marker(self.at(p.samples, p.probability)));
+                group(canvas, "class=\"estimate\"", Some(tip));
+                canvas.add(look.marker(self.at(p.samples, p.probability)));
             } else {
-                group(scene, "class=\"limit\"", Some(tip));
-                limit(scene, self.at(p.samples, p.upper), look);
+                group(canvas, "class=\"limit\"", Some(tip));
+                limit(canvas, self.at(p.samples, p.upper), look);
             }
-            scene.elements.push(Primitive::GroupEnd);
+            canvas.add(Shape::GroupEnd);
         }
     }
 }
 
 /// A short bar with an arrow downwards: the value is somewhere below.
-fn limit(scene: &mut Scene, (x, y): (f64, f64), look: &Look) {
+fn limit(canvas: &mut Canvas, (x, y): (f64, f64), look: &Look) {
     let solid = Look { dash: None, line_px: 1.6, ..look.clone() };
     // The lines drawn first are the wider ones: where limits coincide, as they do early on, each can be seen.
     let half = 1.6 * look.marker_px;
-    scene.elements.push(solid.line(path_data(&[(x - half, y), (x + half, y)], false)));
-    scene.elements.push(solid.line(path_data(&[(x, y), (x, y + 9.0)], false)));
-    area(scene, &[(x - 3.5, y + 8.0), (x + 3.5, y + 8.0), (x, y + 15.0)], look.colour.clone(), 1.0);
+    canvas.add(solid.line(path_data(&[(x - half, y), (x + half, y)], false)));
+    canvas.add(solid.line(path_data(&[(x, y), (x, y + 9.0)], false)));
+    area(canvas, &[(x - 3.5, y + 8.0), (x + 3.5, y + 8.0), (x, y + 15.0)], look.colour.clone(), 1.0);
 }
 
 /// As in the legend's other figures, but thin: dozens of points lie close together.

@@ -1,12 +1,9 @@
 //! What the figures share: ink, type, the looks of series, and the few shapes and texts they are made of.
 //!
-//! `kuva` supplies the scene and the SVG writer (number format, XML escapes); layout is ours. Every figure is 1000 px
-//! wide and as high as its texts need, so no text is cut.
+//! Every figure is 1000 px wide and as high as its texts need, so no text is cut; [`svg`](super::svg) writes it.
 
+use super::svg::{Canvas, Color, PathData, Shape, TextAnchor};
 use crate::support::plain_text::acts;
-use kuva::backend::svg::SvgBackend;
-use kuva::render::color::Color;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 use std::f64::consts::TAU;
 
 /// Width of the picture and of its empty border, in SVG user units (px).
@@ -117,17 +114,17 @@ impl Look {
         }
     }
 
-    pub fn line(&self, d: String) -> Primitive {
+    pub fn line(&self, d: String) -> Shape {
         path(d, None, self.colour.clone(), self.line_px, self.dash.clone())
     }
 
     /// The marker around a point, with a white rim that parts it from the markers below.
-    pub fn marker(&self, (x, y): (f64, f64)) -> Primitive {
+    pub fn marker(&self, (x, y): (f64, f64)) -> Shape {
         let (corners, on_top) = self.corners;
         let (fill, rim) = (self.colour.clone(), Color::from("#ffffff"));
         if corners == 0 {
             let (r, stroke, stroke_width) = (self.marker_px * 0.9, Some(rim), Some(1.0));
-            return Primitive::Circle { cx: x, cy: y, r, fill, fill_opacity: None, stroke, stroke_width };
+            return Shape::Circle { cx: x, cy: y, r, fill, stroke, stroke_width };
         }
         let step = TAU / f64::from(corners);
         let first = if on_top { 0.0 } else { step / 2.0 };
@@ -137,27 +134,30 @@ impl Look {
     }
 }
 
+/// An empty sheet; its height is set when everything is on it.
+pub(super) fn sheet(width: f64) -> Canvas {
+    Canvas { width, height: 0.0, font_family: FONTS, text_color: INK, shapes: Vec::new() }
+}
+
 /// A page with its heading and the line below it; returns the y below them.
-pub(super) fn page(title: &str, subtitle: Option<&str>) -> (Scene, f64) {
-    let mut scene = Scene::new(WIDTH_PX, 0.0);
-    scene.font_family = Some(FONTS.to_string());
-    scene.text_color = Some(INK.to_string());
-    let mut y = paragraph(&mut scene, (BORDER_PX, 24.0), title, TITLE, TEXT_WIDTH_PX);
+pub(super) fn page(title: &str, subtitle: Option<&str>) -> (Canvas, f64) {
+    let mut canvas = sheet(WIDTH_PX);
+    let mut y = paragraph(&mut canvas, (BORDER_PX, 24.0), title, TITLE, TEXT_WIDTH_PX);
     if let Some(subtitle) = subtitle {
-        y = paragraph(&mut scene, (BORDER_PX, y + 4.0), subtitle, SUBTITLE, TEXT_WIDTH_PX);
+        y = paragraph(&mut canvas, (BORDER_PX, y + 4.0), subtitle, SUBTITLE, TEXT_WIDTH_PX);
     }
-    (scene, y)
+    (canvas, y)
 }
 
 /// The page, ending a little below `bottom`, as a complete SVG document.
-pub(super) fn document(mut scene: Scene, bottom: f64) -> String {
-    scene.height = (bottom + 20.0).ceil();
-    SvgBackend::new().with_pretty(true).render_scene(&scene)
+pub(super) fn document(mut canvas: Canvas, bottom: f64) -> String {
+    canvas.height = (bottom + 20.0).ceil();
+    canvas.to_svg()
 }
 
 /// Sample and name of each series, in two columns read downwards (one, if a name is too long for half the width);
 /// returns the y below.
-pub(super) fn legend(scene: &mut Scene, entries: &[(&str, Look)], top: f64) -> f64 {
+pub(super) fn legend(canvas: &mut Canvas, entries: &[(&str, Look)], top: f64) -> f64 {
     let half_px = TEXT_WIDTH_PX / 2.0;
     let fits = entries.iter().all(|(name, _)| LEGEND.text_px(name) <= half_px - SAMPLE_TEXT_PX - 12.0);
     let columns = if fits { 2 } else { 1 };
@@ -172,22 +172,22 @@ pub(super) fn legend(scene: &mut Scene, entries: &[(&str, Look)], top: f64) -> f
         }
         let x = BORDER_PX + half_px * column as f64;
         let middle = y + LEGEND.line_px() / 2.0;
-        scene.add(look.line(path_data(&[(x, middle), (x + SAMPLE_PX, middle)], false)));
-        scene.add(look.marker((x + SAMPLE_PX / 2.0, middle)));
-        y = paragraph(scene, (x + SAMPLE_TEXT_PX, y), name, LEGEND, width_px).max(y + LEGEND.line_px()) + 5.0;
+        canvas.add(look.line(path_data(&[(x, middle), (x + SAMPLE_PX, middle)], false)));
+        canvas.add(look.marker((x + SAMPLE_PX / 2.0, middle)));
+        y = paragraph(canvas, (x + SAMPLE_TEXT_PX, y), name, LEGEND, width_px).max(y + LEGEND.line_px()) + 5.0;
         bottom = bottom.max(y);
     }
     bottom
 }
 
 /// A bold head and the lines below it; without lines nothing. Returns the y below.
-pub(super) fn notes(scene: &mut Scene, head: &str, lines: &[String], top: f64) -> f64 {
+pub(super) fn notes(canvas: &mut Canvas, head: &str, lines: &[String], top: f64) -> f64 {
     if lines.is_empty() {
         return top;
     }
-    let mut y = paragraph(scene, (BORDER_PX, top), head, NOTE_HEAD, TEXT_WIDTH_PX);
+    let mut y = paragraph(canvas, (BORDER_PX, top), head, NOTE_HEAD, TEXT_WIDTH_PX);
     for line in lines {
-        y = paragraph(scene, (BORDER_PX, y + 3.0), line, NOTE, TEXT_WIDTH_PX);
+        y = paragraph(canvas, (BORDER_PX, y + 3.0), line, NOTE, TEXT_WIDTH_PX);
     }
     y
 }
@@ -208,31 +208,30 @@ pub(super) fn path(
     stroke: Color,
     stroke_width: f64,
     stroke_dasharray: Option<String>,
-) -> Primitive {
-    Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity: None, stroke_dasharray }))
+) -> Shape {
+    Shape::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity: None, stroke_dasharray }))
 }
 
-/// Opens a group; `tip` is what a browser shows over it. `Scene::add` would bring hover styles along, so past it.
-pub(super) fn group(scene: &mut Scene, attributes: &str, tip: Option<String>) {
-    let extra_attrs = Some(attributes.to_string());
-    scene.elements.push(Primitive::GroupStart { transform: None, title: tip, extra_attrs });
+/// Opens a group; `tip` is what a browser shows over it.
+pub(super) fn group(canvas: &mut Canvas, attributes: &str, tip: Option<String>) {
+    canvas.add(Shape::GroupStart { title: tip, attributes: attributes.to_owned() });
 }
 
 /// A straight line.
-pub(super) fn line(scene: &mut Scene, (x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &str, stroke_width: f64) {
+pub(super) fn line(canvas: &mut Canvas, (x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &str, stroke_width: f64) {
     let (stroke, stroke_dasharray) = (Color::from(colour), None);
-    scene.add(Primitive::Line { x1, y1, x2, y2, stroke, stroke_width, stroke_dasharray });
+    canvas.add(Shape::Line { x1, y1, x2, y2, stroke, stroke_width, stroke_dasharray });
 }
 
 /// A rectangle from corner to corner, in either order.
 pub(super) fn rect(
-    scene: &mut Scene,
+    canvas: &mut Canvas,
     (x1, y1): (f64, f64),
     (x2, y2): (f64, f64),
     fill: Color,
     rim: Option<(&str, f64)>,
 ) {
-    scene.add(Primitive::Rect {
+    canvas.add(Shape::Rect {
         x: x1.min(x2),
         y: y1.min(y2),
         width: (x2 - x1).abs(),
@@ -245,33 +244,31 @@ pub(super) fn rect(
 }
 
 /// A filled area without a rim.
-pub(super) fn area(scene: &mut Scene, outline: &[(f64, f64)], fill: Color, opacity: f64) {
+pub(super) fn area(canvas: &mut Canvas, outline: &[(f64, f64)], fill: Color, opacity: f64) {
     let (d, stroke, stroke_dasharray) = (path_data(outline, true), Color::None, None);
     let fill = Some(fill);
     let opacity = Some(opacity);
-    scene.add(Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width: 0.0, opacity, stroke_dasharray })));
+    canvas.add(Shape::Path(Box::new(PathData { d, fill, stroke, stroke_width: 0.0, opacity, stroke_dasharray })));
 }
 
 /// A wrapped text with its top at `y`; returns the y below it.
-pub(super) fn paragraph(scene: &mut Scene, (x, y): (f64, f64), words: &str, set: Type, width_px: f64) -> f64 {
+pub(super) fn paragraph(canvas: &mut Canvas, (x, y): (f64, f64), words: &str, set: Type, width_px: f64) -> f64 {
     let lines = set.wrap(words, width_px);
     for (k, line) in lines.iter().enumerate() {
-        text(scene, (x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, TextAnchor::Start);
+        text(canvas, (x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, TextAnchor::Start);
     }
     y + lines.len() as f64 * set.line_px()
 }
 
-pub(super) fn text(scene: &mut Scene, (x, y): (f64, f64), line: &str, set: Type, anchor: TextAnchor) {
-    scene.add(Primitive::Text {
+pub(super) fn text(canvas: &mut Canvas, (x, y): (f64, f64), line: &str, set: Type, anchor: TextAnchor) {
+    canvas.add(Shape::Text {
         x,
         y,
-        // kuva would read `$…$` as a formula; `\$` is its plain dollar.
-        content: plain(line).replace('$', "\\$"),
+        content: plain(line),
         size: set.size_px,
         anchor,
-        rotate: None,
         bold: set.bold,
-        color: Some(Color::from(set.colour)),
+        color: Color::from(set.colour),
     });
 }
 

@@ -5,6 +5,7 @@
 //! a cell with few samples is a smaller square, and a cell without failures has its own grey, so that "none seen" and
 //! "few" differ.
 
+use super::svg::{Canvas, Color, PathData, Shape, TextAnchor};
 use std::fmt::Write;
 
 use super::axis::{Axis, number, plain_end};
@@ -12,8 +13,6 @@ use super::drawing::{
     self, BORDER_PX, GREY, GRID, INK, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, paragraph, path_data, rect,
     text,
 };
-use kuva::render::color::Color;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 /// One parameter, cut into cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,18 +115,18 @@ impl FailureMap {
     /// XML-escaped; control characters become U+FFFD. The same map gives the same bytes. Nothing fails: a map with a
     /// [`FailureMap::problem`] is a text that names it.
     pub fn svg(&self) -> String {
-        let (mut scene, y) = drawing::page(&self.title, self.subtitle.as_deref());
+        let (mut canvas, y) = drawing::page(&self.title, self.subtitle.as_deref());
         if let Some(problem) = self.problem() {
             let words = format!("This map cannot be drawn: {problem}.");
-            let y = paragraph(&mut scene, (BORDER_PX, y + 14.0), &words, NOTE, TEXT_WIDTH_PX);
-            return drawing::document(scene, y);
+            let y = paragraph(&mut canvas, (BORDER_PX, y + 14.0), &words, NOTE, TEXT_WIDTH_PX);
+            return drawing::document(canvas, y);
         }
         let shares: Vec<Share> = (0..self.samples.len()).map(|cell| self.share(cell)).collect();
         let known = |s: &Share| if let Share::Known { share, .. } = s { Some(*share) } else { None };
         let largest = shares.iter().filter_map(known).fold(0.0, f64::max);
         let largest = if largest > 0.0 { plain_end(largest).min(1.0) } else { 0.0 };
 
-        let y = paragraph(&mut scene, (BORDER_PX, y + 14.0), &self.y.label(), LABEL, RIGHT_PX - BORDER_PX);
+        let y = paragraph(&mut canvas, (BORDER_PX, y + 14.0), &self.y.label(), LABEL, RIGHT_PX - BORDER_PX);
         let ratio = self.y.cells() as f64 / self.x.cells() as f64;
         let (top, width_px) = (y + 8.0, RIGHT_PX - LEFT_PX);
         let bottom = top + (width_px * ratio).clamp(360.0, width_px);
@@ -135,21 +134,21 @@ impl FailureMap {
         let x = Axis::exactly(ends(&self.x), (LEFT_PX, RIGHT_PX));
         let y = Axis::exactly(ends(&self.y), (bottom, top));
 
-        self.cells(&mut scene, &shares, (&x, &y), largest);
-        rect(&mut scene, (LEFT_PX, top), (RIGHT_PX, bottom), Color::None, Some((GREY, 1.0)));
-        y.draw_left(&mut scene, (LEFT_PX, RIGHT_PX), 8, false);
-        let mut below = x.draw_below(&mut scene, (top, bottom), 8, false);
-        colour_bar(&mut scene, (top, bottom), largest);
+        self.cells(&mut canvas, &shares, (&x, &y), largest);
+        rect(&mut canvas, (LEFT_PX, top), (RIGHT_PX, bottom), Color::None, Some((GREY, 1.0)));
+        y.draw_left(&mut canvas, (LEFT_PX, RIGHT_PX), 8, false);
+        let mut below = x.draw_below(&mut canvas, (top, bottom), 8, false);
+        colour_bar(&mut canvas, (top, bottom), largest);
         for line in LABEL.wrap(&self.x.label(), RIGHT_PX - LEFT_PX) {
-            text(&mut scene, ((LEFT_PX + RIGHT_PX) / 2.0, below + 19.0), &line, LABEL, TextAnchor::Middle);
+            text(&mut canvas, ((LEFT_PX + RIGHT_PX) / 2.0, below + 19.0), &line, LABEL, TextAnchor::Middle);
             below += LABEL.line_px();
         }
-        let below = key(&mut scene, &shares, below + 20.0);
-        let below = drawing::notes(&mut scene, "Notes:", &self.notes(&shares), below + 10.0);
-        drawing::document(scene, below)
+        let below = key(&mut canvas, &shares, below + 20.0);
+        let below = drawing::notes(&mut canvas, "Notes:", &self.notes(&shares), below + 10.0);
+        drawing::document(canvas, below)
     }
 
-    fn cells(&self, scene: &mut Scene, shares: &[Share], (x, y): (&Axis, &Axis), largest: f64) {
+    fn cells(&self, canvas: &mut Canvas, shares: &[Share], (x, y): (&Axis, &Axis), largest: f64) {
         let [across, up] = [(x, &self.x), (y, &self.y)].map(|(axis, edges)| {
             let edges: Vec<f64> = edges.edges.iter().map(|e| axis.at(*e)).collect();
             edges
@@ -161,18 +160,18 @@ impl FailureMap {
         // Whole cells without smoothing, so that no white seams part neighbours; the rims of small squares need it.
         for few_now in [false, true] {
             let whole = "shape-rendering=\"crispEdges\"";
-            group(scene, if few_now { "class=\"rarely-sampled\"" } else { whole }, None);
+            group(canvas, if few_now { "class=\"rarely-sampled\"" } else { whole }, None);
             for (cell, share) in shares.iter().enumerate() {
                 let Share::Known { share, few } = *share else { continue };
                 if few != few_now {
                     continue;
                 }
                 let class = if few { "class=\"cell few\"" } else { "class=\"cell\"" };
-                group(scene, class, Some(self.tip(cell, share)));
-                square(scene, corners(cell), share_colour(share, largest), few);
-                scene.elements.push(Primitive::GroupEnd);
+                group(canvas, class, Some(self.tip(cell, share)));
+                square(canvas, corners(cell), share_colour(share, largest), few);
+                canvas.add(Shape::GroupEnd);
             }
-            scene.elements.push(Primitive::GroupEnd);
+            canvas.add(Shape::GroupEnd);
         }
         let mut strokes = Vec::new();
         for (cell, share) in shares.iter().enumerate() {
@@ -186,7 +185,7 @@ impl FailureMap {
                 Share::Known { .. } => {}
             }
         }
-        hatch(scene, &strokes);
+        hatch(canvas, &strokes);
     }
 
     fn tip(&self, cell: usize, share: f64) -> String {
@@ -239,15 +238,15 @@ impl FailureMap {
 type Corners = ((f64, f64), (f64, f64));
 
 /// A cell, or the middle of one with few samples.
-fn square(scene: &mut Scene, (a, b): Corners, fill: Color, few: bool) {
+fn square(canvas: &mut Canvas, (a, b): Corners, fill: Color, few: bool) {
     if !few {
-        return rect(scene, a, b, fill, None);
+        return rect(canvas, a, b, fill, None);
     }
     let inner = |from: f64, to: f64| (from + 0.22 * (to - from), to - 0.22 * (to - from));
     let ((x1, x2), (y1, y2)) = (inner(a.0, b.0), inner(a.1, b.1));
     // In small cells the rim must not outweigh the colour.
     let rim_px = (0.08 * (x2 - x1).abs().min((y2 - y1).abs())).min(0.8);
-    rect(scene, (x1, y1), (x2, y2), fill, Some((HATCH, rim_px)));
+    rect(canvas, (x1, y1), (x2, y2), fill, Some((HATCH, rim_px)));
 }
 
 /// Lines along the diagonal of a cell, about 12 px apart; in small cells the diagonal alone.
@@ -263,15 +262,15 @@ fn hatching(((left, lower), (right, upper)): Corners) -> Vec<String> {
     (1 - lines..lines).map(line).collect()
 }
 
-fn hatch(scene: &mut Scene, strokes: &[String]) {
+fn hatch(canvas: &mut Canvas, strokes: &[String]) {
     if strokes.is_empty() {
         return;
     }
     let (d, stroke, stroke_width) = (strokes.join(" "), Color::from(HATCH), 0.8);
     let (fill, opacity, stroke_dasharray) = (None, None, None);
-    group(scene, "class=\"hatch\"", None);
-    scene.add(Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity, stroke_dasharray })));
-    scene.elements.push(Primitive::GroupEnd);
+    group(canvas, "class=\"hatch\"", None);
+    canvas.add(Shape::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity, stroke_dasharray })));
+    canvas.add(Shape::GroupEnd);
 }
 
 fn share_colour(share: f64, largest: f64) -> Color {
@@ -288,56 +287,62 @@ fn scale_colour(place: f64) -> Color {
 }
 
 /// The scale from zero to `largest`, a plain number at or above every share, at the right of the map; without any failure there is none.
-fn colour_bar(scene: &mut Scene, (top, bottom): (f64, f64), largest: f64) {
+fn colour_bar(canvas: &mut Canvas, (top, bottom): (f64, f64), largest: f64) {
     if largest <= 0.0 {
         return;
     }
     let (left, right) = BAR_PX;
     let bottom = bottom.min(top + 420.0);
-    text(scene, (left, top + 12.0), "Share failed", TICK, TextAnchor::Start);
+    text(canvas, (left, top + 12.0), "Share failed", TICK, TextAnchor::Start);
     let top = top + 28.0;
     let bands = 100_u32;
     let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(bands);
-    group(scene, "shape-rendering=\"crispEdges\" class=\"scale\"", None);
+    group(canvas, "shape-rendering=\"crispEdges\" class=\"scale\"", None);
     for k in 0..bands {
-        rect(scene, (left, edge(k)), (right, edge(k + 1)), scale_colour((f64::from(k) + 0.5) / f64::from(bands)), None);
+        rect(
+            canvas,
+            (left, edge(k)),
+            (right, edge(k + 1)),
+            scale_colour((f64::from(k) + 0.5) / f64::from(bands)),
+            None,
+        );
     }
-    scene.elements.push(Primitive::GroupEnd);
-    rect(scene, (left, top), (right, bottom), Color::None, Some((GREY, 1.0)));
+    canvas.add(Shape::GroupEnd);
+    rect(canvas, (left, top), (right, bottom), Color::None, Some((GREY, 1.0)));
     for tick in Axis::exactly((0.0, largest), (bottom, top)).ticks(6) {
-        drawing::line(scene, (right, tick.at_px), (right + 5.0, tick.at_px), GREY, 1.0);
+        drawing::line(canvas, (right, tick.at_px), (right + 5.0, tick.at_px), GREY, 1.0);
         if let Some(label) = &tick.label {
-            text(scene, (right + 8.0, tick.at_px + 4.5), label, TICK, TextAnchor::Start);
+            text(canvas, (right + 8.0, tick.at_px + 4.5), label, TICK, TextAnchor::Start);
         }
     }
 }
 
 /// What the cells that are no plain colour mean, as far as they occur; returns the y below.
-fn key(scene: &mut Scene, shares: &[Share], top: f64) -> f64 {
+fn key(canvas: &mut Canvas, shares: &[Share], top: f64) -> f64 {
     let is = |test: fn(&Share) -> bool| shares.iter().any(test);
     let mut x = LEFT_PX;
-    let mut entry = |scene: &mut Scene, words: &str| {
+    let mut entry = |canvas: &mut Canvas, words: &str| {
         let corners = ((x, top + 18.0), (x + 18.0, top));
-        text(scene, (x + 26.0, top + 14.0), words, NOTE, TextAnchor::Start);
+        text(canvas, (x + 26.0, top + 14.0), words, NOTE, TextAnchor::Start);
         x += 26.0 + NOTE.text_px(words) + 24.0;
         corners
     };
     let mut any = false;
     if is(|s| matches!(s, Share::Known { share: 0.0, .. })) {
-        let (a, b) = entry(scene, "no failure");
-        rect(scene, a, b, Color::from(NONE_FAILED), Some((GRID, 0.8)));
+        let (a, b) = entry(canvas, "no failure");
+        rect(canvas, a, b, Color::from(NONE_FAILED), Some((GRID, 0.8)));
         any = true;
     }
     if is(|s| matches!(s, Share::Known { few: true, .. })) {
-        let (a, b) = entry(scene, &format!("fewer than {FEW_SAMPLES} samples: smaller square"));
-        rect(scene, a, b, Color::None, Some((GRID, 0.8)));
-        square(scene, (a, b), scale_colour(0.6), true);
+        let (a, b) = entry(canvas, &format!("fewer than {FEW_SAMPLES} samples: smaller square"));
+        rect(canvas, a, b, Color::None, Some((GRID, 0.8)));
+        square(canvas, (a, b), scale_colour(0.6), true);
         any = true;
     }
     if is(|s| matches!(s, Share::Empty)) {
-        let (a, b) = entry(scene, "no samples");
-        rect(scene, a, b, Color::None, Some((GRID, 0.8)));
-        hatch(scene, &hatching((a, b)));
+        let (a, b) = entry(canvas, "no samples");
+        rect(canvas, a, b, Color::None, Some((GRID, 0.8)));
+        hatch(canvas, &hatching((a, b)));
         any = true;
     }
     if any { top + 22.0 } else { top }

@@ -5,8 +5,7 @@ use super::drawing::{
     self, BORDER_PX, GREY, GRID, INK, Look, NAME, NAME_BOLD, NOTE, TEXT_WIDTH_PX, Type, WIDTH_PX, area, group, line,
     paragraph, path_data, plain, rect, text,
 };
-use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+use super::svg::{Canvas, Color, Shape, TextAnchor};
 
 /// One estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,36 +107,36 @@ impl ForestFigure {
     /// XML-escaped; control characters become U+FFFD. The same figure gives the same bytes. Nothing fails: without
     /// any estimate only the texts remain.
     pub fn svg(&self) -> String {
-        let (mut scene, y) = drawing::page(&self.title, self.subtitle.as_deref());
+        let (mut canvas, y) = drawing::page(&self.title, self.subtitle.as_deref());
         let axis = self.axis();
         let lines = self.groups.iter().map(|g| g.rows.len() + 2).sum::<usize>();
         let mut top = y + 14.0;
         if lines == 0 {
-            let y = paragraph(&mut scene, (BORDER_PX, top), "There is no estimate to draw.", NOTE, TEXT_WIDTH_PX);
-            return drawing::document(scene, y);
+            let y = paragraph(&mut canvas, (BORDER_PX, top), "There is no estimate to draw.", NOTE, TEXT_WIDTH_PX);
+            return drawing::document(canvas, y);
         }
         if lines > LONG_ROWS && axis.is_some() {
             top += 22.0;
         }
         let bottom = self.groups.iter().fold(top, |y, g| y + g.height_px(self.scale)) + 4.0;
         if let Some(axis) = &axis {
-            self.grid(&mut scene, axis, (top, bottom), lines > LONG_ROWS);
+            self.grid(&mut canvas, axis, (top, bottom), lines > LONG_ROWS);
         }
         let mut y = top;
         for group in &self.groups {
-            y = self.group(&mut scene, axis.as_ref(), group, y);
+            y = self.group(&mut canvas, axis.as_ref(), group, y);
         }
         let mut below = bottom;
         if let Some(axis) = &axis {
-            rect(&mut scene, (PLOT_PX.0, top), (PLOT_PX.1, bottom), Color::None, Some((GREY, 1.0)));
-            below = axis.draw_below(&mut scene, (top, bottom), MAX_NUMBERS, false);
+            rect(&mut canvas, (PLOT_PX.0, top), (PLOT_PX.1, bottom), Color::None, Some((GREY, 1.0)));
+            below = axis.draw_below(&mut canvas, (top, bottom), MAX_NUMBERS, false);
             for words in NAME.wrap(&self.axis, TEXT_WIDTH_PX - NAME_WIDTH_PX) {
-                text(&mut scene, ((PLOT_PX.0 + PLOT_PX.1) / 2.0, below + 20.0), &words, NAME, TextAnchor::Middle);
+                text(&mut canvas, ((PLOT_PX.0 + PLOT_PX.1) / 2.0, below + 20.0), &words, NAME, TextAnchor::Middle);
                 below += NAME.line_px();
             }
         }
-        let y = paragraph(&mut scene, (BORDER_PX, below + 18.0), &self.caption(), NOTE, TEXT_WIDTH_PX);
-        drawing::document(scene, y)
+        let y = paragraph(&mut canvas, (BORDER_PX, below + 18.0), &self.caption(), NOTE, TEXT_WIDTH_PX);
+        drawing::document(canvas, y)
     }
 
     fn all_rows(&self) -> impl Iterator<Item = &ForestRow> {
@@ -162,20 +161,20 @@ impl ForestFigure {
         }
     }
 
-    fn grid(&self, scene: &mut Scene, axis: &Axis, (top, bottom): (f64, f64), numbers_on_top: bool) {
+    fn grid(&self, canvas: &mut Canvas, axis: &Axis, (top, bottom): (f64, f64), numbers_on_top: bool) {
         for tick in axis.ticks(MAX_NUMBERS) {
             let Some(label) = &tick.label else { continue };
-            line(scene, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
+            line(canvas, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
             if numbers_on_top {
-                line(scene, (tick.at_px, top - 6.0), (tick.at_px, top), GREY, 1.0);
-                text(scene, (tick.at_px, top - 10.0), label, drawing::TICK, TextAnchor::Middle);
+                line(canvas, (tick.at_px, top - 6.0), (tick.at_px, top), GREY, 1.0);
+                text(canvas, (tick.at_px, top - 10.0), label, drawing::TICK, TextAnchor::Middle);
             }
         }
     }
 
     /// Heading, reference and rows of one group from `top` on; returns the y below.
-    fn group(&self, scene: &mut Scene, axis: Option<&Axis>, group: &ForestGroup, top: f64) -> f64 {
-        let mut y = paragraph(scene, (BORDER_PX, top + 8.0), &group.name, NAME_BOLD, NAME_WIDTH_PX) + 2.0;
+    fn group(&self, canvas: &mut Canvas, axis: Option<&Axis>, group: &ForestGroup, top: f64) -> f64 {
+        let mut y = paragraph(canvas, (BORDER_PX, top + 8.0), &group.name, NAME_BOLD, NAME_WIDTH_PX) + 2.0;
         let bottom = top + group.height_px(self.scale);
         if let Some(reference) = &group.reference {
             let drawn = reference.drawn(self.scale);
@@ -183,15 +182,15 @@ impl ForestFigure {
                 // At least a line, where the interval is narrower than one.
                 let (left, right) = (axis.at(lower), axis.at(upper).max(axis.at(lower) + 1.0));
                 let corners = [(left, y), (right, y), (right, bottom), (left, bottom)];
-                area(scene, &corners, Color::from(REFERENCE_COLOUR), 0.28);
+                area(canvas, &corners, Color::from(REFERENCE_COLOUR), 0.28);
             }
             if let (Some(axis), Some(estimate)) = (axis, drawn.estimate) {
-                line(scene, (axis.at(estimate), y), (axis.at(estimate), bottom), REFERENCE_COLOUR, 1.4);
+                line(canvas, (axis.at(estimate), y), (axis.at(estimate), bottom), REFERENCE_COLOUR, 1.4);
             }
-            y = self.row(scene, axis, reference, &reference_look(), y, &group.name);
+            y = self.row(canvas, axis, reference, &reference_look(), y, &group.name);
         }
         for row in &group.rows {
-            y = self.row(scene, axis, row, &row_look(), y, &group.name);
+            y = self.row(canvas, axis, row, &row_look(), y, &group.name);
         }
         bottom
     }
@@ -199,7 +198,7 @@ impl ForestFigure {
     /// One line: name, mark, numbers; returns the y below.
     fn row(
         &self,
-        scene: &mut Scene,
+        canvas: &mut Canvas,
         axis: Option<&Axis>,
         row: &ForestRow,
         look: &Look,
@@ -207,24 +206,24 @@ impl ForestFigure {
         group_name: &str,
     ) -> f64 {
         let (words, height_px) = (row.words(self.scale), row.height_px(self.scale));
-        paragraph(scene, (BORDER_PX + INDENT_PX, y + 3.0), &row.name, ROW, NAME_WIDTH_PX - INDENT_PX);
-        paragraph(scene, (VALUE_LEFT_PX, y + 3.0), &words, ROW, VALUE_WIDTH_PX);
+        paragraph(canvas, (BORDER_PX + INDENT_PX, y + 3.0), &row.name, ROW, NAME_WIDTH_PX - INDENT_PX);
+        paragraph(canvas, (VALUE_LEFT_PX, y + 3.0), &words, ROW, VALUE_WIDTH_PX);
         let Some(axis) = axis else { return y + height_px };
         let middle = y + 3.0 + ROW.line_px() / 2.0;
         let drawn = row.drawn(self.scale);
         let tip = format!("{}; {}: {words}", plain(group_name), plain(&row.name));
         let class = if drawn.below { "class=\"limit\"" } else { "class=\"estimate\"" };
         if drawn.estimate.is_some() || drawn.below {
-            group(scene, class, Some(tip));
+            group(canvas, class, Some(tip));
             if let (Some((_, upper)), true) = (drawn.interval, drawn.below) {
-                limit(scene, (axis.at(upper), middle), look);
+                limit(canvas, (axis.at(upper), middle), look);
             } else if let Some((lower, upper)) = drawn.interval {
-                whisker(scene, axis, (lower, upper), middle, look);
+                whisker(canvas, axis, (lower, upper), middle, look);
             }
             if let Some(estimate) = drawn.estimate {
-                scene.elements.push(look.marker((axis.at(estimate), middle)));
+                canvas.add(look.marker((axis.at(estimate), middle)));
             }
-            scene.elements.push(Primitive::GroupEnd);
+            canvas.add(Shape::GroupEnd);
         }
         y + height_px
     }
@@ -277,19 +276,19 @@ fn reference_look() -> Look {
 }
 
 /// The interval with a short bar at each end that is on the axis.
-fn whisker(scene: &mut Scene, axis: &Axis, (lower, upper): (f64, f64), y: f64, look: &Look) {
+fn whisker(canvas: &mut Canvas, axis: &Axis, (lower, upper): (f64, f64), y: f64, look: &Look) {
     let (left, right) = (axis.at(lower), axis.at(upper));
-    scene.elements.push(look.line(path_data(&[(left, y), (right, y)], false)));
+    canvas.add(look.line(path_data(&[(left, y), (right, y)], false)));
     for end in [left, right].into_iter().filter(|x| *x > PLOT_PX.0) {
-        scene.elements.push(look.line(path_data(&[(end, y - 4.0), (end, y + 4.0)], false)));
+        canvas.add(look.line(path_data(&[(end, y - 4.0), (end, y + 4.0)], false)));
     }
 }
 
 /// A short bar with an arrow to the left: the value is somewhere below.
-fn limit(scene: &mut Scene, (x, y): (f64, f64), look: &Look) {
-    scene.elements.push(look.line(path_data(&[(x, y - 5.0), (x, y + 5.0)], false)));
-    scene.elements.push(look.line(path_data(&[(x - 11.0, y), (x, y)], false)));
-    area(scene, &[(x - 10.0, y - 4.0), (x - 10.0, y + 4.0), (x - 18.0, y)], look.colour.clone(), 1.0);
+fn limit(canvas: &mut Canvas, (x, y): (f64, f64), look: &Look) {
+    canvas.add(look.line(path_data(&[(x, y - 5.0), (x, y + 5.0)], false)));
+    canvas.add(look.line(path_data(&[(x - 11.0, y), (x, y)], false)));
+    area(canvas, &[(x - 10.0, y - 4.0), (x - 10.0, y + 4.0), (x - 18.0, y)], look.colour.clone(), 1.0);
 }
 
 #[cfg(test)]
@@ -362,10 +361,10 @@ mod tests {
     fn the_heights_of_the_rows_fill_the_group() {
         let long = row(&"a very long name ".repeat(20), Some(1e-4));
         let figure = figure(Logarithmic, 1, vec![long, row("", None)]);
-        let mut scene = Scene::new(WIDTH_PX, 0.0);
+        let mut canvas = super::super::drawing::sheet(WIDTH_PX);
         let group = &figure.groups[0];
         let rows: f64 = group.reference.iter().chain(&group.rows).map(|r| r.height_px(Logarithmic)).sum();
-        let bottom = figure.group(&mut scene, figure.axis().as_ref(), group, 0.0);
+        let bottom = figure.group(&mut canvas, figure.axis().as_ref(), group, 0.0);
         assert!(bottom >= rows + NAME_BOLD.line_px());
     }
 

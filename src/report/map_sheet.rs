@@ -9,9 +9,8 @@ use super::drawing::{
     self, BORDER_PX, GREY, GRID, INK, NAME_BOLD, NOTE, TEXT_WIDTH_PX, Type, group, paragraph, path, path_data, rect,
     text,
 };
+use super::svg::{Canvas, Color, TextAnchor};
 use crate::run::grid::{Grid, boundary, runs};
-use kuva::render::color::Color;
-use kuva::render::render::{Scene, TextAnchor};
 
 /// What the cells of one kind look like.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,11 +82,11 @@ struct Frame<'a> {
 impl MapSheet<'_> {
     /// The sheet as a complete SVG document, 1000 px wide. The same sheet gives the same bytes.
     pub fn svg(&self) -> String {
-        let (mut scene, y) = drawing::page(&self.title, Some(&self.subtitle));
-        let y = self.key(&mut scene, y + 12.0);
+        let (mut canvas, y) = drawing::page(&self.title, Some(&self.subtitle));
+        let y = self.key(&mut canvas, y + 12.0);
         let label =
             format!("Upwards: {}. Across: {}.", self.grid.y().parameter.title(), self.grid.x().parameter.title());
-        let mut top = paragraph(&mut scene, (BORDER_PX, y + 8.0), &label, LABEL, TEXT_WIDTH_PX);
+        let mut top = paragraph(&mut canvas, (BORDER_PX, y + 8.0), &label, LABEL, TEXT_WIDTH_PX);
         let panels = self.grid.panels().len();
         let columns = match panels {
             0 | 1 => 1,
@@ -107,19 +106,19 @@ impl MapSheet<'_> {
             let name = self.panel_name(panel);
             for (k, line) in NAME_BOLD.wrap(&name, width_px).iter().take(1).enumerate() {
                 let at = (left, upper - 9.0 + k as f64);
-                text(&mut scene, at, line, Type { size_px: 15, ..NAME_BOLD }, TextAnchor::Start);
+                text(&mut canvas, at, line, Type { size_px: 15, ..NAME_BOLD }, TextAnchor::Start);
             }
-            self.panel(&mut scene, panel, Frame { x: &x, y: &y, across: &across, up: &up });
+            self.panel(&mut canvas, panel, Frame { x: &x, y: &y, across: &across, up: &up });
             let most = if columns == 1 { 10 } else { 6 };
-            y.draw_left(&mut scene, (left, left + width_px), most, false);
-            x.draw_below(&mut scene, (upper, upper + height_px), most, false);
-            rect(&mut scene, (left, upper), (left + width_px, upper + height_px), Color::None, Some((GREY, 1.0)));
+            y.draw_left(&mut canvas, (left, left + width_px), most, false);
+            x.draw_below(&mut canvas, (upper, upper + height_px), most, false);
+            rect(&mut canvas, (left, upper), (left + width_px, upper + height_px), Color::None, Some((GREY, 1.0)));
             if column + 1 == columns || panel + 1 == panels {
                 top += height_px + GUTTER_PX.1;
             }
         }
-        let bottom = drawing::notes(&mut scene, "Notes:", &self.notes, top + 10.0);
-        drawing::document(scene, bottom)
+        let bottom = drawing::notes(&mut canvas, "Notes:", &self.notes, top + 10.0);
+        drawing::document(canvas, bottom)
     }
 
     fn panel_name(&self, panel: usize) -> String {
@@ -140,10 +139,10 @@ impl MapSheet<'_> {
         parts.join(", ")
     }
 
-    fn panel(&self, scene: &mut Scene, panel: usize, frame: Frame) {
+    fn panel(&self, canvas: &mut Canvas, panel: usize, frame: Frame) {
         let Frame { x, y, across, up } = frame;
         let kind = |i: usize, j: usize| usize::from(self.cells[self.grid.cell(panel, i, j)]);
-        group(scene, "shape-rendering=\"crispEdges\"", None);
+        group(canvas, "shape-rendering=\"crispEdges\"", None);
         let mut hatching = Vec::new();
         for (number, look) in self.kinds.iter().enumerate() {
             for j in 0..self.grid.y().len() {
@@ -151,27 +150,27 @@ impl MapSheet<'_> {
                     let (a, b) = ((x.at(across[from]), y.at(up[j])), (x.at(across[to]), y.at(up[j + 1])));
                     // A little lower than its row, so that no white seam parts it from the one below.
                     let lower = if j > 0 { a.1 + SEAM_PX } else { a.1 };
-                    rect(scene, (a.0, lower), b, Color::from(look.fill), None);
+                    rect(canvas, (a.0, lower), b, Color::from(look.fill), None);
                     hatching.extend(strokes(look.hatch, a, b));
                 }
             }
         }
-        scene.elements.push(kuva::render::render::Primitive::GroupEnd);
+        canvas.add(super::svg::Shape::GroupEnd);
         if !hatching.is_empty() {
-            scene.add(path(hatching.join(" "), None, Color::from("#ffffff"), 1.4, None));
+            canvas.add(path(hatching.join(" "), None, Color::from("#ffffff"), 1.4, None));
         }
         let at = |(i, j): (usize, usize)| (x.at(across[i]), y.at(up[j]));
         let lines = boundary(self.grid, &kind);
         let lines: Vec<String> = lines.into_iter().map(|(a, b)| path_data(&[at(a), at(b)], false)).collect();
         if !lines.is_empty() {
-            group(scene, "class=\"boundary\" stroke-linecap=\"square\"", None);
-            scene.add(path(lines.join(" "), None, Color::from(INK), 1.8, None));
-            scene.elements.push(kuva::render::render::Primitive::GroupEnd);
+            group(canvas, "class=\"boundary\" stroke-linecap=\"square\"", None);
+            canvas.add(path(lines.join(" "), None, Color::from(INK), 1.8, None));
+            canvas.add(super::svg::Shape::GroupEnd);
         }
     }
 
     /// The looks with their names and counts; returns the y below.
-    fn key(&self, scene: &mut Scene, top: f64) -> f64 {
+    fn key(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let (mut x, mut y) = (BORDER_PX, top);
         for (number, kind) in self.kinds.iter().enumerate() {
             let count = self.cells.iter().filter(|c| usize::from(**c) == number).count();
@@ -181,17 +180,17 @@ impl MapSheet<'_> {
                 (x, y) = (BORDER_PX, y + 30.0);
             }
             let (a, b) = ((x, y + 20.0), (x + 22.0, y));
-            rect(scene, a, b, Color::from(kind.fill), Some((GRID, 0.8)));
+            rect(canvas, a, b, Color::from(kind.fill), Some((GRID, 0.8)));
             let hatching = strokes(kind.hatch, a, b);
             if !hatching.is_empty() {
-                scene.add(path(hatching.join(" "), None, Color::from("#ffffff"), 1.4, None));
+                canvas.add(path(hatching.join(" "), None, Color::from("#ffffff"), 1.4, None));
             }
-            text(scene, (x + 30.0, y + 16.0), &words, LABEL, TextAnchor::Start);
+            text(canvas, (x + 30.0, y + 16.0), &words, LABEL, TextAnchor::Start);
             x += width_px;
         }
         let y = y + 28.0;
         paragraph(
-            scene,
+            canvas,
             (BORDER_PX, y),
             "Black lines: the boundary, between cells of different kinds.",
             NOTE,

@@ -34,6 +34,7 @@ pub mod study;
 mod study_document;
 pub mod study_figures;
 mod study_page;
+mod svg;
 pub mod tables;
 pub mod trace_figure;
 mod trace_panels;

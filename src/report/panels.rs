@@ -8,9 +8,8 @@ use super::csv;
 use super::drawing::{
     self, BORDER_PX, GREY, Look, NAME_BOLD, NOTE, TEXT_WIDTH_PX, TICK, group, paragraph, path_data, plain, rect, text,
 };
+use super::svg::{Canvas, Color, Shape, TextAnchor};
 use crate::Result;
-use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
 
 /// How the values of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,17 +90,17 @@ impl PanelFigure {
     /// The figure as a complete SVG document, 1000 px wide and as high as its panels and texts need. The same figure
     /// gives the same bytes; a panel without a value says so.
     pub fn svg(&self) -> String {
-        let (mut scene, y) = drawing::page(&self.title, self.subtitle.as_deref());
+        let (mut canvas, y) = drawing::page(&self.title, self.subtitle.as_deref());
         let names = self.names();
         let named: Vec<&str> = names.iter().filter(|name| !name.is_empty()).copied().collect();
         let look = |name: &str| look(named.iter().position(|n| *n == name).unwrap_or(0), named.len());
-        let mut y = self.rows(&mut scene, &look, y + 14.0);
+        let mut y = self.rows(&mut canvas, &look, y + 14.0);
         let legend: Vec<(&str, Look)> = named.iter().map(|name| (*name, look(name))).collect();
         if legend.len() > 1 {
-            y = drawing::legend(&mut scene, &legend, y + 8.0);
+            y = drawing::legend(&mut canvas, &legend, y + 8.0);
         }
-        y = paragraph(&mut scene, (BORDER_PX, y + 6.0), &self.caption, NOTE, TEXT_WIDTH_PX);
-        drawing::document(scene, y)
+        y = paragraph(&mut canvas, (BORDER_PX, y + 6.0), &self.caption, NOTE, TEXT_WIDTH_PX);
+        drawing::document(canvas, y)
     }
 
     /// The numbers of the picture: one row per value.
@@ -134,7 +133,7 @@ impl PanelFigure {
         names
     }
 
-    fn rows(&self, scene: &mut Scene, look: &dyn Fn(&str) -> Look, top: f64) -> f64 {
+    fn rows(&self, canvas: &mut Canvas, look: &dyn Fn(&str) -> Look, top: f64) -> f64 {
         let (columns, height_px) = match self.panels.len() {
             0 | 1 => (1, 420.0),
             2 | 4 => (2, 290.0),
@@ -148,9 +147,9 @@ impl PanelFigure {
             let mut bottom = plot_top;
             for (column, panel) in in_row.iter().enumerate() {
                 let left = BORDER_PX + column as f64 * (width_px + GAP_PX);
-                paragraph(scene, (left, y), &panel.heading, NAME_BOLD, width_px);
+                paragraph(canvas, (left, y), &panel.heading, NAME_BOLD, width_px);
                 let across = (left + LEFT_PX, left + width_px - RIGHT_PX);
-                bottom = bottom.max(panel.draw(scene, across, (plot_top, plot_top + height_px), look));
+                bottom = bottom.max(panel.draw(canvas, across, (plot_top, plot_top + height_px), look));
             }
             y = bottom + 20.0;
         }
@@ -160,35 +159,35 @@ impl PanelFigure {
 
 impl Panel {
     /// The plot within these ends; returns the y below its words.
-    fn draw(&self, scene: &mut Scene, across: (f64, f64), down: (f64, f64), look: &dyn Fn(&str) -> Look) -> f64 {
+    fn draw(&self, canvas: &mut Canvas, across: (f64, f64), down: (f64, f64), look: &dyn Fn(&str) -> Look) -> f64 {
         let bottom = down.1 + 44.0;
         let (Some(x), Some(y)) = (self.x_axis(across), self.y_axis((down.1, down.0))) else {
             let middle = (across.0 + across.1) / 2.0;
-            rect(scene, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
-            text(scene, (middle, (down.0 + down.1) / 2.0), "no value to draw", TICK, TextAnchor::Middle);
+            rect(canvas, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
+            text(canvas, (middle, (down.0 + down.1) / 2.0), "no value to draw", TICK, TextAnchor::Middle);
             return bottom;
         };
-        text(scene, (across.0 - LEFT_PX + 4.0, down.0 - 11.0), &self.y, TICK, TextAnchor::Start);
-        y.draw_left(scene, across, 6, true);
-        let numbers = x.draw_below(scene, down, ((across.1 - across.0) / 70.0) as usize, true);
-        text(scene, (across.1, numbers + 12.0), &self.x, TICK, TextAnchor::End);
-        rect(scene, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
+        text(canvas, (across.0 - LEFT_PX + 4.0, down.0 - 11.0), &self.y, TICK, TextAnchor::Start);
+        y.draw_left(canvas, across, 6, true);
+        let numbers = x.draw_below(canvas, down, ((across.1 - across.0) / 70.0) as usize, true);
+        text(canvas, (across.1, numbers + 12.0), &self.x, TICK, TextAnchor::End);
+        rect(canvas, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
         let at = |(a, b): (f64, f64)| (x.at(a), y.at(b));
         for guide in &self.guides {
             let line: Vec<_> = guide.values.iter().copied().map(at).collect();
             let thin = Look { colour: Color::from(GREY), line_px: 0.9, dash: Some("4,4".to_owned()), ..look("") };
-            scene.add(thin.line(path_data(&line, false)));
+            canvas.add(thin.line(path_data(&line, false)));
             if let Some(&(end_x, end_y)) = line.last() {
-                text(scene, (end_x - 4.0, end_y - 4.0), &guide.label, TICK, TextAnchor::End);
+                text(canvas, (end_x - 4.0, end_y - 4.0), &guide.label, TICK, TextAnchor::End);
             }
         }
         for series in &self.series {
-            series.bars_and_line(scene, &at, &look(&series.name));
+            series.bars_and_line(canvas, &at, &look(&series.name));
         }
         // Every marker above every line.
         let mut taken: Vec<(f64, f64, f64)> = Vec::new();
         for series in &self.series {
-            series.markers(scene, &at, &look(&series.name), self, &mut taken);
+            series.markers(canvas, &at, &look(&series.name), self, &mut taken);
         }
         bottom
     }
@@ -221,17 +220,17 @@ impl Panel {
 }
 
 impl PanelSeries {
-    fn bars_and_line(&self, scene: &mut Scene, at: &dyn Fn((f64, f64)) -> (f64, f64), look: &Look) {
+    fn bars_and_line(&self, canvas: &mut Canvas, at: &dyn Fn((f64, f64)) -> (f64, f64), look: &Look) {
         if let Mark::Bars(width) = self.mark {
             for &(x, y) in self.values.iter().filter(|(x, y)| x.is_finite() && y.is_finite() && *y != 0.0) {
                 let (from, to) = (at((x - width / 2.0, 0.0)), at((x + width / 2.0, y)));
-                rect(scene, from, to, look.colour.clone(), Some(("#ffffff", 0.8)));
+                rect(canvas, from, to, look.colour.clone(), Some(("#ffffff", 0.8)));
             }
         }
         if matches!(self.mark, Mark::Line | Mark::LineAndPoints) {
             // A gap where there is no value.
             for run in self.values.split(|(x, y)| !x.is_finite() || !y.is_finite()).filter(|run| run.len() > 1) {
-                scene.add(look.line(path_data(&run.iter().copied().map(at).collect::<Vec<_>>(), false)));
+                canvas.add(look.line(path_data(&run.iter().copied().map(at).collect::<Vec<_>>(), false)));
             }
         }
     }
@@ -239,7 +238,7 @@ impl PanelSeries {
     /// `taken`: where labels stand already, as left end, width and base line.
     fn markers(
         &self,
-        scene: &mut Scene,
+        canvas: &mut Canvas,
         at: &dyn Fn((f64, f64)) -> (f64, f64),
         look: &Look,
         panel: &Panel,
@@ -262,10 +261,10 @@ impl PanelSeries {
                 &format!("{} {}", panel.y, number(y)),
             ];
             let tip = words.iter().filter(|word| !word.is_empty()).copied().collect::<Vec<_>>().join("; ");
-            group(scene, "class=\"value\"", Some(plain(&tip)));
+            group(canvas, "class=\"value\"", Some(plain(&tip)));
             let place = at((x, y));
-            scene.elements.push(look.marker(place));
-            scene.elements.push(Primitive::GroupEnd);
+            canvas.add(look.marker(place));
+            canvas.add(Shape::GroupEnd);
             // A word per value of a few; with many they would cover one another.
             if !label.is_empty() && self.values.len() <= MAX_WORDS {
                 let width = TICK.text_px(label);
@@ -276,7 +275,7 @@ impl PanelSeries {
                 };
                 let (dx, dy) = places.into_iter().find(is_free).unwrap_or(places[0]);
                 taken.push((place.0 + dx, width, place.1 + dy));
-                text(scene, (place.0 + dx, place.1 + dy), label, TICK, TextAnchor::Start);
+                text(canvas, (place.0 + dx, place.1 + dy), label, TICK, TextAnchor::Start);
             }
         }
     }

@@ -1,9 +1,8 @@
 //! The radar chart of the paper: one spoke per (driver model, criterion), one polygon per parameterization,
 //! radius = F1.
 //!
-//! The radar plot of `kuva` is not used: it
-//! needs a number on every spoke, and an undefined F1 (0/0) drawn as a number would be a false measurement. Here
-//! the line of a series is *broken* at an undefined spoke and the spoke is named in a note below the chart.
+//! An undefined F1 (0/0) drawn as a number would be a false measurement. The line of a series is *broken* at an
+//! undefined spoke, and a note below the chart names the spoke.
 //!
 //! Several series often share a value (F1 = 1 above all). So the lines are drawn from thick to thin and the markers
 //! from large to small: what lies below stays visible.
@@ -12,8 +11,7 @@ use super::drawing::{
     self, BORDER_PX, GREY, GRID, Look, NAME, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, on_circle, paragraph,
     path_data, plain, text,
 };
-use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+use super::svg::{Canvas, Color, Shape, TextAnchor};
 use std::f64::consts::TAU;
 
 /// One polygon: the scores of one parameterization.
@@ -55,18 +53,18 @@ const NAME_UNDEFINED: Type = Type { colour: GREY, ..NAME };
 /// The same chart gives the same bytes. Nothing fails: without spokes or series only the texts remain.
 pub fn radar_svg(chart: &RadarChart) -> String {
     let scores: Vec<Vec<Option<f64>>> = chart.series.iter().map(|s| scores(s, chart.spokes.len())).collect();
-    let (mut scene, mut y) = drawing::page(&chart.title, chart.subtitle.as_deref());
+    let (mut canvas, mut y) = drawing::page(&chart.title, chart.subtitle.as_deref());
     if !chart.spokes.is_empty() {
-        y = web(&mut scene, chart, &scores, y + 14.0);
+        y = web(&mut canvas, chart, &scores, y + 14.0);
         let caption = "Radius: F1 score, 0 at the centre, 1 at the outer ring.";
-        y = paragraph(&mut scene, (BORDER_PX, y + 12.0), caption, NOTE, TEXT_WIDTH_PX);
+        y = paragraph(&mut canvas, (BORDER_PX, y + 12.0), caption, NOTE, TEXT_WIDTH_PX);
     }
     let count = chart.series.len();
     let names = chart.series.iter().map(|s| s.name.as_str()).enumerate();
     let legend: Vec<(&str, Look)> = names.map(|(s, name)| (name, Look::of(s, count))).collect();
-    y = drawing::legend(&mut scene, &legend, y + 10.0);
-    y = notes(&mut scene, chart, &scores, y + 10.0);
-    drawing::document(scene, y)
+    y = drawing::legend(&mut canvas, &legend, y + 10.0);
+    y = notes(&mut canvas, chart, &scores, y + 10.0);
+    drawing::document(canvas, y)
 }
 
 /// One score per spoke; whatever is no number in 0..=1 is undefined.
@@ -80,7 +78,7 @@ fn undefined_everywhere(scores: &[Vec<Option<f64>>], spoke: usize) -> bool {
 }
 
 /// Rings, spokes, names and polygons below `top`; returns the y below them.
-fn web(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
+fn web(canvas: &mut Canvas, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
     let names: Vec<Vec<String>> = (0..chart.spokes.len())
         .map(|i| {
             let mut lines = NAME.wrap(&chart.spokes[i], NAME_WIDTH_PX);
@@ -98,12 +96,12 @@ fn web(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: 
     for ring in 1..=5_u32 {
         let (r, stroke) = (RADIUS_PX * f64::from(ring) / 5.0, Some(Color::from(GRID)));
         let (fill, stroke_width) = (Color::None, Some(if ring == 5 { 1.6 } else { 1.0 }));
-        scene.add(Primitive::Circle { cx: centre.0, cy: centre.1, r, fill, fill_opacity: None, stroke, stroke_width });
+        canvas.add(Shape::Circle { cx: centre.0, cy: centre.1, r, fill, stroke, stroke_width });
     }
     for (i, lines) in names.iter().enumerate() {
         let nowhere = undefined_everywhere(scores, i);
         let (x2, y2) = on_circle(centre, RADIUS_PX, turn(i));
-        scene.add(Primitive::Line {
+        canvas.add(Shape::Line {
             x1: centre.0,
             y1: centre.1,
             x2,
@@ -112,17 +110,17 @@ fn web(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: 
             stroke_width: 1.0,
             stroke_dasharray: nowhere.then(|| "2,5".to_string()),
         });
-        spoke_name(scene, lines, centre, turn(i), if nowhere { NAME_UNDEFINED } else { NAME });
+        spoke_name(canvas, lines, centre, turn(i), if nowhere { NAME_UNDEFINED } else { NAME });
     }
     // Round joins: a mitred corner of a thin spike would reach beyond its score.
-    group(scene, "stroke-linejoin=\"round\"", None);
+    group(canvas, "stroke-linejoin=\"round\"", None);
     for (s, values) in scores.iter().enumerate() {
         let look = Look::of(s, scores.len());
         let at = |(i, v): (usize, &Option<f64>)| v.map(|v| on_circle(centre, RADIUS_PX * v, turn(i)));
         let points: Vec<Option<(f64, f64)>> = values.iter().enumerate().map(at).collect();
         for (run, closed) in runs(&points) {
             if run.len() > 1 {
-                scene.elements.push(look.line(path_data(&run, closed)));
+                canvas.add(look.line(path_data(&run, closed)));
             }
         }
     }
@@ -132,21 +130,21 @@ fn web(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: 
         for (i, value) in values.iter().enumerate() {
             let Some(value) = value else { continue };
             let tip = format!("{}; {}: {value:.3}", plain(&chart.series[s].name), plain(&chart.spokes[i]));
-            group(scene, "class=\"score\"", Some(tip));
-            scene.elements.push(look.marker(on_circle(centre, RADIUS_PX * value, turn(i))));
-            scene.elements.push(Primitive::GroupEnd);
+            group(canvas, "class=\"score\"", Some(tip));
+            canvas.add(look.marker(on_circle(centre, RADIUS_PX * value, turn(i))));
+            canvas.add(Shape::GroupEnd);
         }
     }
-    scene.elements.push(Primitive::GroupEnd);
-    ring_labels(scene, centre, turn(1) / 2.0);
+    canvas.add(Shape::GroupEnd);
+    ring_labels(canvas, centre, turn(1) / 2.0);
     centre.1 + reach
 }
 
 /// The values of the rings, midway between the first two spokes where no marker lies, above the lines.
-fn ring_labels(scene: &mut Scene, centre: (f64, f64), turn: f64) {
+fn ring_labels(canvas: &mut Canvas, centre: (f64, f64), turn: f64) {
     for ring in 1..=5_u32 {
         let (x, y) = on_circle(centre, RADIUS_PX * f64::from(ring) / 5.0, turn);
-        scene.add(Primitive::Rect {
+        canvas.add(Shape::Rect {
             x: x - 13.0,
             y: y - 9.0,
             width: 26.0,
@@ -157,12 +155,12 @@ fn ring_labels(scene: &mut Scene, centre: (f64, f64), turn: f64) {
             opacity: Some(0.8),
         });
         let label = format!("{:.1}", f64::from(ring) / 5.0);
-        text(scene, (x, y + 5.0), &label, TICK, TextAnchor::Middle);
+        text(canvas, (x, y + 5.0), &label, TICK, TextAnchor::Middle);
     }
 }
 
 /// The lines of a spoke's name outside the outer ring: upward at the top, downward at the bottom, centred beside it.
-fn spoke_name(scene: &mut Scene, lines: &[String], centre: (f64, f64), turn: f64, set: Type) {
+fn spoke_name(canvas: &mut Canvas, lines: &[String], centre: (f64, f64), turn: f64, set: Type) {
     let (x, y) = on_circle(centre, RADIUS_PX + NAME_GAP_PX, turn);
     let (across, up) = (libm::sin(turn), libm::cos(turn));
     let anchor = match across {
@@ -174,12 +172,12 @@ fn spoke_name(scene: &mut Scene, lines: &[String], centre: (f64, f64), turn: f64
     let block_px = lines.len() as f64 * set.line_px();
     let first = y - block_px * (1.0 + up) / 2.0 + f64::from(set.size_px);
     for (k, line) in lines.iter().enumerate() {
-        text(scene, (x, first + k as f64 * set.line_px()), line, set, anchor);
+        text(canvas, (x, first + k as f64 * set.line_px()), line, set, anchor);
     }
 }
 
 /// Which scores are undefined, if any; returns the y below.
-fn notes(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
+fn notes(canvas: &mut Canvas, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
     let everywhere = |i: &usize| undefined_everywhere(scores, *i);
     let name = |i: usize| chart.spokes[i].as_str();
     let mut lines = Vec::new();
@@ -194,7 +192,7 @@ fn notes(scene: &mut Scene, chart: &RadarChart, scores: &[Vec<Option<f64>>], top
             lines.push(format!("{} — {}", series.name, gaps.join(", ")));
         }
     }
-    drawing::notes(scene, "Undefined F1 (0/0): no point is drawn and the line is broken there.", &lines, top)
+    drawing::notes(canvas, "Undefined F1 (0/0): no point is drawn and the line is broken there.", &lines, top)
 }
 
 /// The pieces of a series' line, and whether the piece closes: the whole polygon, or what lies between the gaps

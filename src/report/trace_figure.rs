@@ -3,13 +3,11 @@
 //! The sheet has the width of a column of a paper (two for a cut-out, whose vehicles stand side by side) and type that
 //! stays readable at that width. Series differ in colour, dashes and line width, marks in their shapes.
 
-use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
-
 use super::axis::{Axis, number};
 use super::drawing::{
-    self, FONTS, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, rect, text,
+    self, GREY, INK, Look, Type, area, group, line, on_circle, paragraph, path, path_data, rect, text,
 };
+use super::svg::{Canvas, Color, Shape, TextAnchor};
 pub use super::trace_panels::TraceSeries;
 use super::trace_panels::{Curve, Level, Owner, Panel, PanelMark, Reach, Shown};
 use crate::engine::Mark;
@@ -52,31 +50,29 @@ impl TraceFigure<'_> {
         let shown = Shown::of(&self.series, self.until_s);
         let columns = shown.columns();
         let sheet = Sheet { width_px: COLUMN_PX * columns.len() as f64, looks: self.looks() };
-        let mut scene = Scene::new(sheet.width_px, 0.0);
-        scene.font_family = Some(FONTS.to_string());
-        scene.text_color = Some(INK.to_string());
+        let mut canvas = drawing::sheet(sheet.width_px);
         let across_px = sheet.width_px - 2.0 * MARGIN_PX;
-        let mut y = paragraph(&mut scene, (MARGIN_PX, 14.0), &self.title, TITLE, across_px);
+        let mut y = paragraph(&mut canvas, (MARGIN_PX, 14.0), &self.title, TITLE, across_px);
         if let Some(subtitle) = &self.subtitle {
-            y = paragraph(&mut scene, (MARGIN_PX, y + 3.0), subtitle, SUBTITLE, across_px);
+            y = paragraph(&mut canvas, (MARGIN_PX, y + 3.0), subtitle, SUBTITLE, across_px);
         }
         if self.series.iter().all(|s| s.trace.steps.is_empty()) {
-            y = paragraph(&mut scene, (MARGIN_PX, y + 8.0), "There is no lane to draw.", CELL, across_px);
-            return drawing::document(scene, y);
+            y = paragraph(&mut canvas, (MARGIN_PX, y + 8.0), "There is no lane to draw.", CELL, across_px);
+            return drawing::document(canvas, y);
         }
-        y = self.table(&mut scene, &sheet, y + 8.0) + 6.0;
+        y = self.table(&mut canvas, &sheet, y + 8.0) + 6.0;
         let lines = self.mark_lines();
         let mut bottom = y;
         for (k, panels) in columns.iter().enumerate() {
             let left = COLUMN_PX * k as f64;
             let time = time_axis(shown.until_s, (left + LEFT_PX, left + COLUMN_PX - MARGIN_PX));
-            bottom = bottom.max(sheet.column(&mut scene, panels, &time, left, y, &lines));
+            bottom = bottom.max(sheet.column(&mut canvas, panels, &time, left, y, &lines));
         }
         y = bottom + 6.0;
         for note in self.notes(&shown, &columns) {
-            y = paragraph(&mut scene, (MARGIN_PX, y), &note, CELL, across_px) + 3.0;
+            y = paragraph(&mut canvas, (MARGIN_PX, y), &note, CELL, across_px) + 3.0;
         }
-        drawing::document(scene, y)
+        drawing::document(canvas, y)
     }
 
     fn looks(&self) -> Vec<Look> {
@@ -86,7 +82,7 @@ impl TraceFigure<'_> {
     }
 
     /// Names, marks and worst values of the series; returns the y below.
-    fn table(&self, scene: &mut Scene, sheet: &Sheet, top: f64) -> f64 {
+    fn table(&self, canvas: &mut Canvas, sheet: &Sheet, top: f64) -> f64 {
         let columns = [Mark::Reaction.label(), Mark::Braking.label(), Mark::Contact.label(), "min TTC", "max BTN"];
         let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
         let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
@@ -94,27 +90,27 @@ impl TraceFigure<'_> {
         let at = |column: usize| most.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
         let mut y = top + CELL.line_px();
         for (column, head) in columns.iter().enumerate() {
-            text(scene, (at(column), top + f64::from(CELL.size_px)), head, HINT, TextAnchor::Start);
+            text(canvas, (at(column), top + f64::from(CELL.size_px)), head, HINT, TextAnchor::Start);
         }
         for (k, series) in self.series.iter().enumerate() {
             let look = &sheet.looks[k];
             let (baseline, middle) = (y + f64::from(CELL.size_px), y + CELL.line_px() / 2.0);
-            group(scene, "class=\"legend\"", None);
-            scene.elements.push(look.line(path_data(&[(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)], false)));
-            scene.elements.push(Primitive::GroupEnd);
-            let below = paragraph(scene, (name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
+            group(canvas, "class=\"legend\"", None);
+            canvas.add(look.line(path_data(&[(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)], false)));
+            canvas.add(Shape::GroupEnd);
+            let below = paragraph(canvas, (name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
             for (column, mark) in Mark::ALL.into_iter().enumerate() {
                 let Some(step) = series.trace.step_of(mark) else {
-                    text(scene, (at(column), baseline), "never", HINT, TextAnchor::Start);
+                    text(canvas, (at(column), baseline), "never", HINT, TextAnchor::Start);
                     continue;
                 };
-                symbol(scene, mark, (at(column) + MARK_PX, middle), look);
+                symbol(canvas, mark, (at(column) + MARK_PX, middle), look);
                 let time = format!("{} s", thousandths(series.trace.time_s(step)));
-                text(scene, (at(column) + 2.0 * MARK_PX + 5.0, baseline), &time, CELL, TextAnchor::Start);
+                text(canvas, (at(column) + 2.0 * MARK_PX + 5.0, baseline), &time, CELL, TextAnchor::Start);
             }
             let outcome = &series.trace.outcome;
-            text(scene, (at(3), baseline), &worst(outcome.min_ttc, " s"), CELL, TextAnchor::Start);
-            text(scene, (at(4), baseline), &worst(outcome.max_btn, ""), CELL, TextAnchor::Start);
+            text(canvas, (at(3), baseline), &worst(outcome.min_ttc, " s"), CELL, TextAnchor::Start);
+            text(canvas, (at(4), baseline), &worst(outcome.max_btn, ""), CELL, TextAnchor::Start);
             y = below.max(y + CELL.line_px()) + 3.0;
         }
         y
@@ -158,7 +154,7 @@ impl Sheet {
     /// One column of panels; returns the y below.
     fn column(
         &self,
-        scene: &mut Scene,
+        canvas: &mut Canvas,
         panels: &[Panel],
         time: &Axis,
         left: f64,
@@ -171,40 +167,46 @@ impl Sheet {
         let (mut y, mut bottom) = (top, top);
         for (k, panel) in panels.iter().enumerate() {
             let title_bottom = y + NAME.line_px() + 3.0;
-            text(scene, (across.0, title_bottom - 6.0), panel.title, NAME, TextAnchor::Start);
-            text(scene, (across.1, title_bottom - 6.0), &panel.hint, HINT, TextAnchor::End);
+            text(canvas, (across.0, title_bottom - 6.0), panel.title, NAME, TextAnchor::Start);
+            text(canvas, (across.1, title_bottom - 6.0), &panel.hint, HINT, TextAnchor::End);
             // The labels of the lines through all panels stand above the first plot.
             let above = if k == 0 { rows as f64 * CELL.line_px() } else { 0.0 };
             let down = (title_bottom + above, title_bottom + above + panel.height_px);
             // In pieces, so that no title is crossed.
             for label in &labels {
                 let from = if k == 0 { title_bottom + label.row as f64 * CELL.line_px() + 2.0 } else { down.0 };
-                group(scene, &format!("class=\"mark-line {}\"", label.mark.label()), None);
+                group(canvas, &format!("class=\"mark-line {}\"", label.mark.label()), None);
                 let d = path_data(&[(label.x, from), (label.x, down.1)], false);
-                scene.elements.push(path(d, None, Color::from(INK), 1.0, dash_of(label.mark)));
-                scene.elements.push(Primitive::GroupEnd);
+                canvas.add(path(d, None, Color::from(INK), 1.0, dash_of(label.mark)));
+                canvas.add(Shape::GroupEnd);
             }
             for label in labels.iter().filter(|_| k == 0) {
                 let row_bottom = title_bottom + (label.row + 1) as f64 * CELL.line_px();
                 // On white: lines of other labels pass behind.
                 let (from, to) = label.text_px;
                 let white = Color::from("#ffffff");
-                rect(scene, (from - 1.0, row_bottom - CELL.line_px() + 1.0), (to + 1.0, row_bottom - 1.0), white, None);
+                rect(
+                    canvas,
+                    (from - 1.0, row_bottom - CELL.line_px() + 1.0),
+                    (to + 1.0, row_bottom - 1.0),
+                    white,
+                    None,
+                );
                 let x = if label.is_right { from } else { to };
                 let anchor = if label.is_right { TextAnchor::Start } else { TextAnchor::End };
-                text(scene, (x, row_bottom - 4.0), &label.words, CELL, anchor);
+                text(canvas, (x, row_bottom - 4.0), &label.words, CELL, anchor);
             }
-            self.panel(scene, panel, time, across, down, k + 1 == panels.len());
+            self.panel(canvas, panel, time, across, down, k + 1 == panels.len());
             bottom = down.1;
             y = down.1 + 5.0;
         }
-        text(scene, (across.1, bottom + 36.0), "Time (s)", NAME, TextAnchor::End);
+        text(canvas, (across.1, bottom + 36.0), "Time (s)", NAME, TextAnchor::End);
         bottom + 40.0
     }
 
     fn panel(
         &self,
-        scene: &mut Scene,
+        canvas: &mut Canvas,
         panel: &Panel,
         time: &Axis,
         across: (f64, f64),
@@ -213,13 +215,13 @@ impl Sheet {
     ) {
         let value = Axis::exactly(panel.reach.ends(), (down.1, down.0));
         let rows = if panel.height_px < 70.0 { 2 } else { 5 };
-        value.draw_left(scene, across, rows, true);
+        value.draw_left(canvas, across, rows, true);
         let time_ticks = time.ticks(8);
         for tick in &time_ticks {
-            line(scene, (tick.at_px, down.0), (tick.at_px, down.1), drawing::GRID, 0.8);
+            line(canvas, (tick.at_px, down.0), (tick.at_px, down.1), drawing::GRID, 0.8);
         }
         if is_last {
-            time.draw_below(scene, down, 8, false);
+            time.draw_below(canvas, down, 8, false);
         }
         for level in &panel.levels {
             let y = value.at(level.1);
@@ -230,23 +232,23 @@ impl Sheet {
                 Level::EgoSide => (None, 2.4, GREY),
             };
             let d = path_data(&[(across.0, y), (across.1, y)], false);
-            scene.add(path(d, None, Color::from(colour), width_px, dash.map(str::to_owned)));
+            canvas.add(path(d, None, Color::from(colour), width_px, dash.map(str::to_owned)));
         }
         for band in &panel.bands {
             let upper = band.points.iter().map(|p| (time.at(p.0), value.at(p.2)));
             let lower = band.points.iter().rev().map(|p| (time.at(p.0), value.at(p.1)));
-            area(scene, &upper.chain(lower).collect::<Vec<_>>(), self.colour(band.owner), 0.18);
+            area(canvas, &upper.chain(lower).collect::<Vec<_>>(), self.colour(band.owner), 0.18);
         }
         for curve in &panel.curves {
-            group(scene, "class=\"series\"", None);
-            self.curve(scene, curve, time, &value);
-            scene.elements.push(Primitive::GroupEnd);
+            group(canvas, "class=\"series\"", None);
+            self.curve(canvas, curve, time, &value);
+            canvas.add(Shape::GroupEnd);
         }
-        group(scene, &format!("class=\"frame\" data-panel=\"{}\"", panel.title), None);
-        rect(scene, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
-        scene.elements.push(Primitive::GroupEnd);
+        group(canvas, &format!("class=\"frame\" data-panel=\"{}\"", panel.title), None);
+        rect(canvas, (across.0, down.0), (across.1, down.1), Color::None, Some((GREY, 1.0)));
+        canvas.add(Shape::GroupEnd);
         for mark in &panel.marks {
-            self.mark(scene, mark, (time.at(mark.at.0), value.at(mark.at.1)));
+            self.mark(canvas, mark, (time.at(mark.at.0), value.at(mark.at.1)));
         }
     }
 
@@ -257,7 +259,7 @@ impl Sheet {
         }
     }
 
-    fn curve(&self, scene: &mut Scene, curve: &Curve, time: &Axis, value: &Axis) {
+    fn curve(&self, canvas: &mut Canvas, curve: &Curve, time: &Axis, value: &Axis) {
         let places: Vec<(f64, f64)> = curve.points.iter().map(|p| (time.at(p.0), value.at(p.1))).collect();
         let dash = match curve.owner {
             Owner::Series(k) => self.looks[k].dash.clone(),
@@ -270,18 +272,18 @@ impl Sheet {
         };
         if let [(cx, cy)] = places[..] {
             let (fill, r) = (self.colour(curve.owner), 1.0 + line_px / 2.0);
-            let dot = Primitive::Circle { cx, cy, r, fill, fill_opacity: None, stroke: None, stroke_width: None };
-            scene.elements.push(dot);
+            let dot = Shape::Circle { cx, cy, r, fill, stroke: None, stroke_width: None };
+            canvas.add(dot);
         } else if places.len() > 1 {
             let d = path_data(&without_inner_points(&places), false);
-            scene.elements.push(path(d, None, self.colour(curve.owner), line_px, dash));
+            canvas.add(path(d, None, self.colour(curve.owner), line_px, dash));
         }
     }
 
-    fn mark(&self, scene: &mut Scene, mark: &PanelMark, at: (f64, f64)) {
-        group(scene, &format!("class=\"mark {}\" data-t=\"{}\"", mark.mark.label(), mark.at.0), None);
-        symbol(scene, mark.mark, at, &self.looks[mark.series]);
-        scene.elements.push(Primitive::GroupEnd);
+    fn mark(&self, canvas: &mut Canvas, mark: &PanelMark, at: (f64, f64)) {
+        group(canvas, &format!("class=\"mark {}\" data-t=\"{}\"", mark.mark.label(), mark.at.0), None);
+        symbol(canvas, mark.mark, at, &self.looks[mark.series]);
+        canvas.add(Shape::GroupEnd);
     }
 }
 
@@ -291,25 +293,25 @@ fn time_axis(until_s: f64, across: (f64, f64)) -> Axis {
 }
 
 /// Told apart by shape: circle, triangle, cross.
-fn symbol(scene: &mut Scene, mark: Mark, (x, y): (f64, f64), look: &Look) {
+fn symbol(canvas: &mut Canvas, mark: Mark, (x, y): (f64, f64), look: &Look) {
     let (colour, white) = (look.colour.clone(), Color::from("#ffffff"));
     match mark {
         Mark::Reaction => {
             let (fill, stroke, stroke_width) = (white, Some(colour), Some(2.0));
             let r = MARK_PX - 1.0;
-            scene.elements.push(Primitive::Circle { cx: x, cy: y, r, fill, fill_opacity: None, stroke, stroke_width });
+            canvas.add(Shape::Circle { cx: x, cy: y, r, fill, stroke, stroke_width });
         }
         Mark::Braking => {
             let corners: Vec<_> = [1.0, 3.0, 5.0]
                 .map(|sixth| on_circle((x, y - 0.5), MARK_PX + 1.5, sixth * std::f64::consts::FRAC_PI_3))
                 .to_vec();
-            scene.elements.push(path(path_data(&corners, true), Some(colour), white, 1.0, None));
+            canvas.add(path(path_data(&corners, true), Some(colour), white, 1.0, None));
         }
         Mark::Contact => {
             for (stroke, width_px) in [(white, 5.0), (colour, 2.6)] {
                 for (dx, dy) in [(MARK_PX, MARK_PX), (MARK_PX, -MARK_PX)] {
                     let d = path_data(&[(x - dx, y - dy), (x + dx, y + dy)], false);
-                    scene.elements.push(path(d, None, stroke.clone(), width_px, None));
+                    canvas.add(path(d, None, stroke.clone(), width_px, None));
                 }
             }
         }
