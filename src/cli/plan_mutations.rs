@@ -1,5 +1,5 @@
 //! Plan files that were changed and sealed again: an error or a plan that can be used, never a panic. The readers of
-//! the library have the same test, with more inputs, in `tests/mutated_inputs.rs`.
+//! the library have the same test, with more inputs, in `tests/memory/mutated_inputs.rs`.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ use crate::traffic::mining::{MiningOptions, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::{Error, Result};
 
-#[path = "../../tests/mutated_inputs/mutate.rs"]
+#[path = "../../tests/memory/mutated_inputs/mutate.rs"]
 mod mutate;
 
 /// Changed files of each kind.

@@ -8,7 +8,11 @@ use std::path::PathBuf;
 pub mod device;
 pub mod lane_sets;
 pub mod page;
+pub mod plans;
+pub mod reliability;
 pub mod small;
+#[cfg(feature = "parquet")]
+pub mod tables;
 
 /// A path below the shared folder (`../shared`, or the environment variable `LANESWEEP_SHARED`); where
 /// it is absent, says so loudly and gives `None`: the test returns.

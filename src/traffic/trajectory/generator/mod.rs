@@ -20,7 +20,7 @@
 //! | `braking` | scheduled hard brakings of one or two phases, two kinds of exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; order of the paper's LVD failure shares |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
-//! `tests/generator_calibration.rs` prints every one of these figures beside ours and fails where they
+//! `tests/traffic/generator_calibration.rs` prints every one of these figures beside ours and fails where they
 //! part by more than it states.
 //!
 //! # The rate factor

@@ -1,0 +1,4 @@
+//! Tables as other programs write them.
+
+pub mod made;
+pub mod run;

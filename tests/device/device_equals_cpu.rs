@@ -1,0 +1,165 @@
+//! Every output word of a device equals the CPU's, bit for bit, whatever the profile, the cut into jobs and the
+//! run-time checks; and a wrong shader is found. The software Vulkan stands for a device here; `lanesweep
+//! verify` asks the same of any other.
+
+use crate::common::device::software_device;
+use crate::common::lane_sets::{forms, random, small_study, thresholds};
+use lanesweep::engine::gpu::{Checks, GpuBackend, GpuOptions};
+use lanesweep::engine::verify::{Comparison, compare, self_check};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Wanted, same_words};
+use lanesweep::model::profile::Profile;
+
+fn open(options: GpuOptions) -> Option<GpuBackend> {
+    let (adapters, index) = software_device()?;
+    Some(GpuBackend::open(&adapters, index, options).unwrap())
+}
+
+fn run(backend: &dyn Backend, plan: &LanePlan, wanted: Wanted) -> Chunk {
+    let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap();
+    chunk.check(plan).unwrap();
+    chunk
+}
+
+fn assert_equal(what: &str, comparison: &Comparison) {
+    let worst: Vec<String> = comparison.worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
+    assert!(comparison.is_equal(), "{what}: {worst:#?}, modes {}", comparison.modes_differing);
+}
+
+#[test]
+fn every_word_of_a_small_study_equals_the_cpus() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    assert!(gpu.is_exact());
+    let plan = small_study();
+    let comparison = compare("study", &plan, &gpu, |_| ()).unwrap();
+    assert_equal("study", &comparison);
+    assert_eq!(comparison.lanes(), plan.lane_count());
+}
+
+#[test]
+fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    for name in Profile::names() {
+        let profile = Profile::load(name).unwrap();
+        assert_equal(name, &compare("random", &random(&profile, 1000), &gpu, |_| ()).unwrap());
+        assert_equal(name, &compare("thresholds", &thresholds(&profile, 3), &gpu, |_| ()).unwrap());
+    }
+}
+
+#[test]
+fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    for profile in &forms() {
+        let what = format!("{:?} {:?}", profile.criteria, profile.frame);
+        for plan in [random(profile, 200), thresholds(profile, 1)] {
+            let comparison = compare("form", &plan, &gpu, |_| ());
+            assert_equal(&what, &comparison.unwrap_or_else(|error| panic!("{what}: {error}")));
+        }
+    }
+}
+
+#[test]
+fn the_cut_into_jobs_and_into_calls_changes_no_word() {
+    let plan = random(&Profile::load("paper").unwrap(), 2000);
+    let cpu = run(&CpuBackend::lane_arithmetic(), &plan, Wanted::Outcomes);
+    for first_lanes in [1, 77, 1 << 22] {
+        let Some(gpu) = open(GpuOptions { first_lanes, ..Default::default() }) else { return };
+        let mut session = gpu.prepare(&plan).unwrap();
+        // Sizes that fit no word: 7 units are 280 lanes of each model.
+        let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
+        while from < plan.unit_count() {
+            let to = (from + 7).min(plan.unit_count());
+            outcomes.extend(session.run(from..to, Wanted::Outcomes).unwrap().outcomes);
+            verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
+            from = to;
+        }
+        assert!(outcomes.iter().zip(&cpu.outcomes).all(|(a, b)| same_words(a, b)), "first job of {first_lanes} lanes");
+        assert!(outcomes.len() == cpu.outcomes.len() && verdicts == cpu.verdicts);
+    }
+}
+
+#[test]
+fn shaders_without_run_time_checks_give_the_same_words() {
+    let Some(gpu) = open(GpuOptions { checks: Checks::Unchecked, ..Default::default() }) else { return };
+    let profile = Profile::load("paper").unwrap();
+    assert_equal("unchecked", &compare("random", &random(&profile, 2000), &gpu, |_| ()).unwrap());
+    assert_equal("unchecked", &compare("thresholds", &thresholds(&profile, 4), &gpu, |_| ()).unwrap());
+}
+
+/// What `verify` says of a device whose shaders have one text replaced.
+fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
+    let shader_patch = Some((from.to_owned(), to.to_owned()));
+    let gpu = open(GpuOptions { shader_patch, ..Default::default() })?;
+    let profile = Profile::load("paper").unwrap();
+    let mut found = compare("random", &random(&profile, 4000), &gpu, |_| ()).unwrap();
+    let thresholds = compare("thresholds", &thresholds(&profile, 8), &gpu, |_| ()).unwrap();
+    found.tallies.extend(thresholds.tallies);
+    found.worst.extend(thresholds.worst);
+    Some(found)
+}
+
+#[test]
+fn one_step_more_delay_in_a_shader_is_found_with_its_model() {
+    let Some(found) = shader_patch(
+        "DriverState(driver_coasting, driver_delay_steps)",
+        "DriverState(driver_coasting, driver_delay_steps + 1u)",
+    ) else {
+        return;
+    };
+    assert!(!found.is_equal() && !found.worst.is_empty());
+    assert!(found.tallies.iter().all(|t| (t.words_differing > 0) == (t.model.name() == "CCHDM")), "{found:?}");
+    assert!(found.tallies.iter().any(|t| t.verdicts_differing > 0));
+}
+
+#[test]
+fn one_unit_in_the_last_place_of_a_constant_is_found() {
+    let plants = [
+        // 1/12 in the Reg157 threshold.
+        (
+            "dv * driver_half_inverse_deceleration",
+            "dv * bitcast<f32>(bitcast<u32>(driver_half_inverse_deceleration) + 1u)",
+        ),
+        ("driver_ttc * abs(dv)", "bitcast<f32>(bitcast<u32>(driver_ttc) + 1u) * abs(dv)"),
+        ("v_ego * driver_tau", "v_ego * bitcast<f32>(bitcast<u32>(driver_tau) + 1u)"),
+        ("v_ego * driver_response_time", "v_ego * bitcast<f32>(bitcast<u32>(driver_response_time) + 1u)"),
+        ("gap < ttc_threshold_s * closing", "gap < bitcast<f32>(bitcast<u32>(ttc_threshold_s) + 1u) * closing"),
+        ("closing * btn_ramp_delay", "closing * bitcast<f32>(bitcast<u32>(btn_ramp_delay) + 1u)"),
+    ];
+    for (from, to) in plants {
+        let Some(found) = shader_patch(from, to) else { return };
+        assert!(!found.is_equal(), "{to} was not found");
+    }
+}
+
+#[test]
+fn the_quick_self_check_finds_a_wrong_shader_and_no_other() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let good = self_check(&gpu).unwrap();
+    assert!(good.lanes > 8000 && good.differing == 0, "{good:?}");
+    let shader_patch = Some(("(v_ego - v_before)".to_owned(), "(v_before - v_ego)".to_owned()));
+    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    assert!(self_check(&gpu).unwrap().differing > 0);
+}
+
+#[test]
+fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
+    let shader_patch = Some(("if lane >= launch.lanes {".to_owned(), "if lane + 1u >= launch.lanes {".to_owned()));
+    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    let plan = random(&Profile::load("paper").unwrap(), 400);
+    let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();
+    assert!(error.to_string().contains("of 400 lanes") || error.to_string().contains("lanes of"), "{error}");
+}
+
+/// The plain path (naga's own module, as on Metal, DX12 and GL) may contract and reassociate: equality is not
+/// promised there, and what the drivers at hand do is printed.
+#[test]
+fn the_self_check_finds_what_the_plain_path_changes() {
+    let Some(gpu) = open(GpuOptions { plain: true, ..Default::default() }) else { return };
+    assert!(!gpu.is_exact());
+    let profile = Profile::load("paper").unwrap();
+    let found = compare("random", &random(&profile, 20_000), &gpu, |_| ()).unwrap();
+    let differing: u64 = found.tallies.iter().map(|t| t.lanes_differing).sum();
+    let verdicts: u64 = found.tallies.iter().map(|t| t.verdicts_differing).sum();
+    println!("{}: {differing} of {} lanes, {verdicts} verdict bits differ", gpu.describe(), found.lanes());
+    // One lane in a thousand is enough for the self-check, which decides there.
+    assert!(differing < found.lanes() / 1000 || self_check(&gpu).unwrap().differing > 0);
+}

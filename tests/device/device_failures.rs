@@ -1,0 +1,142 @@
+//! A device that fails takes nothing with it: the CPU computes what is missing, the user is told, and the
+//! numbers are complete.
+
+use std::time::Duration;
+
+use crate::common::device::software_device;
+use lanesweep::Error;
+use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
+use lanesweep::engine::verify::{RandomOptions, random_plan};
+use lanesweep::engine::{
+    Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
+};
+use lanesweep::model::profile::Profile;
+
+fn open(options: GpuOptions) -> Option<GpuBackend> {
+    let (adapters, index) = software_device()?;
+    Some(GpuBackend::open(&adapters, index, options).unwrap())
+}
+
+fn plan() -> LanePlan {
+    let options = RandomOptions { lanes_per_model_and_category: 40_000, ..Default::default() };
+    random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
+}
+
+/// All verdicts and how the sweep went, with the CPU standing in.
+fn swept(plan: &LanePlan, gpu: &GpuBackend) -> (Vec<Verdicts>, SweepSummary) {
+    let cpu = CpuBackend::lane_arithmetic();
+    let recheck = Recheck::new(plan, 157, 100);
+    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: Some(&cpu), recheck: Some(&recheck) };
+    let mut verdicts = Vec::new();
+    let summary = sweep(plan, 0..plan.unit_count(), gpu, &options, |chunk| {
+        Partial::from_chunk(plan, &chunk)?;
+        verdicts.extend(chunk.verdicts);
+        Ok(())
+    });
+    (verdicts, summary.unwrap())
+}
+
+fn expected(plan: &LanePlan) -> Vec<Verdicts> {
+    CpuBackend::lane_arithmetic().prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap().verdicts
+}
+
+#[test]
+fn a_healthy_device_computes_every_lane_itself_and_a_sample_is_checked() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let plan = plan();
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan));
+    assert_eq!((summary.lanes, summary.redone_lanes), (plan.lane_count(), 0));
+    assert_eq!(summary.rechecked_lanes, plan.lane_count() / 100);
+    assert!(summary.device_s.unwrap() > 0.0);
+}
+
+#[test]
+fn a_device_that_is_lost_at_any_job_leaves_complete_numbers() {
+    let plan = plan();
+    let expected = expected(&plan);
+    for at_job in [0, 3] {
+        let fault = Some(Fault { at_job, kind: FaultKind::Lost });
+        let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+        let (verdicts, summary) = swept(&plan, &gpu);
+        assert!(verdicts == expected, "lost at job {at_job}");
+        assert!(summary.redone_lanes > 0 && summary.lanes == plan.lane_count(), "{summary:?}");
+        // It stays lost, and says so.
+        assert!(matches!(gpu.prepare(&plan).err(), Some(Error::Device { .. })));
+    }
+}
+
+#[test]
+fn a_device_without_memory_leaves_complete_numbers() {
+    let plan = plan();
+    let fault = Some(Fault { at_job: 1, kind: FaultKind::OutOfMemory });
+    let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0, "{summary:?}");
+}
+
+#[test]
+fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
+    let plan = plan();
+    let timeout = Duration::from_millis(1);
+    let Some(gpu) = open(GpuOptions { timeout, first_lanes: 1 << 20, ..Default::default() }) else { return };
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0, "{summary:?}");
+}
+
+#[test]
+fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
+    let plan = plan();
+    let shader_patch = Some(("index < frame_step_cap; index++".to_owned(), "index < 100u; index++".to_owned()));
+    let options = GpuOptions { shader_patch, ..Default::default() };
+    let Some(gpu) = open(options.clone()) else { return };
+    for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
+        let Some(gpu) = open(options.clone()) else { return };
+        let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), wanted).unwrap_err();
+        assert!(error.to_string().contains("lanes of") && error.to_string().contains("to their end"), "{error}");
+    }
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan) && summary.redone_lanes > 0);
+}
+
+#[test]
+fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
+    // llvmpipe ends every loop after 65,535 turns: at a millisecond a lane may have 120,000 steps.
+    let profile = Profile::load("jrc-2021").unwrap();
+    let mut long = profile.with_dt(0.001).unwrap();
+    long.frame.time_cap_s = 120.0;
+    let options = RandomOptions { lanes_per_model_and_category: 40, ..Default::default() };
+    let plan = random_plan(&long, &options).unwrap();
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let (verdicts, summary) = swept(&plan, &gpu);
+    assert!(verdicts == expected(&plan));
+    assert!(!gpu.card().name.starts_with("llvmpipe") || summary.redone_lanes > 0, "{summary:?}");
+}
+
+#[test]
+fn without_a_stand_in_the_failure_is_the_users_to_know() {
+    let plan = plan();
+    let fault = Some(Fault { at_job: 0, kind: FaultKind::Lost });
+    let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+    let error =
+        sweep(&plan, 0..plan.unit_count(), &gpu, &SweepOptions::plain(Wanted::Verdicts), |_| Ok(())).unwrap_err();
+    assert!(matches!(&error, Error::Device { .. }), "{error}");
+    assert!(error.help().unwrap().contains("--backend cpu"));
+}
+
+#[test]
+fn a_wrong_lane_stops_the_run_and_is_named() {
+    let plan = plan();
+    // One model's verdict bit, always.
+    let shader_patch =
+        Some(("select(0u, 2u, record.ttc.failed)".to_owned(), "select(2u, 0u, record.ttc.failed)".to_owned()));
+    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    let cpu = CpuBackend::lane_arithmetic();
+    let recheck = Recheck::new(&plan, 1, 1000);
+    for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
+        let options = SweepOptions { wanted, fallback: Some(&cpu), recheck: Some(&recheck) };
+        let error = sweep(&plan, 0..plan.unit_count(), &gpu, &options, |_| Ok(())).unwrap_err();
+        assert!(matches!(&error, Error::Verification(_)), "{error}");
+        assert!(error.to_string().contains("lane random-"), "{error}");
+    }
+}

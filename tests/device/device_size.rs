@@ -1,0 +1,113 @@
+//! Sizes at which kernels break: more than 65,535 workgroups in one dispatch, more than 2²⁷ lanes in one run.
+//! Every lane ends at its first step, and its verdict is known without computing it.
+
+use crate::common::device::software_device;
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::scenario::{Case, Category, Lateral, Participant, Speed, Tables};
+
+/// Cases whose vehicle stands in the ego's lane or far beside it.
+struct Beside {
+    inside: LaneCase<f64>,
+    outside: LaneCase<f64>,
+    tables: Tables<f64>,
+}
+
+/// Pseudo-random, and not in step with any power of two.
+fn is_inside(unit: u64, variant: usize) -> bool {
+    (unit * 2_654_435_761 + variant as u64 * 40_503) % 97 < 41
+}
+
+/// Likewise: does this headway start in contact?
+fn touches(headway: usize) -> bool {
+    headway * 31 % 13 < 5
+}
+
+impl CaseSource for Beside {
+    fn case(&self, _: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        if is_inside(unit, variant) { self.inside } else { self.outside }
+    }
+    fn tables(&self) -> &Tables<f64> {
+        &self.tables
+    }
+}
+
+fn plan(units: usize, variants: usize, headways: usize) -> LanePlan {
+    let profile = Profile::load("paper").unwrap();
+    let mut tables = Tables::default();
+    let mut case = |y: f64| {
+        let lateral = Lateral::Kinematic { start_m: y, rate_mps: 0.0, end_m: y };
+        let principal = Participant { length_m: 4.0, width_m: 2.0, speed: Speed::constant(20.0), lateral };
+        let (ego_length_m, ego_width_m) = (4.0, 2.0);
+        let category = Category::Lvd;
+        let case =
+            Case { category, ego_length_m, ego_width_m, ego_speed_mps: 20.0, principal, ahead: None, horizon_s: 0.0 };
+        LaneCase::encode(&case, &profile, &mut tables)
+    };
+    let (inside, outside) = (case(0.0), case(9.0));
+    let source = Beside { inside, outside, tables };
+    let blocks = vec![Block {
+        category: Category::Lvd,
+        units: (0..units).map(|u| u.to_string()).collect(),
+        variants: (0..variants).map(|v| if v == 0 { "S".to_owned() } else { v.to_string() }).collect(),
+        first_unit: 0,
+        first_lane: 0,
+    }];
+    let headways = (0..headways).map(|h| Headway::GapM(if touches(h) { -1.0 } else { 5.0 })).collect();
+    LanePlan::new(profile, ModelId::ALL.to_vec(), headways, blocks, Box::new(source)).unwrap()
+}
+
+fn expected(plan: &LanePlan, lane: u64) -> Verdicts {
+    let key = plan.key(lane).unwrap();
+    let collides = is_inside(key.unit, key.variant) && touches(key.headway);
+    // A contact fails BTN too; nobody closes in, so TTC never fails.
+    Verdicts(if collides { 1 << Criterion::Collision.index() | 1 << Criterion::Btn.index() } else { 0 })
+}
+
+/// Sweeps for verdicts and for counts, and compares every lane.
+fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
+    let Some((adapters, index)) = software_device() else { return };
+    let gpu = GpuBackend::open(&adapters, index, GpuOptions { first_lanes, ..Default::default() }).unwrap();
+    let mut lane = 0;
+    let mut collisions = 0;
+    let options = SweepOptions::plain(Wanted::Verdicts);
+    let all = 0..plan.unit_count();
+    let summary = sweep(plan, all.clone(), &gpu, &options, |chunk| {
+        assert_eq!(chunk.first_lane, lane);
+        for verdicts in chunk.verdicts {
+            assert_eq!(verdicts, expected(plan, lane), "lane {lane}");
+            collisions += u64::from(verdicts.failed(Criterion::Collision));
+            lane += 1;
+        }
+        Ok(())
+    });
+    assert_eq!((lane, summary.unwrap().lanes), (plan.lane_count(), plan.lane_count()));
+    let (mut lanes, mut counted) = (0, 0);
+    sweep(plan, all, &gpu, &SweepOptions::plain(Wanted::Counts), |chunk| {
+        lanes += chunk.counts.iter().map(|c| c.lanes).sum::<u64>();
+        counted += chunk.counts.iter().map(|c| c.failed[Criterion::Collision.index()]).sum::<u64>();
+        Ok(())
+    })
+    .unwrap();
+    assert_eq!((lanes, counted), (plan.lane_count(), collisions));
+}
+
+#[test]
+fn one_dispatch_reaches_beyond_65535_workgroups() {
+    // 4.8 million lanes of each model: 75,000 workgroups of 64 in one job.
+    let plan = plan(600, 8, 1000);
+    assert!(plan.lane_count() / 4 / 64 > 65_535);
+    assert_every_lane(&plan, 1 << 23);
+}
+
+/// `cargo test --release --test device device_size:: -- --ignored`
+#[test]
+#[ignore = "135 million lanes take about a minute on a software device"]
+fn one_run_reaches_beyond_two_to_the_27_lanes() {
+    let plan = plan(4_200, 8, 1000);
+    assert!(plan.lane_count() > 1 << 27);
+    assert_every_lane(&plan, 1 << 14);
+}

@@ -1,0 +1,101 @@
+//! `lanesweep devices` on a machine with a software device, and on one with none.
+
+use crate::common::device::software_device;
+use assert_cmd::Command;
+use lanesweep::engine::gpu::{BackendChoice, choose, visible_here};
+
+/// The verb without what a cluster may have set, in a home of its own.
+fn devices(home: &tempfile::TempDir) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    command.arg("devices").env("NO_COLOR", "1").env("XDG_RUNTIME_DIR", home.path());
+    for variable in ["CUDA_VISIBLE_DEVICES", "SLURM_STEP_GPUS", "SLURM_JOB_GPUS"] {
+        command.env_remove(variable);
+    }
+    command
+}
+
+/// The same on a machine where no driver of Vulkan or OpenGL answers.
+fn without_drivers(home: &tempfile::TempDir) -> Command {
+    let mut command = devices(home);
+    let empty = home.path().join("empty.json");
+    std::fs::write(&empty, "").unwrap();
+    command.env("VK_DRIVER_FILES", &empty).env("VK_ICD_FILENAMES", home.path().join("missing.json"));
+    command.env("__EGL_VENDOR_LIBRARY_FILENAMES", home.path().join("missing.json"));
+    command
+}
+
+fn stdout(mut command: Command) -> String {
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_any_driver_is_told_what_to_install() {
+    let home = tempfile::tempdir().unwrap();
+    let text = stdout(without_drivers(&home));
+    for part in ["No compute device", "libvulkan1 mesa-vulkan-drivers", "--backend auto takes the processor"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let mut json = without_drivers(&home);
+    json.args(["--format", "json"]);
+    let seen: serde_json::Value = serde_json::from_str(&stdout(json)).unwrap();
+    assert_eq!((&seen["devices"], &seen["auto"]), (&serde_json::json!([]), &serde_json::Value::Null));
+}
+
+#[test]
+fn the_software_device_is_listed_but_taken_only_by_name() {
+    let Some((adapters, index)) = software_device() else { return };
+    let name = &adapters.cards()[index].name;
+    let home = tempfile::tempdir().unwrap();
+    let text = stdout(devices(&home));
+    assert!(text.contains(name.split(' ').next().unwrap()) && text.contains("software"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let named = choose(adapters.cards(), BackendChoice::Gpu, Some(&name.parse().unwrap()), Some(&[]));
+    assert_eq!(named.unwrap(), Some(index), "an environment that hides every GPU leaves it");
+    let auto = choose(adapters.cards(), BackendChoice::Auto, None, None).unwrap();
+    assert!(auto.is_none_or(|auto| adapters.cards()[auto].is_real()));
+    assert_eq!(adapters.take(index).unwrap().get_info().name.trim(), name);
+}
+
+#[test]
+fn json_is_all_that_is_on_stdout_and_agrees_with_the_library() {
+    let Some((adapters, _)) = software_device() else { return };
+    let home = tempfile::tempdir().unwrap();
+    let mut json = devices(&home);
+    json.args(["--format", "json"]);
+    let seen: serde_json::Value = serde_json::from_str(&stdout(json)).unwrap();
+    let listed = seen["devices"].as_array().unwrap();
+    assert_eq!(listed.len(), adapters.cards().len());
+    for (device, card) in listed.iter().zip(adapters.cards()) {
+        assert_eq!((&device["index"], &device["name"]), (&card.index.into(), &card.name.clone().into()));
+        assert_eq!(device["exact_path"], card.exact_path);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_variable_of_nvidia_is_judged_only_where_its_driver_is() {
+    let home = tempfile::tempdir().unwrap();
+    let mut command = devices(&home);
+    let output = command.env("CUDA_VISIBLE_DEVICES", "no such entry").output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let nvidia = std::fs::read_dir("/proc/driver/nvidia/gpus").is_ok_and(|gpus| gpus.count() > 0);
+    assert_eq!(output.status.code(), Some(if nvidia { 2 } else { 0 }), "{text}");
+    assert!(text.contains("--backend auto takes"), "the devices are listed either way: {text}");
+    if !nvidia {
+        assert_eq!(visible_here().unwrap(), None);
+    }
+}
+
+#[test]
+fn a_driver_that_misses_its_runtime_folder_does_not_look_like_a_failure_of_ours() {
+    let home = tempfile::tempdir().unwrap();
+    let mut command = devices(&home);
+    command.arg("--no-self-check").env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY").env_remove("NODEVICE_SELECT");
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.is_empty(), "{said}");
+}

@@ -1,0 +1,88 @@
+//! Shards that ran on different backends, in any order, join to the run in one piece, byte for byte. Seven shards by
+//! default; the long form is `cargo test --release --test device mixed_shards:: -- --ignored` (1, 7 and 100 of each run).
+
+use crate::common;
+
+use std::path::Path;
+
+use crate::common::device::software_device;
+use assert_cmd::Command;
+
+fn done(dir: &Path, args: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    let output = command.current_dir(dir).arg("-q").args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The results in a folder; of the records only that they are there (they hold times and devices), of the page all but that.
+fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let paths = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<(String, Vec<u8>)> = paths
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap()))
+        .filter(|(name, _)| !name.ends_with("plan.json") && !name.starts_with("part-"))
+        .collect();
+    for (name, content) in &mut files {
+        if ["run.json", "estimate.json"].contains(&name.as_str()) {
+            content.clear();
+        }
+        if name == "report.html" {
+            let page = String::from_utf8(std::mem::take(content)).unwrap();
+            *content = common::page::without_host(&page).into_bytes();
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Every run that can be split, in one piece and in so many shards, of which every other one is the device's.
+fn whole_and_shards(counts: &[u64]) {
+    let Some((_, device)) = software_device() else { return };
+    let device = device.to_string();
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let fit = ["fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
+    let density = "densities/cut-in-2.json";
+    let sample = ["sample", density, "--samples", "9000", "--thw", "0.4", "--models", "FSM,RSS"];
+    let pilot = ["--estimator", "is", "--pilot", "2000", "--backend", "cpu", "--out", "pilot"];
+    done(dir, &[&sample[..], &pilot].concat());
+    let weighted = [&sample[..], &["--estimator", "is", "--proposal", "pilot/proposal-FSM.json"]].concat();
+    let study = ["study", "--synth-recordings", "2", "--synth-duration", "240"];
+    for (name, run) in [("study", &study[..]), ("crude", &sample[..]), ("weighted", &weighted)] {
+        let whole = done(dir, &[run, &["--backend", "cpu", "--out", name]].concat());
+        for &count in counts {
+            let out = format!("{name}-{count}");
+            done(dir, &[run, &["--backend", "cpu", "--plan-only", "--out", &out]].concat());
+            let plan = format!("{out}/plan.json");
+            // 37 has no factor in common with the counts: every shard comes once, in no natural order.
+            for shard in (0..count).map(|k| (k * 37 + 3) % count) {
+                let part = format!("{shard}/{count}");
+                let backend: &[&str] = if (shard + count).is_multiple_of(2) {
+                    &["--backend", "gpu", "--device", &device]
+                } else {
+                    &["--backend", "cpu"]
+                };
+                done(dir, &[&[run[0], "--plan", &plan, "--shard", &part, "--out", &out], backend].concat());
+            }
+            assert_eq!(done(dir, &["merge", &out]), whole, "{out}");
+            let (merged, expected) = (results(&dir.join(&out)), results(&dir.join(name)));
+            let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+            assert_eq!(names(&merged), names(&expected), "{out}");
+            for ((file, one), (_, other)) in merged.iter().zip(&expected) {
+                assert!(one == other, "{out}/{file} differs");
+            }
+        }
+    }
+}
+
+#[test]
+fn seven_shards_on_two_backends_are_the_run_in_one_piece() {
+    whole_and_shards(&[7]);
+}
+
+#[test]
+#[ignore = "minutes; run it with --ignored"]
+fn one_seven_and_a_hundred_shards_on_two_backends_are_the_run_in_one_piece() {
+    whole_and_shards(&[1, 7, 100]);
+}

@@ -1,0 +1,472 @@
+//! The shaders say what the host says: same records, same constants, same parallel trees, and nothing that devices
+//! differ on. The shaders are read with naga, so that no device is needed.
+
+use std::collections::BTreeSet;
+use std::mem::offset_of;
+use std::path::{Path, PathBuf};
+
+use crate::wgsl::{
+    Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments,
+};
+use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
+use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
+use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
+use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
+use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
+use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
+use lanesweep::model::profile::Profile;
+use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
+use lanesweep::stats::random::SOBOL_ROW;
+
+/// What [`every_record_has_the_layout_of_its_rust_twin`] looks at: name in WGSL, size of the Rust type, its fields.
+type Record = (&'static str, usize, Vec<Shape>);
+
+/// The fields of a `repr(C)` type. Each is given with its type, checked by the compiler, and the closing pattern
+/// makes a field that is left out an error of compilation.
+macro_rules! record {
+    ($name:literal, $path:ident $(<$real:ty>)?, { $($field:ident: $kind:ty),+ $(,)? }) => {{
+        type Twin = $path $(<$real>)?;
+        $(let _: fn(&Twin) -> &$kind = |record| &record.$field;)+
+        let _: fn(Twin) = |record| { let $path { $($field: _),+ } = record; };
+        let shapes = vec![$(Shape {
+            name: stringify!($field).to_owned(),
+            offset: offset_of!(Twin, $field),
+            size: size_of::<$kind>(),
+            kind: stringify!($kind).replace(' ', "").replace("<f32>", "").replace("MODELS", &MODELS.to_string()),
+        }),+];
+        ($name, size_of::<Twin>(), shapes)
+    }};
+}
+
+fn records() -> Vec<Record> {
+    vec![
+        record!("Motion", Motion<f32>, {
+            kind: u32, speed_offset: u32, speed_len: u32, lateral_offset: u32, lateral_len: u32, speed_until: u32,
+            lateral_until: u32, speed_initial: f32, speed_per_step: f32, speed_end: f32, lateral_initial: f32,
+            lateral_per_step: f32, lateral_end: f32, lateral_towards: f32, reserved: [u32; 2],
+        }),
+        record!("LaneOther", LaneOther<f32>, {
+            motion: Motion<f32>, half_lengths: f32, half_widths: f32, gap_offset: f32, present_from: u32,
+            present_until: u32, attend_from: [u32; MODELS], used: u32, judged: u32,
+        }),
+        record!("LaneCase", LaneCase<f32>, {
+            others: [LaneOther<f32>; 2], ego_speed: f32, ego_width: f32, horizon: u32, pair: u32,
+        }),
+        record!("Start", StartRecord, { is_gap: u32, value: f32 }),
+        record!("Launch", Launch, {
+            lanes: u32, headways: u32, variants: u32, first_case: u32, first_word: u32, first_outcome: u32,
+            first_cell_word: u32, done_word: u32, wanted: u32,
+        }),
+        record!("OutcomeRecord", OutcomeRecord, {
+            word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
+            min_ttc_bits: u32, btn_numerator: f32, btn_denominator: f32, min_gap_bits: u32,
+        }),
+    ]
+}
+
+/// The records of the generator's pipeline beside those of lanes.
+fn generator_records() -> Vec<Record> {
+    vec![
+        record!("AttentionRule", AttentionRule<f32>, {
+            kind: u32, delay_steps: u32, with_ahead: u32, threshold: f32, travel: f32,
+        }),
+        record!("ReducedColumns", ReducedColumns, {
+            width: u32, instants: u32, coefficients: u32, lateral: u32, speed: u32, lead_speed: u32, ego_speed: u32,
+            lead_gap: u32, duration: u32,
+        }),
+        record!("Recipe", Recipe, {
+            path: u32, lateral: u32, dimensions: u32, pair: u32, decelerates: u32, unlimited: u32, judged: u32,
+            step_cap: u32, slots: [u32; 11], columns: ReducedColumns, lower: [f32; 14], upper: [f32; 14],
+            min_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
+            half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32,
+            attention: [AttentionRule<f32>; MODELS],
+        }),
+        record!("Generation", Generation, {
+            index_low: u32, index_high: u32, count: u32, source: u32, seed_low: u32, seed_high: u32, purpose: u32,
+            components: u32, weighted: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
+            speed_stride: u32, lateral_stride: u32,
+        }),
+    ]
+}
+
+/// Every built-in profile with every category: all the constants that a pipeline may get.
+fn resolved() -> Vec<(String, Constants<f32>)> {
+    let of = |name: &'static str, category| {
+        let profile = Profile::load(name).unwrap();
+        (format!("{name}, {category:?}"), Constants::resolve(&profile, category))
+    };
+    Profile::names().flat_map(|name| Category::ALL.map(|category| of(name, category))).collect()
+}
+
+#[test]
+fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
+    let mut compiled = 0;
+    for model in ModelId::ALL {
+        let source = shader::assemble(model);
+        // Validates with all flags and without any capability.
+        parse(&source);
+        for (place, constants) in resolved() {
+            for paired in [false, true] {
+                let constants = shader::constants(&constants, model, paired);
+                let sizes = [Checks::Checked, Checks::Unchecked].map(|checks| {
+                    let words = exact_spirv(&source, shader::ENTRY, &constants, checks);
+                    words.unwrap_or_else(|e| panic!("{model:?}, {place}, paired {paired}, {checks:?}: {e}")).len()
+                });
+                assert!(sizes[0] > sizes[1], "{model:?}, {place}: the checks add nothing");
+                compiled += 2;
+            }
+        }
+    }
+    assert_eq!(compiled, MODELS * Profile::names().count() * Category::ALL.len() * 4);
+}
+
+#[test]
+fn every_record_has_the_layout_of_its_rust_twin() {
+    for model in ModelId::ALL {
+        let (module, _) = parse(&shader::assemble(model));
+        for (name, size, ours) in records() {
+            let (stride, theirs) = fields(&module, name);
+            assert_eq!(stride, size, "{name}: size");
+            for (our, their) in ours.iter().zip(&theirs) {
+                assert_eq!(our, their, "{name}");
+            }
+            assert_eq!(ours.len(), theirs.len(), "{name}: number of fields");
+        }
+    }
+}
+
+#[test]
+fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twins() {
+    let (module, info) = parse(&shader::assemble_generator());
+    for (name, size, ours) in records().into_iter().take(3).chain(generator_records()) {
+        let (stride, theirs) = fields(&module, name);
+        assert_eq!((stride, ours), (size, theirs), "{name}");
+    }
+    for (name, value) in [
+        ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
+        ("ATTEMPTS", ATTEMPTS),
+        ("NO_SLOT", NO_SLOT),
+        ("TARGET_SPEED", Quantity::TargetSpeed as u32),
+        ("LATERAL_SPEED", Quantity::LateralSpeed as u32),
+        ("EGO_SPEED", Quantity::EgoSpeed as u32),
+        ("TARGET_ACCELERATION", Quantity::TargetAcceleration as u32),
+        ("LEAD_SPEED", Quantity::LeadSpeed as u32),
+        ("LEAD_ACCELERATION", Quantity::LeadAcceleration as u32),
+        ("LEAD_GAP", Quantity::LeadGap as u32),
+        ("DURATION", Quantity::Duration as u32),
+        ("FINAL_SPEED", Quantity::FinalSpeed as u32),
+        ("MEAN_DECELERATION", Quantity::MeanDeceleration as u32),
+        ("TIME_HEADWAY", Quantity::TimeHeadway as u32),
+        ("QUANTITIES", Quantity::TimeHeadway as u32 + 1),
+        ("PATH_SINUSOID", generated::Path::Sinusoid as u32),
+        ("PATH_REDUCED", generated::Path::Reduced as u32),
+        ("LATERAL_ENTERING", generated::Lateral::Entering as u32),
+        ("LATERAL_LEAVING", generated::Lateral::Leaving as u32),
+        ("LATERAL_GONE", generated::Lateral::Gone as u32),
+        ("NEVER", NEVER),
+    ] {
+        assert_eq!(constant(&module, name), value, "{name}");
+    }
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
+    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &[], Checks::Checked);
+    assert!(words.is_ok_and(|w| !w.is_empty()));
+}
+
+#[test]
+fn every_table_has_the_stride_of_its_rust_twin() {
+    let (module, _) = parse(&shader::assemble(ModelId::Fsm));
+    let stride = |name: &str| {
+        let (_, variable) = module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some(name)).unwrap();
+        match module.types[variable.ty].inner {
+            naga::TypeInner::Array { stride, size: naga::ArraySize::Dynamic, .. } => stride as usize,
+            ref other => panic!("{name}: {other:?}"),
+        }
+    };
+    assert_eq!(stride("cases"), size_of::<LaneCase<f32>>());
+    assert_eq!(stride("starts"), size_of::<StartRecord>());
+    assert_eq!(stride("speed_table"), size_of::<f32>());
+    assert_eq!(stride("lateral_table"), size_of::<[f32; 2]>());
+    assert_eq!(stride("verdicts"), size_of::<u32>());
+    assert_eq!(stride("outcomes"), size_of::<OutcomeRecord>());
+    assert_eq!(stride("counts"), size_of::<u32>());
+}
+
+#[test]
+fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
+    for model in ModelId::ALL {
+        let (module, _) = parse(&shader::assemble(model));
+        let asked: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
+        for (place, constants) in resolved() {
+            for paired in [false, true] {
+                let given = shader::constants(&constants, model, paired);
+                let names: BTreeSet<&str> = given.iter().map(|(name, _)| *name).collect();
+                assert_eq!(names.len(), given.len(), "{model:?}: a constant is given twice");
+                assert_eq!(names, asked, "{model:?}, {place}");
+                for (_, wanted) in module.overrides.iter() {
+                    let name = wanted.name.as_deref().unwrap();
+                    // A default would hide a constant that the host forgets.
+                    assert!(wanted.init.is_none(), "{name} has a default");
+                    let value = given.iter().find(|(known, _)| *known == name).unwrap().1;
+                    let naga::TypeInner::Scalar(scalar) = module.types[wanted.ty].inner else { panic!("{name}") };
+                    let fits = match scalar.kind {
+                        naga::ScalarKind::Bool => value == 0.0 || value == 1.0,
+                        naga::ScalarKind::Uint => value == f64::from(value as u32),
+                        // The host rounds once: what reaches the device is a binary32 already.
+                        naga::ScalarKind::Float => value.is_finite() && value == f64::from(value as f32),
+                        other => panic!("{name}: {other:?}"),
+                    };
+                    assert!(fits, "{model:?}, {place}: {name} = {value} is no {:?}", scalar.kind);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_entry_is_the_one_that_the_host_asks_for() {
+    for model in ModelId::ALL {
+        let (module, _) = parse(&shader::assemble(model));
+        let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
+        assert_eq!(entry.name, shader::ENTRY);
+        assert_eq!(entry.stage, naga::ShaderStage::Compute);
+        assert_eq!(entry.workgroup_size, [shader::WORKGROUP, 1, 1]);
+        assert_eq!(constant(&module, "WORKGROUP"), shader::WORKGROUP);
+        assert_eq!(constant(&module, "MODELS"), MODELS as u32);
+    }
+}
+
+#[test]
+fn constants_that_stand_on_both_sides_agree() {
+    let (module, _) = parse(&shader::assemble(ModelId::Fsm));
+    let expected = [
+        ("SPEED_SAMPLED", SPEED_SAMPLED),
+        ("LATERAL_SAMPLED", LATERAL_SAMPLED),
+        ("NO_STEP", NO_STEP),
+        ("WANTED_VERDICTS", Wanted::Verdicts as u32),
+        ("WANTED_OUTCOMES", Wanted::Outcomes as u32),
+        ("WANTED_COUNTS", Wanted::Counts as u32),
+        ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
+        ("GATE_OVERLAP", LateralGate::Overlap as u32),
+        ("BTN_EQUIVALENT_DELAY", BtnForm::EquivalentDelay as u32),
+        ("BTN_EXACT", BtnForm::Exact as u32),
+        ("BTN_DISTANCE_RATIO", BtnForm::DistanceRatio as u32),
+        ("CONTACT_NONE", Contact::None.code()),
+        ("CONTACT_BY_SIDE", Contact::BySide.code()),
+        ("CONTACT_FRONTAL", Contact::Frontal.code()),
+        ("END_CONTACT", EndReason::Contact as u32),
+        ("END_SETTLED", EndReason::Settled as u32),
+        ("END_STANDSTILL", EndReason::Standstill as u32),
+        ("END_CAP", EndReason::Cap as u32),
+        ("END_ABORTED", EndReason::Aborted as u32),
+        ("INFINITY_BITS", f32::INFINITY.to_bits()),
+        ("UNBOUNDED", f32::MAX.to_bits()),
+        // Four verdict bits a lane; the host's own constants are not public, so their text is read.
+        ("LANES_PER_WORD", u32::BITS / 4),
+        ("CELL_WORDS", number_after(include_str!("../../src/engine/gpu/records.rs"), "const CELL_WORDS: usize = ")),
+    ];
+    for (name, host) in expected {
+        assert_eq!(constant(&module, name), host, "{name}");
+    }
+    // A lane that is not over never writes its end: no reason may have its code.
+    assert!(expected.iter().all(|(name, code)| !name.starts_with("END_") || *code != constant(&module, "END_NOT_YET")));
+    // No constant without a twin is added unseen.
+    let known: BTreeSet<&str> = expected.iter().map(|(name, _)| *name).collect();
+    let alone = ["WORKGROUP", "MODELS", "END_NOT_YET"];
+    for (_, other) in module.constants.iter() {
+        let name = other.name.as_deref().unwrap();
+        assert!(known.contains(name) || alone.contains(&name), "{name} is compared with nothing");
+    }
+}
+
+fn number_after(text: &str, what: &str) -> u32 {
+    let rest = text.split_once(what).unwrap_or_else(|| panic!("no `{what}`")).1;
+    rest.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap()
+}
+
+#[test]
+fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
+    let (module, _) = parse(&shader::assemble(ModelId::Fsm));
+    let criteria: Criteria<f32> = Profile::load("paper").unwrap().criteria.resolve();
+    let read = |word: u32| {
+        let unbounded = f32::INFINITY.to_bits();
+        let record = OutcomeRecord {
+            word,
+            reaction_step: NO_STEP,
+            end_step: 7,
+            impact_speed: 0.0,
+            impact_closing_speed: 0.0,
+            min_ttc_bits: unbounded,
+            btn_numerator: 0.0,
+            btn_denominator: 1.0,
+            min_gap_bits: unbounded,
+        };
+        record.outcome(&criteria)
+    };
+    let settled = constant(&module, "END_SETTLED") << 8;
+    let frontal = constant(&module, "CONTACT_FRONTAL") << 4;
+    for (name, contact) in
+        [("CONTACT_NONE", Contact::None), ("CONTACT_BY_SIDE", Contact::BySide), ("CONTACT_FRONTAL", Contact::Frontal)]
+    {
+        assert_eq!(read(constant(&module, name) << 4 | settled).unwrap().contact, contact);
+    }
+    for (name, end) in [
+        ("END_CONTACT", EndReason::Contact),
+        ("END_SETTLED", EndReason::Settled),
+        ("END_STANDSTILL", EndReason::Standstill),
+        ("END_CAP", EndReason::Cap),
+        ("END_ABORTED", EndReason::Aborted),
+    ] {
+        assert_eq!(read(constant(&module, name) << 8 | frontal).unwrap().end, end);
+    }
+    assert_eq!(read(constant(&module, "END_NOT_YET") << 8), None);
+    assert_eq!(read(3 << 4 | settled), None);
+    // What no lane wrote: an end by contact, without one.
+    assert_eq!(read(0), None);
+    // The bits that `outcome` in shared/frame.wgsl sets, in its order.
+    let bits = [Criterion::Collision, Criterion::Ttc, Criterion::Btn].map(|c| 1 << c.index());
+    assert_eq!([bits[0], bits[1], bits[2], Verdicts::CAPPED], [1, 2, 4, 8]);
+    for bit in 0..4 {
+        assert_eq!(read(1 << bit | settled).unwrap().verdicts, Verdicts(1 << bit));
+    }
+    assert_eq!(read(1 << 6 | settled).unwrap().contact_with, 1);
+}
+
+fn in_crate(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+#[test]
+fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order() {
+    // What only the host does, or batches of lanes alone; and `shader_constants` is what joins the two.
+    let no_twin = [
+        "default",
+        "resolve",
+        "bounds",
+        "time_step_bounds",
+        "attention",
+        "abort_above_ttc_s",
+        "safe_gap",
+        "ignores",
+        "steady_gap",
+        "check_steady",
+        "shader_constants",
+    ];
+    for model in ModelId::ALL {
+        let (file, shader) = driver_shader(model);
+        let twin = in_crate("src/model/driver").join(file).with_extension("rs");
+        let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+        let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
+        names.retain(|name| !no_twin.contains(&name.as_str()));
+        assert_eq!(names, function_names(shader), "{file} and its twin");
+        assert!(["initial", "check", "react"].iter().all(|&asked| names.iter().any(|name| name == asked)), "{file}");
+    }
+}
+
+#[test]
+fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_order() {
+    // What makes the tables, which only the host does; and methods that only look up a row and call what has a twin.
+    let no_twin = ["normal_table", "inverse_normal_tail", "segment", "new", "table", "word", "directions"];
+    let no_twin = [&no_twin[..], &["count", "columns"]].concat();
+    // Methods have the name of their type with them in WGSL.
+    let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
+    for (file, shader) in RANDOM {
+        let name = Path::new(file).file_name().unwrap();
+        let twin = in_crate("src/stats/random").join(name).with_extension("rs");
+        let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
+        let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
+        names.retain(|name| !no_twin.contains(&name.as_str()));
+        for name in &mut names {
+            if let Some((_, in_wgsl)) = renamed.iter().find(|(in_rust, _)| in_rust == name) {
+                *name = (*in_wgsl).to_owned();
+            }
+        }
+        assert_eq!(names, function_names(shader), "{file} and its twin");
+    }
+}
+
+#[test]
+fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
+    let tables = "@group(0) @binding(0) var<storage, read> normal_table: array<vec4<f32>>;
+        @group(0) @binding(1) var<storage, read> sobol_table: array<u32>;
+        @group(0) @binding(2) var<storage, read> alias_table: array<vec2<u32>>;\n";
+    let source = RANDOM.iter().fold(tables.to_owned(), |source, (_, text)| source + text);
+    let (module, info) = parse(&source);
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
+    let (loops, unbounded) = unbounded_loops(&module);
+    // philox4x32_10, sobol_point, both of owen_scramble.
+    assert_eq!((loops, unbounded), (4, vec![]));
+    assert_eq!(constant(&module, "SOBOL_ROW") as usize, SOBOL_ROW);
+}
+
+#[test]
+fn every_shader_file_is_part_of_a_pipeline() {
+    let parts = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader));
+    let known: BTreeSet<String> = parts.map(|(name, _)| name.to_owned()).collect();
+    let mut found = BTreeSet::new();
+    for folder in ["", "shared/"] {
+        for entry in std::fs::read_dir(in_crate("shaders").join(folder)).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            found.extend(name.ends_with(".wgsl").then(|| format!("{folder}{name}")));
+        }
+    }
+    assert_eq!(found, known);
+}
+
+#[test]
+fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
+    for (name, text) in SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader)) {
+        assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
+        let code = without_comments(text);
+        if !["lane.wgsl", "generate.wgsl"].contains(&name) {
+            for word in ["@group", "@binding", "@compute", "var<"] {
+                assert!(!code.contains(word), "{name} has {word}");
+            }
+        }
+        for call in ["fma", "exp", "exp2", "log", "log2", "pow", "sin", "cos", "tan", "sqrt", "inverseSqrt"]
+            .into_iter()
+            .chain(["min", "max", "clamp", "mix", "fract", "modf", "dot", "length", "normalize"])
+        {
+            let is_called = code.match_indices(&format!("{call}(")).any(|(at, _)| {
+                let before = code[..at].chars().next_back();
+                !before.is_some_and(|c| c.is_ascii_alphanumeric() || c == '_')
+            });
+            assert!(!is_called, "{name} calls {call}");
+        }
+    }
+}
+
+#[test]
+fn floats_are_added_multiplied_negated_and_compared_and_divided_in_one_place() {
+    for model in ModelId::ALL {
+        let (module, info) = parse(&shader::assemble(model));
+        let found = float_operations(&module, &info);
+        // As naga understands the source: no remainder, no root, no built-in function but the magnitude.
+        assert_eq!(found.forbidden, Vec::<String>::new(), "{model:?}");
+        // The device's own quotient is only a guess, and only exact_div asks for it.
+        assert_eq!(found.divided_in, ["exact_div"], "{model:?}");
+    }
+}
+
+#[test]
+fn every_loop_counts_up_to_a_constant_or_an_override() {
+    for model in ModelId::ALL {
+        let (module, _) = parse(&shader::assemble(model));
+        let (loops, unbounded) = unbounded_loops(&module);
+        assert_eq!(unbounded, Vec::<String>::new(), "{model:?}");
+        // exact_div, btn_solve, run_lane, count_lane.
+        assert_eq!(loops, 4, "{model:?}");
+    }
+    for (body, counted) in [
+        ("for (var k = 0u; k < 9u; k++) { x = x + 1.0; }", true),
+        ("for (var k = 0u; k < n; k++) { x = x + 1.0; }", false),
+        ("for (var k = 0u; k < 9u; k++) { if x > 1.0 { k = 0u; } }", false),
+        ("loop { if x > 1.0 { break; } }", false),
+        ("for (var k = 0u; k < 9u; ) { x = x + 1.0; }", false),
+    ] {
+        let source = format!("fn f(n: u32) -> f32 {{ var x = 0.0; {body} return x; }}");
+        let (loops, unbounded) = unbounded_loops(&naga::front::wgsl::parse_str(&source).unwrap());
+        assert_eq!((loops, unbounded.is_empty()), (1, counted), "{body}");
+    }
+}

@@ -1,0 +1,177 @@
+//! Partial results are the same however a sweep is cut and in whatever order its parts come together.
+
+use crate::common::plans;
+
+use crate::common::plans::{chunk, mixed, plan};
+use lanesweep::Place;
+use lanesweep::engine::{LanePlan, Partial, Verdicts};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::scenario::Category;
+use proptest::prelude::*;
+
+fn study() -> LanePlan {
+    plan(&[(Category::CutIn, 4, &["1", "2"]), (Category::CutOut, 0, &["a"]), (Category::Lvd, 5, &["i"])])
+}
+
+/// Random verdicts, also capped ones; min TTC with many ties and infinities, in
+/// eighths: short decimals, of which no changed digit reads back as the same number.
+fn lane(seed: u64) -> impl Fn(u64) -> (Verdicts, f64) {
+    move |lane| {
+        let word = mixed(seed, lane);
+        let coarse = (word >> 8) % 50;
+        (Verdicts((word & 0xf) as u8), if coarse > 45 { f64::INFINITY } else { coarse as f64 / 8.0 })
+    }
+}
+
+fn whole(plan: &LanePlan, seed: u64) -> Partial {
+    Partial::from_chunk(plan, &chunk(plan, 0..plan.unit_count(), &lane(seed), true)).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_cut_and_any_order_gives_the_same_partial(
+        seed: u64,
+        cuts in prop::collection::vec(0u64..10, 0..6),
+        order: u64,
+    ) {
+        let plan = study();
+        let mut borders: Vec<u64> = cuts.into_iter().chain([0, plan.unit_count()]).filter(|c| *c <= 9).collect();
+        borders.sort_unstable();
+        let mut parts: Vec<Partial> = borders
+            .windows(2)
+            .map(|w| Partial::from_chunk(&plan, &chunk(&plan, w[0]..w[1], &lane(seed), true)).unwrap())
+            .collect();
+        // Merge any two, again and again: any order and any bracketing.
+        let mut step = 0;
+        while parts.len() > 1 {
+            let a = parts.swap_remove((mixed(order, step) % parts.len() as u64) as usize);
+            let at = (mixed(order, step + 1) % parts.len() as u64) as usize;
+            let b = parts.swap_remove(at);
+            parts.push(a.merge(b).unwrap());
+            step += 2;
+        }
+        let merged = parts.pop().unwrap();
+        let expected = whole(&plan, seed);
+        prop_assert_eq!(&merged, &expected);
+        prop_assert_eq!(merged.to_json().unwrap(), expected.to_json().unwrap());
+        prop_assert!(merged.is_complete(&plan));
+    }
+
+    #[test]
+    fn a_partial_survives_its_file(seed: u64) {
+        let partial = whole(&study(), seed);
+        let text = partial.to_json().unwrap();
+        prop_assert_eq!(Partial::from_json(&text, Place::item("test")).unwrap(), partial);
+    }
+
+    #[test]
+    fn a_changed_digit_is_noticed(seed: u64, at in 0usize..4000) {
+        let text = whole(&study(), seed).to_json().unwrap();
+        let digits: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect();
+        let at = digits[at % digits.len()];
+        let mut bytes = text.into_bytes();
+        bytes[at] = if bytes[at] == b'7' { b'3' } else { b'7' };
+        let error = Partial::from_json(std::str::from_utf8(&bytes).unwrap(), Place::item("test")).unwrap_err();
+        prop_assert!(error.help().is_some(), "{}", error);
+    }
+}
+
+#[test]
+fn counts_by_headway_that_do_not_add_up_are_those_of_no_study() {
+    let plan = study();
+    let honest = whole(&plan, 3);
+    assert!(honest.adds_up(&plan) && Partial::empty(&plan).adds_up(&plan));
+    let parts = [0..3, 3..9].map(|units| Partial::from_chunk(&plan, &chunk(&plan, units, &lane(3), false)).unwrap());
+    assert!(parts.iter().all(|part| part.adds_up(&plan)));
+    let mut changed = serde_json::to_value(&honest).unwrap();
+    let count = &mut changed["headway_failures"][5];
+    *count = (count.as_u64().unwrap() + 1).into();
+    assert!(!serde_json::from_value::<Partial>(changed.clone()).unwrap().adds_up(&plan));
+    changed["headway_failures"].as_array_mut().unwrap().pop();
+    assert!(!serde_json::from_value::<Partial>(changed).unwrap().adds_up(&plan));
+}
+
+#[test]
+fn the_worst_lanes_are_the_smallest_by_value_and_then_by_lane() {
+    let plan = study();
+    let lane = |lane: u64| (Verdicts(0), if lane.is_multiple_of(3) { 0.0 } else { 1.0 });
+    let partial = Partial::from_chunk_keeping(&plan, &chunk(&plan, 0..9, &lane, true), 4).unwrap();
+    assert_eq!(partial.worst().iter().map(|w| w.lane).collect::<Vec<_>>(), [0, 3, 6, 9]);
+    assert_eq!(partial.valued_lanes(), plan.lane_count());
+    let silent = Partial::from_chunk(&plan, &chunk(&plan, 0..9, &lane, false)).unwrap();
+    assert_eq!((silent.worst().len(), silent.valued_lanes()), (0, 0));
+}
+
+#[test]
+fn counts_are_over_the_headways_of_one_scenario() {
+    let plan = study();
+    // S of the model at index 0 fails collision at every headway; variant 1 at the first three of ten.
+    let lane = |lane: u64| {
+        let key = plan.key(lane).unwrap();
+        let fails = key.model == 0 && (key.variant == 0 || (key.variant == 1 && key.headway < 3));
+        (Verdicts(u8::from(fails)), 1.0)
+    };
+    let partial = Partial::from_chunk(&plan, &chunk(&plan, 0..9, &lane, false)).unwrap();
+    let unit = &partial.units()[2];
+    assert_eq!(unit.unit, 2);
+    let cell = |variant: usize| unit.cells[variant * plan.models.len() * Criterion::ALL.len()];
+    assert_eq!((cell(0).tp, cell(0).tn), (10, 0), "S against itself");
+    assert_eq!((cell(1).tp, cell(1).fn_, cell(1).fp, cell(1).tn), (3, 7, 0, 0));
+    assert_eq!((cell(2).tp, cell(2).fn_), (0, 10));
+    assert_eq!(unit.cells[1].tn, 10, "TTC never fails");
+    // Over the four cut-ins, headway by headway: S fails everywhere, variant 1 at the first three.
+    let by_headway = partial.headway_failures(&plan, 0).unwrap();
+    let width = plan.models.len() * Criterion::ALL.len();
+    let first: Vec<u64> = by_headway.iter().step_by(width).copied().collect();
+    assert_eq!(first[..10], [4; 10]);
+    assert_eq!(first[10..20], [4, 4, 4, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(by_headway.iter().sum::<u64>(), first.iter().sum::<u64>());
+}
+
+#[test]
+fn overlaps_and_strangers_are_refused() {
+    let plan = study();
+    let part = |plan: &LanePlan, units| Partial::from_chunk(plan, &chunk(plan, units, &lane(1), true)).unwrap();
+    let error = part(&plan, 0..5).merge(part(&plan, 4..6)).unwrap_err();
+    assert!(error.to_string().contains("unit 4"), "{error}");
+    let other = plans::plan(&[(Category::Lvd, 9, &["i"])]);
+    let error = part(&plan, 0..5).merge(part(&other, 5..6)).unwrap_err();
+    assert!(error.to_string().contains("belongs to plan"), "{error}");
+    let read = |text: &str| Partial::from_json(text, Place::item("part.json")).unwrap_err().to_string();
+    assert!(read("{\"a\": 1}").contains("no partial result"));
+    assert!(read("{\"format\": \"lanesweep partial\", \"ver").contains("no complete JSON"));
+    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 99}").contains("version is 99"));
+    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 3}").contains("damaged"));
+}
+
+#[test]
+fn parts_that_keep_different_numbers_of_worst_lanes_do_not_merge() {
+    let plan = study();
+    let few = Partial::from_chunk_keeping(&plan, &chunk(&plan, 0..2, &lane(1), true), 3).unwrap();
+    let error = Partial::empty(&plan).merge(few.clone()).unwrap_err().to_string();
+    assert!(error.contains("keeps 3 worst lanes, the other 20"), "{error}");
+    assert_eq!(Partial::empty_keeping(&plan, 3).merge(few.clone()).unwrap(), few);
+}
+
+#[test]
+fn a_chunk_that_does_not_fit_its_plan_is_an_error_and_no_panic() {
+    let plan = study();
+    let good = chunk(&plan, 2..6, &lane(1), true);
+    let mut short = good.clone();
+    short.verdicts.pop();
+    let mut few_values = good.clone();
+    few_values.outcomes.pop();
+    let mut shifted = good.clone();
+    shifted.first_lane += 1;
+    let mut beyond = good.clone();
+    beyond.units.end = 99;
+    let mut reversed = good.clone();
+    (reversed.units.start, reversed.units.end) = (6, 2);
+    for bad in [short, few_values, shifted, beyond, reversed] {
+        let error = Partial::from_chunk(&plan, &bad).unwrap_err();
+        assert!(matches!(error, lanesweep::Error::Internal(_)), "{error}");
+    }
+    assert!(Partial::from_chunk(&plan, &good).is_ok());
+}

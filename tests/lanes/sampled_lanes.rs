@@ -1,0 +1,314 @@
+//! Cases made where lanes run: they mean what the host's cases mean, and every backend makes the same bits of them.
+
+use crate::common;
+
+use std::sync::OnceLock;
+
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
+use lanesweep::engine::{
+    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, SweepOptions, Wanted, sweep,
+    words,
+};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{
+    SampleHeadways, SamplePlanOptions, SampleSource, generator_of, generator_of_points, plan_points, plan_samples,
+};
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::{Category, Scenario, Tables};
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Mixture};
+use lanesweep::stats::random::Stream;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+
+fn scenarios() -> &'static [Scenario] {
+    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
+    MINED.get_or_init(|| {
+        let generator = GeneratorOptions { recordings: 12, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+    })
+}
+
+fn density(id: ParameterizationId, with_thw: bool) -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
+}
+
+fn options(samples: u64, source: SampleSource) -> SamplePlanOptions {
+    let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
+    SamplePlanOptions { samples, seed: 2026, source, models: ModelId::ALL.to_vec(), headways }
+}
+
+fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 12]> {
+    let mut session = backend.prepare(plan).unwrap();
+    let mut all = Vec::new();
+    for ends in cuts.windows(2) {
+        let chunk = session.run(ends[0]..ends[1], Wanted::Outcomes).unwrap();
+        all.extend(chunk.outcomes.iter().map(words));
+    }
+    all
+}
+
+#[test]
+fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
+    for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
+        for id in ParameterizationId::ALL {
+            let density = density(id, false);
+            let points: Vec<Vec<f64>> = density.kde.points().to_vec();
+            let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();
+            let mut late = 0;
+            for (index, point) in points.iter().enumerate() {
+                // The point that lanes see is rounded; the host decodes the same.
+                let drawn = generator.draw(index as u64);
+                let seen: Vec<f64> = drawn.values[..point.len()].iter().map(|&v| f64::from(v)).collect();
+                let Ok(case) = density.space.case(&seen, &density.sizes, profile.frame.dt_s) else {
+                    assert!(drawn.is_void(), "{id:?} {index}: the host refuses the point");
+                    continue;
+                };
+                let (mut tables, mut made_tables) = (Tables::default(), Tables::<f32>::default());
+                let host = LaneCase::encode(&case, &profile, &mut tables);
+                let made = generator.case(index as u64, &mut made_tables);
+                assert!((host.ego_speed - f64::from(made.ego_speed)).abs() < 1e-4, "{id:?} {index}");
+                assert!(host.horizon.abs_diff(made.horizon) <= 1, "{id:?} {index}: horizon");
+                assert_eq!(host.pair, made.pair);
+                for (ours, theirs) in made.others.iter().zip(&host.others).take(1 + host.pair as usize) {
+                    assert!((theirs.half_lengths - f64::from(ours.half_lengths)).abs() < 1e-5);
+                    assert!((theirs.half_widths - f64::from(ours.half_widths)).abs() < 1e-5);
+                    assert!((theirs.gap_offset - f64::from(ours.gap_offset)).abs() < 1e-3);
+                    assert_eq!((theirs.judged, theirs.used), (ours.judged, ours.used));
+                    for step in 0..400 {
+                        let speeds = (theirs.motion.speed(&tables, step), ours.motion.speed(&made_tables, step));
+                        assert!((speeds.0 - f64::from(speeds.1)).abs() < 2e-3, "{id:?} {index} {step}: {speeds:?}");
+                        let (a, b) = (theirs.motion.lateral(&tables, step), ours.motion.lateral(&made_tables, step));
+                        assert!((a.position.abs() - f64::from(b.position).abs()).abs() < 2e-3, "{id:?} {index} {step}");
+                        // Where a motion ends, rounding may decide by one step.
+                        late += u32::from((a.towards - f64::from(b.towards)).abs() > 0.02);
+                    }
+                    for model in 0..MODELS {
+                        let (a, b) = (theirs.attend_from[model], ours.attend_from[model]);
+                        assert!(a.abs_diff(b) <= 1, "{id:?} {index}: attention at {a} and {b}");
+                    }
+                }
+            }
+            assert!(f64::from(late) < 0.01 * (points.len() * 400) as f64, "{id:?}: {late} lateral speeds differ");
+        }
+    }
+}
+
+#[test]
+fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
+    let id = ParameterizationId::find(Category::CutIn, "2").unwrap();
+    let density = density(id, false);
+    let profile = Profile::load("paper").unwrap();
+    let mixture = density.mixture().unwrap();
+    for source in [SampleSource::Random, SampleSource::Sobol] {
+        let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
+        let n = 1 << 16;
+        let d = mixture.dimensions();
+        let (mut sum, mut valid) = (vec![0.0; d], 0.0);
+        for index in 0..n {
+            let drawn = generator.draw(index);
+            if drawn.is_void() {
+                continue;
+            }
+            let point: Vec<f64> = drawn.values[..d].iter().map(|&v| f64::from(v)).collect();
+            assert!(density.space.is_valid(&point), "{point:?}");
+            valid += 1.0;
+            sum.iter_mut().zip(&point).for_each(|(s, v)| *s += v);
+        }
+        // The same by the mixture's own f64 draws.
+        let stream = Stream { seed: 1, purpose: 2 };
+        let draws: Vec<Vec<f64>> = (0..n).map(|index| mixture.draw(&stream, index, 0)).collect();
+        let kept: Vec<&Vec<f64>> = draws.iter().filter(|p| density.space.is_valid(p)).collect();
+        for j in 0..d {
+            let mean = kept.iter().map(|p| p[j]).sum::<f64>() / kept.len() as f64;
+            let spread = (kept.iter().map(|p| (p[j] - mean) * (p[j] - mean)).sum::<f64>() / kept.len() as f64).sqrt();
+            let error = (sum[j] / valid - mean) / (spread / (n as f64).sqrt());
+            assert!(error.abs() < 6.0, "{source:?}, parameter {j}: {error} standard errors off");
+        }
+        let share = kept.len() as f64 / n as f64;
+        if source == SampleSource::Sobol {
+            assert!((valid / n as f64 - share).abs() < 0.01, "invalid Sobol points are void");
+        } else {
+            assert_eq!(valid, n as f64, "an invalid draw is drawn again");
+        }
+    }
+}
+
+#[test]
+fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
+    let profile = Profile::load("paper").unwrap();
+    for id in ParameterizationId::ALL {
+        for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
+            let density = density(id, false);
+            let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
+            let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+            assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
+            for instructions in Instructions::available() {
+                let backend = CpuBackend::with_instructions(instructions).unwrap();
+                assert!(whole == outcomes(&plan, &backend, &[0, n / 2, n]), "{id:?} {instructions}");
+            }
+            let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            let alone = one.install(|| outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]));
+            assert!(whole == alone, "{id:?}: threads matter");
+        }
+    }
+}
+
+#[test]
+fn a_device_makes_the_same_lanes_of_the_same_samples() {
+    let Some((adapters, index)) = common::device::software_device() else { return };
+    let backend = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+    let mut compared = 0;
+    for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
+        for id in ParameterizationId::ALL {
+            for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
+                let n = 400;
+                let density = density(id, with_thw);
+                let mixture = density.mixture().unwrap();
+                let plan = plan_samples(&density, &mixture, &profile, &options(n, source)).unwrap();
+                let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+                let theirs = outcomes(&plan, &backend, &[0, 3, 150, n]);
+                let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
+                assert_eq!(differing, 0, "{} {} {source:?}: of {} lanes", profile.name, id.key, ours.len());
+                compared += ours.len();
+            }
+        }
+    }
+    eprintln!("{compared} sampled lanes: 0 differ");
+}
+
+#[test]
+fn a_device_draws_headways_weighted_components_and_given_points_alike() {
+    let Some((adapters, index)) = common::device::software_device() else { return };
+    let backend = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+    let profile = Profile::load("paper").unwrap();
+    let n = 500;
+    for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
+        let id = ParameterizationId::find(id.1, id.0).unwrap();
+        let density = density(id, true);
+        let kernels = density.mixture().unwrap();
+        // A second mixture of another shape beside: weights and two factors.
+        let mean = kernels.mean(0).to_vec();
+        let d = mean.len();
+        let mut factor = vec![0.0; d * d];
+        for j in 0..d {
+            for k in 0..=j {
+                factor[j * d + k] = if j == k { 0.3 } else { 0.05 };
+            }
+        }
+        let other = Mixture::new(vec![1.0], vec![mean], vec![factor], vec![0]).unwrap();
+        let mixture = Mixture::join(&[(0.7, &kernels), (0.3, &other)]).unwrap();
+        let options = SamplePlanOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
+        let plan = plan_samples(&density, &mixture, &profile, &options).unwrap();
+        let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+        assert!(ours == outcomes(&plan, &backend, &[0, 77, n]), "{}", id.key);
+        let points = density.kde.points();
+        let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
+        let last = points.len() as u64;
+        let ours = outcomes(&given, &CpuBackend::lane_arithmetic(), &[0, last]);
+        assert!(ours == outcomes(&given, &backend, &[0, 5, last]), "{} given", id.key);
+    }
+}
+
+#[test]
+fn indices_beyond_32_bits_are_samples_of_their_own() {
+    let id = ParameterizationId::find(Category::CutIn, "1").unwrap();
+    let density = density(id, false);
+    let profile = Profile::load("paper").unwrap();
+    let plan =
+        plan_samples(&density, &density.mixture().unwrap(), &profile, &options(1 << 34, SampleSource::Random)).unwrap();
+    let (low, high) = (5_u64, (1_u64 << 32) + 5);
+    let run = |backend: &dyn Backend, from: u64| {
+        let chunk = backend.prepare(&plan).unwrap().run(from..from + 64, Wanted::Outcomes).unwrap();
+        chunk.outcomes.iter().map(words).collect::<Vec<_>>()
+    };
+    let cpu = CpuBackend::lane_arithmetic();
+    assert!(run(&cpu, low) != run(&cpu, high));
+    // Across the border of the low word, on a device too.
+    if let Some((adapters, index)) = common::device::software_device() {
+        let device = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+        let border = (1 << 32) - 32;
+        assert!(run(&cpu, border) == run(&device, border));
+    }
+    let key = plan.key(plan.lane_count() - 1).unwrap();
+    assert_eq!(plan.parse_key(&plan.key_text(&key)), Some(key));
+}
+
+#[test]
+fn verdicts_of_samples_come_without_their_values_too() {
+    let id = ParameterizationId::find(Category::Lvd, "iv").unwrap();
+    let density = density(id, false);
+    let profile = Profile::load("paper").unwrap();
+    let plan =
+        plan_samples(&density, &density.mixture().unwrap(), &profile, &options(2000, SampleSource::Random)).unwrap();
+    let cpu = CpuBackend::lane_arithmetic();
+    let mut verdicts = Vec::new();
+    sweep(&plan, 0..2000, &cpu, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
+        verdicts.extend(chunk.verdicts);
+        Ok(())
+    })
+    .unwrap();
+    let mut session: Box<dyn Session> = cpu.prepare(&plan).unwrap();
+    let valued: Vec<Outcome<f64>> = session.run(0..2000, Wanted::Outcomes).unwrap().outcomes;
+    assert!(verdicts.iter().zip(&valued).all(|(v, o)| *v == o.verdicts));
+    assert!(verdicts.iter().any(|v| v.0 != 0));
+}
+
+/// Failures of samples, and of the scenarios that they come from, at finer and coarser steps: none vanish.
+#[test]
+fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
+    let backend = CpuBackend::lane_arithmetic();
+    let failures = |plan: &LanePlan| -> Vec<f64> {
+        let mut counts = vec![[0_u64; 3]; plan.models.len()];
+        let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
+        for (lane, verdict) in chunk.verdicts.iter().enumerate() {
+            let of_model = &mut counts[lane % plan.models.len()];
+            for criterion in Criterion::ALL {
+                of_model[criterion.index()] += u64::from(verdict.failed(criterion));
+            }
+        }
+        counts.iter().flatten().map(|&count| count as f64 / chunk.verdicts.len() as f64).collect()
+    };
+    let densities: Vec<DensityModel> = [(Category::CutIn, "1"), (Category::CutOut, "a"), (Category::Lvd, "i")]
+        .into_iter()
+        .map(|(category, key)| density(ParameterizationId::find(category, key).unwrap(), false))
+        .collect();
+    let shares = |dt_s: f64| -> Vec<Vec<f64>> {
+        let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
+        let sampled = densities.iter().map(|density| {
+            let mixture = density.mixture().unwrap();
+            failures(&plan_samples(density, &mixture, &profile, &options(4000, SampleSource::Random)).unwrap())
+        });
+        let studied = Category::ALL.into_iter().map(|category| {
+            let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
+            failures(&plan_study(scenarios(), &profile, &study).unwrap().plan)
+        });
+        sampled.chain(studied).collect()
+    };
+    let known = shares(0.1);
+    assert!(known.iter().flatten().filter(|share| **share > 0.02).count() > 15, "{known:?}");
+    for dt_s in [0.02, 0.04, 0.07] {
+        for (at, (ours, known)) in shares(dt_s).iter().zip(&known).enumerate() {
+            for (share, known) in ours.iter().zip(known) {
+                let what = format!("plan {at}: {share} at {dt_s} s, {known} at 0.1 s");
+                assert!((share - known).abs() <= 0.02 + 0.25 * known, "{what}");
+                assert!(*share > 0.0 || *known < 0.02, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_has_no_more_samples_than_points() {
+    let density = density(ParameterizationId::find(Category::CutIn, "1").unwrap(), false);
+    let profile = Profile::load("paper").unwrap();
+    let mixture = density.mixture().unwrap();
+    let plan = |samples| plan_samples(&density, &mixture, &profile, &options(samples, SampleSource::Sobol));
+    assert!(plan(1 << 32).is_ok());
+    assert!(plan((1 << 32) + 1).is_err());
+}

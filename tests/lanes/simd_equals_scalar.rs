@@ -1,0 +1,132 @@
+//! Lanes in batches give the same output words as lanes run one by one, bit for bit, on every instruction set of
+//! this machine, whatever the profile, the number of threads and the cut into calls.
+
+use crate::common::lane_sets::{forms, random, small_study, thresholds};
+use lanesweep::engine::verify::{Comparison, compare};
+use lanesweep::engine::{
+    Backend, CpuBackend, Headway, Instructions, LanePlan, LaneRunner, Outcome, Verdicts, Wanted, same_words,
+};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::Category;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+
+/// Batches on every instruction set of this machine.
+fn in_batches() -> Vec<CpuBackend<f32>> {
+    let sets = Instructions::available().into_iter().filter(|set| *set != Instructions::Scalar);
+    sets.map(|set| CpuBackend::with_instructions(set).unwrap()).collect()
+}
+
+/// Outcomes, verdicts and counts of every instruction set against the scalar lanes.
+fn assert_equal(what: &str, plan: &LanePlan) {
+    for backend in in_batches() {
+        let Comparison { worst, modes_differing, .. } = &compare(what, plan, &backend, |_| ()).unwrap();
+        let worst: Vec<String> = worst.iter().map(|l| format!("{} {:?}", l.key, l.names())).collect();
+        assert!(worst.is_empty() && *modes_differing == 0, "{what}, {}: {worst:#?}", backend.describe());
+    }
+}
+
+#[test]
+fn this_machine_runs_what_it_says_and_refuses_the_rest() {
+    for set in Instructions::ALL {
+        let backend = CpuBackend::with_instructions(set);
+        assert_eq!(backend.is_ok(), Instructions::available().contains(&set));
+        match backend {
+            Ok(backend) => assert!(backend.describe().contains(set.name())),
+            Err(error) => assert!(error.to_string().contains(set.name())),
+        }
+    }
+    assert!(CpuBackend::lane_arithmetic().describe().contains(Instructions::best().name()));
+}
+
+#[test]
+fn random_lanes_and_lanes_on_thresholds_are_equal_under_every_profile() {
+    for name in Profile::names() {
+        let profile = Profile::load(name).unwrap();
+        assert_equal(name, &random(&profile, 1000));
+        assert_equal(name, &thresholds(&profile, 3));
+    }
+}
+
+#[test]
+fn lanes_are_equal_under_every_form_of_every_option_and_at_other_time_steps() {
+    for profile in forms() {
+        let what = format!("{:?} {:?}", profile.criteria, profile.frame);
+        assert_equal(&what, &random(&profile, 200));
+        assert_equal(&what, &thresholds(&profile, 1));
+    }
+}
+
+#[test]
+fn every_word_of_a_small_study_is_equal() {
+    assert_equal("study", &small_study());
+}
+
+/// More headways than lanes wait at once, and numbers of them around those that a batch has: at the usual cap, and at
+/// one that most lanes reach, so that slots stay free beside lanes that go on.
+#[test]
+fn any_number_of_headways_gives_the_same_words() {
+    let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    let mut scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    for category in Category::ALL {
+        let mut seen = 0;
+        scenarios.retain(|scenario| {
+            seen += u32::from(scenario.category == category);
+            scenario.category != category || seen <= 2
+        });
+    }
+    let mut short = Profile::load("paper").unwrap();
+    short.frame.time_cap_s = 2.5;
+    for (profile, count) in
+        [(&short, 1), (&short, 15), (&short, 17), (&short, 300), (&Profile::load("paper").unwrap(), 600)]
+    {
+        let headways = (1..=count).map(|k| Headway::ThwS(3.0 * f64::from(k) / f64::from(count))).collect();
+        let options = StudyOptions { headways, ..StudyOptions::default() };
+        assert_equal(&format!("{count} headways"), &plan_study(&scenarios, profile, &options).unwrap().plan);
+    }
+}
+
+#[test]
+fn neither_threads_nor_calls_change_a_word() {
+    let plan = random(&Profile::load("paper").unwrap(), 2000);
+    let runner = LaneRunner::<f32>::new(&plan);
+    let scalar: Vec<Outcome<f64>> =
+        (0..plan.lane_count()).map(|lane| runner.run(&plan.key(lane).unwrap()).widen()).collect();
+    let scalar_verdicts: Vec<Verdicts> = scalar.iter().map(|o| o.verdicts).collect();
+    for threads in [1, 2, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        // Sizes that fill no batch, and all at once.
+        for units in [1, 7, plan.unit_count()] {
+            for backend in in_batches() {
+                let (outcomes, verdicts) = pool.install(|| in_calls(&plan, &backend, units));
+                let what = format!("{threads} threads, {units} units, {}", backend.describe());
+                assert!(outcomes.iter().zip(&scalar).all(|(a, b)| same_words(a, b)), "{what}");
+                assert!(outcomes.len() == scalar.len() && verdicts == scalar_verdicts, "{what}");
+            }
+        }
+    }
+}
+
+/// So many units at a time: outcomes and, asked for separately, verdicts.
+fn in_calls(plan: &LanePlan, backend: &CpuBackend<f32>, units: u64) -> (Vec<Outcome<f64>>, Vec<Verdicts>) {
+    let mut session = backend.prepare(plan).unwrap();
+    let (mut from, mut outcomes, mut verdicts) = (0, Vec::new(), Vec::new());
+    while from < plan.unit_count() {
+        let to = (from + units).min(plan.unit_count());
+        outcomes.extend(session.run(from..to, Wanted::Outcomes).unwrap().outcomes);
+        verdicts.extend(session.run(from..to, Wanted::Verdicts).unwrap().verdicts);
+        from = to;
+    }
+    (outcomes, verdicts)
+}
+
+/// Minutes: `cargo test --release --test lanes simd_equals_scalar:: -- --ignored`.
+#[test]
+#[ignore = "minutes: 10^6 lanes per model and category"]
+fn a_million_random_lanes_per_model_and_category_are_equal() {
+    let plan = random(&Profile::load("paper").unwrap(), 1_000_000);
+    assert!(plan.lane_count() >= 1_000_000 * (ModelId::ALL.len() * Category::ALL.len()) as u64);
+    assert_equal("a million", &plan);
+}

@@ -1,0 +1,12 @@
+//! What no input may ask for: both files need the allocator that counts.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+#[path = "mutated_inputs/memory.rs"]
+mod memory;
+mod mutated_inputs;
+mod table_memory;
+
+#[global_allocator]
+static ALLOCATOR: memory::Counting = memory::Counting;

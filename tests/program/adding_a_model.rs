@@ -1,0 +1,214 @@
+//! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
+//! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
+//!
+//! Ignored, because it compiles the crate a second time (a minute or two):
+//! `cargo test --release --test program adding_a_model:: -- --ignored`
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::common::device::software_device;
+
+/// What a copy needs to be built.
+const SOURCES: [&str; 7] = ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches"];
+
+/// The three touches: two new files and, in the third, one new line.
+const RUST: &str = "src/model/driver/aeb.rs";
+const WGSL: &str = "shaders/aeb.wgsl";
+const REGISTRY: &str = "src/model/driver/registry.rs";
+
+type Tree = BTreeMap<String, Vec<u8>>;
+
+/// Every file below `root` that belongs to [`SOURCES`], by its path from there.
+fn sources(root: &Path) -> Tree {
+    fn add(tree: &mut Tree, root: &Path, at: &str) {
+        let path = root.join(at);
+        if path.is_dir() {
+            for entry in fs::read_dir(&path).unwrap() {
+                let name = entry.unwrap().file_name().into_string().unwrap();
+                add(tree, root, &format!("{at}/{name}"));
+            }
+        } else if path.exists() {
+            tree.insert(at.to_owned(), fs::read(path).unwrap());
+        }
+    }
+    let mut tree = Tree::new();
+    SOURCES.iter().for_each(|at| add(&mut tree, root, at));
+    tree
+}
+
+/// Makes the folder hold exactly these files. What is right already is not touched, so that cargo sees from the
+/// times of the files that nothing is to be built again.
+fn write(tree: &Tree, root: &Path) {
+    let present = sources(root);
+    for stale in present.keys().filter(|at| !tree.contains_key(*at)) {
+        fs::remove_file(root.join(stale)).unwrap();
+    }
+    for (at, content) in tree.iter().filter(|(at, content)| present.get(*at) != Some(content)) {
+        let path = root.join(at);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+}
+
+/// The sources with the example's model: two files and a line after the registry's last.
+fn with_the_example(ours: &Tree, example: &Path) -> Tree {
+    let read = |name: &str| fs::read(example.join(name)).unwrap();
+    let mut theirs = ours.clone();
+    assert!(theirs.insert(RUST.to_owned(), read("aeb.rs")).is_none(), "{RUST} is new");
+    assert!(theirs.insert(WGSL.to_owned(), read("aeb.wgsl")).is_none(), "{WGSL} is new");
+    let line = String::from_utf8(read("registry-line.txt")).unwrap();
+    let registry = String::from_utf8(ours[REGISTRY].clone()).unwrap();
+    let mut lines: Vec<&str> = registry.lines().collect();
+    let last = lines.iter().rposition(|l| l.ends_with("\";")).expect("the registry has models");
+    lines.insert(last + 1, line.trim_end());
+    theirs.insert(REGISTRY.to_owned(), (lines.join("\n") + "\n").into_bytes());
+    theirs
+}
+
+/// Lines of `new` that `old` does not have; every line of `old` must still be there, in its order.
+fn added_lines(old: &[u8], new: &[u8]) -> Vec<String> {
+    let (old, new) = (std::str::from_utf8(old).unwrap(), std::str::from_utf8(new).unwrap());
+    let mut old = old.lines().peekable();
+    let added = new.lines().filter(|line| old.next_if_eq(line).is_none()).map(str::to_owned).collect();
+    assert_eq!(old.next(), None, "a line is gone or changed");
+    added
+}
+
+/// Builds the program of the copy. Dependencies are those that are built already, because the folder of intermediate
+/// files is shared. Cargo knows a package by its path from its own root, which is the same for the copy and for us; only
+/// the profile tells the two apart there, and without a difference in it each would be taken for the other. The
+/// finished program goes to a folder of its own, so that it does not replace the ordinary one.
+fn build(copy: &Path) {
+    let build_dir = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(copy).args(["build", "--release", "--offline", "--locked", "--bin", "lanesweep"]);
+    command.args(["--config", "profile.release.package.lanesweep.debug=false"]);
+    command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{command:?}: {}\n{}", output.status, said(&output));
+}
+
+fn target_dir() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("adding-a-model-target")
+}
+
+/// Runs the program that knows the new model.
+fn lanesweep(args: &[&str]) -> Output {
+    let program = target_dir().join("release").join(format!("lanesweep{}", std::env::consts::EXE_SUFFIX));
+    Command::new(program).env("NO_COLOR", "1").args(args).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+#[test]
+#[ignore = "compiles the crate a second time"]
+fn a_model_is_one_rust_file_one_wgsl_file_and_one_registry_line() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join("adding-a-model");
+    let ours = sources(root);
+    write(&with_the_example(&ours, &root.join("examples/adding-a-driver-model")), &copy);
+    touches_nothing_else(&ours, &sources(&copy));
+
+    let start = std::time::Instant::now();
+    build(&copy);
+    println!("built with the model in {:.0?}", start.elapsed());
+    runs_one_case();
+    takes_its_constants_from_a_profile(&ours);
+    stands_in_every_table_of_a_study();
+    gives_the_same_words_on_a_device();
+}
+
+fn touches_nothing_else(ours: &Tree, theirs: &Tree) {
+    let differs = |at: &&String| ours.get(*at) != theirs.get(*at);
+    let touched: Vec<&String> = theirs.keys().filter(differs).collect();
+    assert_eq!(touched, [WGSL, RUST, REGISTRY]);
+    assert!(ours.keys().all(|at| theirs.contains_key(at)), "no file is gone");
+    let added = added_lines(&ours[REGISTRY], &theirs[REGISTRY]);
+    assert_eq!(added.len(), 1, "{added:?}");
+    println!("{RUST}\n{WGSL}\n{REGISTRY}: {}", added[0].trim());
+}
+
+/// A leader that brakes to a standstill.
+const CASE: &str = "simulate --category lvd --ego-speed 12 --thw 1.5 --acceleration -6 --model AEB";
+
+fn reaction(output: &Output) -> f64 {
+    assert!(output.status.success(), "{}", said(output));
+    let text = said(output);
+    let after = text.split("reacted: ").nth(1).unwrap_or_else(|| panic!("{text}"));
+    after.split(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("{text}"))
+}
+
+fn runs_one_case() {
+    let args: Vec<&str> = CASE.split(' ').collect();
+    let output = lanesweep(&args);
+    // By hand: the leader brakes at 6 m/s² from 12 m/s, 18 m ahead; dv = 6t and g = 18 − 3t², and g ≤ 1.5 dv from
+    // t = (√(81 + 216) − 9)/6 = 1.37 s on; the next step of 0.04 s is 1.40 s.
+    let reacted = reaction(&output);
+    assert!((reacted - 1.40).abs() < 0.041, "{}", said(&output));
+    let wrong = lanesweep(&CASE.replace("AEB", "AEBS").split(' ').collect::<Vec<_>>());
+    assert!(!wrong.status.success() && said(&wrong).contains("FSM, AEB"), "{}", said(&wrong));
+    let help = said(&lanesweep(&["simulate", "--help"]));
+    assert!(help.contains("FSM, AEB"), "{help}");
+}
+
+fn takes_its_constants_from_a_profile(ours: &Tree) {
+    let dir = tempfile::tempdir().unwrap();
+    let paper = String::from_utf8(ours["configs/profiles/paper.toml"].clone()).unwrap();
+    let with = |table: &str| {
+        let path = dir.path().join("own.toml");
+        fs::write(&path, format!("{paper}\n[aeb]\n{table}\n")).unwrap();
+        let args: Vec<&str> = CASE.split(' ').chain(["--profile", path.to_str().unwrap()]).collect();
+        lanesweep(&args)
+    };
+    assert!(reaction(&with("trigger_ttc_s = 3.0")) < 1.2, "an earlier trigger reacts earlier");
+    let bad = with("trigger_ttc_s = -1.0");
+    assert!(bad.status.code() == Some(2) && said(&bad).contains("aeb.trigger_ttc_s"), "{}", said(&bad));
+    let unknown = with("trigger = 3.0");
+    assert!(unknown.status.code() == Some(2) && said(&unknown).contains("unknown field"), "{}", said(&unknown));
+}
+
+fn stands_in_every_table_of_a_study() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("result");
+    let lanes = dir.path().join("lanes.csv");
+    let study = ["-q", "study", "--synth-recordings", "1", "--published", "--out", out.to_str().unwrap(), "--lanes"];
+    let output = lanesweep(&[&study[..], &[lanes.to_str().unwrap()]].concat());
+    assert!(output.status.success(), "{}", said(&output));
+    let tables = String::from_utf8(output.stdout).unwrap();
+    for category in ["cut-in", "cut-out", "LVD"] {
+        let is_row = |l: &&str| l.to_lowercase().contains(&category.to_lowercase()) && l.contains("| AEB ");
+        let row = tables.lines().find(is_row).unwrap_or_else(|| panic!("{category}: {tables}"));
+        assert!(row.trim_end_matches(['|', ' ']).ends_with('-'), "the paper has no number for it: {row}");
+    }
+    let read = |path: &Path| fs::read_to_string(path).unwrap();
+    for name in ["failures.csv", "f1.csv"] {
+        assert!(read(&out.join(name)).contains(",AEB,"), "{name}");
+    }
+    assert!(!read(&out.join("claims.csv")).contains("AEB"), "the paper's claims are about its own models");
+    assert!(read(&out.join("radar-lvd.svg")).contains("AEB"), "a spoke per model and criterion");
+    assert!(read(&out.join("run.json")).contains("trigger_ttc_s"), "the defaults are on record");
+    // One lane in five is the new model's.
+    let rows = read(&lanes);
+    let of = |model: &str| rows.lines().filter(|l| l.contains(&format!(",{model},"))).count();
+    assert!(of("AEB") > 0 && of("AEB") == of("FSM"), "{} {}", of("AEB"), of("FSM"));
+    println!("{} lanes of AEB in the study", of("AEB"));
+}
+
+fn gives_the_same_words_on_a_device() {
+    if software_device().is_none() {
+        return;
+    }
+    let verify = "-q verify --device llvmpipe --lanes 2000 --threshold-units 2 --synth-recordings 1";
+    let output = lanesweep(&verify.split(' ').collect::<Vec<_>>());
+    let text = said(&output);
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("every word equals the CPU's"), "{text}");
+    let rows = text.lines().filter(|line| line.contains("| AEB ")).count();
+    assert_eq!(rows, 9, "three sets of three categories hold it: {text}");
+    println!("{text}");
+}

@@ -1,0 +1,323 @@
+//! The book does what it says: its commands run and print what stands there, its links lead somewhere, every chapter is
+//! in the table of contents, every verb is in the book, every flag exists.
+//!
+//! A chapter's ```` ```console ```` blocks run in an empty folder of the chapter's own, in order; what stands in a block
+//! `toml file=NAME` (any language) is a file there. Programs of the system, such as `head`, may be called too. `TRYCMD=overwrite cargo test --release --test program book::commands` writes
+//! what the commands print into the chapters.
+#![cfg(unix)]
+
+mod markdown;
+mod shell;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use markdown::{Document, Link};
+use shell::commands;
+
+/// Programs of the system that a block may call; trycmd leaves out what it does not know.
+const TOOLS: [&str; 7] = ["cat", "cp", "grep", "head", "ls", "tail", "wc"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Markdown files below a folder of the crate, by their path from its root, in order.
+fn markdown_below(folder: &str) -> Vec<String> {
+    fn add(found: &mut Vec<String>, at: &str) {
+        let entries = fs::read_dir(root().join(at)).unwrap_or_else(|e| panic!("{at}: {e}"));
+        for entry in entries {
+            let entry = entry.unwrap();
+            let name = format!("{at}/{}", entry.file_name().into_string().unwrap());
+            if entry.file_type().unwrap().is_dir() {
+                add(found, &name);
+            } else if name.ends_with(".md") {
+                found.push(name);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    add(&mut found, folder);
+    found.sort();
+    found
+}
+
+fn chapters() -> Vec<Document> {
+    markdown_below("docs/src").into_iter().map(|path| Document::read(root(), &path)).collect()
+}
+
+/// The chapters and what stands beside them for readers of the repository.
+fn documents() -> Vec<Document> {
+    let beside = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/README.md"];
+    let folders = ["deploy", "configs", "examples", "shaders"].map(markdown_below).concat();
+    let paths = beside.map(str::to_owned).into_iter().chain(folders).chain(["benches/README.md".to_owned()]);
+    paths.map(|path| Document::read(root(), &path)).chain(chapters()).collect()
+}
+
+fn lanesweep(args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_lanesweep")).args(args).output().unwrap();
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The verbs as the program's own help lists them.
+fn verbs() -> Vec<String> {
+    let help = lanesweep(&["--help"]);
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let named = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let verbs: Vec<String> = named.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect();
+    assert!(verbs.len() >= 14, "{help}");
+    verbs.into_iter().filter(|verb| verb != "help").collect()
+}
+
+#[test]
+fn commands_print_what_the_book_says() {
+    let work = tempfile::Builder::new().prefix("book").tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let cases: Vec<(PathBuf, Document)> = chapters()
+        .into_iter()
+        .filter(|chapter| chapter.blocks().any(|block| block.language == "console"))
+        .map(|chapter| {
+            let name = chapter.path.trim_start_matches("docs/src/").replace('/', "-");
+            let case = work.path().join(name);
+            fs::write(&case, chapter.for_trycmd()).unwrap();
+            // An empty `.out` asks for a folder of the case's own, in which `.in` lies.
+            fs::create_dir(case.with_extension("out")).unwrap();
+            fs::create_dir(case.with_extension("in")).unwrap();
+            for (file, content) in chapter.files() {
+                fs::write(case.with_extension("in").join(file), content).unwrap();
+            }
+            (case, chapter)
+        })
+        .collect();
+    assert!(!cases.is_empty(), "no chapter has a console block");
+
+    let tests = trycmd::TestCases::new();
+    tests.case(work.path().join("*.md")).timeout(Duration::from_secs(120)).env("NO_COLOR", "1");
+    tests.register_bin("lanesweep", Path::new(env!("CARGO_BIN_EXE_lanesweep")));
+    tests.register_bins(TOOLS.map(|tool| (tool, on_path(tool))));
+    tests.run();
+
+    if std::env::var_os("TRYCMD").is_some_and(|mode| mode == "overwrite") {
+        for (case, chapter) in cases {
+            let text = markdown::from_trycmd(fs::read_to_string(case).unwrap());
+            if text != chapter.text {
+                fs::write(root().join(&chapter.path), text).unwrap();
+            }
+        }
+    }
+}
+
+fn on_path(program: &str) -> PathBuf {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&folders).map(|folder| folder.join(program)).find(|path| path.is_file());
+    found.unwrap_or_else(|| panic!("the book's commands need `{program}`"))
+}
+
+#[test]
+fn the_commands_of_console_blocks_are_ours_or_tools_that_are_known() {
+    for chapter in chapters() {
+        for block in chapter.blocks().filter(|block| block.language == "console") {
+            for (at, command) in
+                block.content.lines().enumerate().filter_map(|(at, l)| Some((at, l.strip_prefix("$ ")?)))
+            {
+                let program = command.split_whitespace().find(|word| !word.contains('=')).unwrap_or_default();
+                let known = program == "lanesweep" || TOOLS.contains(&program);
+                // There is no shell between: a pipe or a redirection would be an argument.
+                let plain = !command.split_whitespace().any(|word| ["|", ">", ">>", "&&", ";", "2>&1"].contains(&word));
+                assert!(
+                    known && plain,
+                    "{}:{}: `{command}` would not be run as it stands",
+                    chapter.path,
+                    block.line + at
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut wrong = Vec::new();
+    let mut anchors: BTreeMap<PathBuf, BTreeSet<String>> = BTreeMap::new();
+    let mut followed = 0;
+    for document in documents() {
+        for Link { line, target } in document.links() {
+            let place = format!("{}:{line}: `{target}`", document.path);
+            if target.contains("://") {
+                let host = target.strip_prefix("https://").unwrap_or_default().split('/').next().unwrap_or_default();
+                if !host.contains('.') || target.contains(char::is_whitespace) {
+                    wrong.push(format!("{place} is not the https address of a host"));
+                }
+                continue;
+            }
+            let (file, anchor) = target.split_once('#').unwrap_or((&target, ""));
+            if file.starts_with('/') {
+                wrong.push(format!("{place} is an absolute path"));
+                continue;
+            }
+            let path = if file.is_empty() { document.path.clone() } else { beside(&document.path, file) };
+            followed += 1;
+            if document.path.starts_with("docs/src/") && !path.starts_with("docs/src/") {
+                // mdBook makes pages of the chapters only: as HTML such a link would lead nowhere.
+                wrong.push(format!("{place} leaves the book: write the path as code"));
+            }
+            let at = root().join(&path);
+            if !at.exists() {
+                wrong.push(format!("{place} leads to no file"));
+            } else if !anchor.is_empty() {
+                let known = anchors.entry(at).or_insert_with(|| Document::read(root(), &path).anchors());
+                if !known.contains(anchor) {
+                    wrong.push(format!("{place} leads to no heading; there are {known:?}"));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(followed > 100, "only {followed} links: are they found?");
+}
+
+/// A path relative to a file, from the crate's root: `docs/src/a/b.md` and `../c.md` give `docs/src/c.md`.
+fn beside(file: &str, relative: &str) -> String {
+    let mut parts: Vec<&str> = file.split('/').collect();
+    parts.pop();
+    for part in relative.split('/').filter(|part| *part != ".") {
+        match part {
+            ".." => {
+                parts.pop();
+            }
+            part => parts.push(part),
+        }
+    }
+    parts.join("/").trim_end_matches('/').to_owned()
+}
+
+#[test]
+fn the_table_of_contents_holds_every_chapter_once() {
+    let summary = Document::read(root(), "docs/src/SUMMARY.md");
+    let listed: Vec<String> = summary.links().into_iter().map(|link| beside(&summary.path, &link.target)).collect();
+    let once: BTreeSet<&String> = listed.iter().collect();
+    assert_eq!(once.len(), listed.len(), "a chapter is listed twice: {listed:?}");
+    let mut present = markdown_below("docs/src");
+    present.retain(|path| path != "docs/src/SUMMARY.md");
+    for path in &present {
+        assert!(once.contains(path), "{path} is not in SUMMARY.md");
+    }
+    for path in &listed {
+        assert!(present.contains(path), "SUMMARY.md names {path}, which is not there");
+    }
+}
+
+#[test]
+fn every_chapter_opens_with_the_question_that_its_reader_came_with() {
+    for chapter in chapters().iter().filter(|c| !c.path.ends_with("SUMMARY.md")) {
+        let mut lines = chapter.text.lines().filter(|line| !line.is_empty());
+        let title = lines.next().unwrap_or_default();
+        assert!(title.starts_with("# "), "{} begins with `{title}`, not with its title", chapter.path);
+        assert_eq!(chapter.anchors().len(), chapter.headings().len(), "{}: two headings are equal", chapter.path);
+    }
+}
+
+#[test]
+fn every_verb_is_in_the_book() {
+    let book: String = chapters().into_iter().map(|chapter| chapter.text).collect();
+    for verb in verbs() {
+        assert!(book.contains(&format!("lanesweep {verb}")), "no chapter has `lanesweep {verb}`");
+    }
+}
+
+#[test]
+fn every_printed_command_has_a_verb_and_flags_that_exist() {
+    let helps: BTreeMap<String, String> =
+        verbs().into_iter().map(|verb| (verb.clone(), lanesweep(&[&verb, "--help"]))).collect();
+    let (mut wrong, mut checked) = (Vec::new(), 0);
+    for document in documents() {
+        // What a changelog says of an earlier version need not be true of this one.
+        if document.path == "CHANGELOG.md" {
+            continue;
+        }
+        for (line, command) in commands(&document) {
+            checked += 1;
+            // Of a verb with verbs of its own, the inner one has the flags.
+            let inner = command.inner.as_ref().map(|inner| lanesweep(&[&command.verb, inner, "--help"]));
+            let Some(help) = inner.as_ref().or_else(|| helps.get(&command.verb)) else {
+                wrong.push(format!("{}:{line}: there is no verb `{}`", document.path, command.verb));
+                continue;
+            };
+            for flag in &command.flags {
+                let known = help.lines().filter(|text| text.trim_start().starts_with('-')).any(|text| {
+                    text.split([' ', ',', '=', '[']).any(|word| word == flag) || (flag == "-V" || flag == "--version")
+                });
+                if !known {
+                    wrong.push(format!("{}:{line}: `lanesweep {}` has no {flag}", document.path, command.verb));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(checked > 60, "only {checked} commands: are they found?");
+}
+
+/// Figures of the book: file, the command that draws it, and where.
+const FIGURES: [(&str, &str, &str); 3] = [
+    ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
+    (
+        "case.svg",
+        "simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
+        "case.svg",
+    ),
+    (
+        "lvd_cchdm_against_fsm.svg",
+        "map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM --out OUT",
+        "lvd_cchdm_against_fsm.svg",
+    ),
+];
+
+/// `LANESWEEP_RENEW_FIGURES=1` draws them anew.
+#[test]
+fn figures_are_what_their_commands_draw() {
+    let renew = std::env::var_os("LANESWEEP_RENEW_FIGURES").is_some();
+    let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
+    listed.sort_unstable();
+    let folder = root().join("docs/src/figures");
+    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut present: Vec<String> = names.filter(|name| name.ends_with(".svg")).collect();
+    present.sort_unstable();
+    assert_eq!(present, listed, "every figure has its command");
+    for (figure, command, drawn) in FIGURES {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().to_str().unwrap();
+        let command = format!("-q {}", command.replace("OUT", out));
+        lanesweep(&command.split(' ').collect::<Vec<_>>());
+        let now = fs::read(dir.path().join(drawn)).unwrap();
+        if renew {
+            fs::write(folder.join(figure), now).unwrap();
+        } else {
+            assert!(fs::read(folder.join(figure)).unwrap() == now, "{figure} is not what `{command}` draws");
+        }
+    }
+}
+
+#[test]
+fn the_code_of_the_chapter_on_driver_models_is_that_of_the_example_which_a_test_builds() {
+    let chapter = Document::read(root(), "docs/src/extend/driver-model.md");
+    let blocks: Vec<String> = chapter.blocks().map(|block| block.content.trim().to_owned()).collect();
+    for file in ["aeb.rs", "aeb.wgsl", "registry-line.txt"] {
+        let code = fs::read_to_string(root().join("examples/adding-a-driver-model").join(file)).unwrap();
+        assert!(blocks.iter().any(|block| block == code.trim()), "no block of the chapter is {file}");
+    }
+}
+
+#[test]
+fn the_time_of_a_study_of_the_papers_size_stands_in_one_place_with_its_command() {
+    let mut told = Vec::new();
+    for path in markdown_below("docs/src").into_iter().chain(["README.md".to_owned()]) {
+        let text = fs::read_to_string(root().join(&path)).unwrap();
+        told.extend(text.split("\n\n").filter(|p| p.contains("493,600 lanes")).map(|p| (path.clone(), p.to_owned())));
+    }
+    let [(path, paragraph)] = &told[..] else { panic!("{told:?}") };
+    assert_eq!(path, "docs/src/validation.md");
+    assert!(paragraph.contains("cargo bench --bench paper_size") && paragraph.contains("benches/runs/"), "{paragraph}");
+}

@@ -1,0 +1,359 @@
+//! The configuration: which source wins, what a wrong word is answered with, and that the default file, the schema and
+//! the keys are the same.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lanesweep::model::driver::ModelId;
+use serde_json::Value;
+
+/// Runs the program with nothing configured but what the test configures.
+fn run(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    command.current_dir(dir).env_remove("LANESWEEP_CONFIG").envs(variables.iter().copied()).args(args);
+    command.output().unwrap()
+}
+
+fn good(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> String {
+    let output = run(dir, variables, args);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The message of a run that must be refused, in one line.
+fn refused(dir: &Path, variables: &[(&str, &str)], args: &[&str]) -> String {
+    let output = run(dir, variables, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+    assert!(output.stdout.is_empty(), "{args:?}");
+    said.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Value and source of a key.
+fn shown(dir: &Path, variables: &[(&str, &str)], args: &[&str], key: &str) -> (Value, String) {
+    let text = good(dir, variables, &[&["config", "show", "--format", "json"], args].concat());
+    let list: Value = serde_json::from_str(&text).unwrap();
+    let found = list.as_array().unwrap().iter().find(|one| one["key"] == key).unwrap_or_else(|| panic!("{key}"));
+    (found["value"].clone(), found["source"].as_str().unwrap().to_owned())
+}
+
+#[test]
+fn a_flag_wins_over_an_assignment_over_the_environment_over_a_file_over_the_default() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    std::fs::write(dir.join("a.toml"), "# mine\n[generator]\nseed = 2\n[run]\ndt_s = 0.2\n").unwrap();
+    let file = ["--config", "a.toml"];
+    let environment = [("LANESWEEP_GENERATOR_SEED", "3"), ("LANESWEEP_RUN_DT_S", "0.3")];
+    let assigned = ["--config", "a.toml", "--config", "generator.seed=4", "--config", "run.dt_s=0.4"];
+    let flags = [&assigned[..], &["--synth-seed", "5", "--dt", "0.5"]].concat();
+    let seed = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "generator.seed");
+    let dt = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "run.dt_s");
+    let is = |value: Value, source: &str| (value, source.to_owned());
+    assert_eq!(seed(&[], &[]), is(20_240_901.into(), "default"));
+    assert_eq!(dt(&[], &[]), is(Value::Null, "default"));
+    assert_eq!(seed(&[], &file), is(2.into(), "file a.toml, line 3"));
+    assert_eq!(dt(&[], &file), is(0.2.into(), "file a.toml, line 5"));
+    assert_eq!(seed(&environment, &file), is(3.into(), "environment LANESWEEP_GENERATOR_SEED"));
+    assert_eq!(dt(&environment, &file), is(0.3.into(), "environment LANESWEEP_RUN_DT_S"));
+    assert_eq!(seed(&environment, &assigned), is(4.into(), "flag --config"));
+    assert_eq!(dt(&environment, &flags), is(0.5.into(), "flag --dt"));
+    assert_eq!(seed(&environment, &flags), is(5.into(), "flag --synth-seed"));
+    // The environment names the file where no flag does, and nothing after `=` is the default again.
+    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &[]), is(2.into(), "file a.toml, line 3"));
+    std::fs::write(dir.join("b.toml"), "").unwrap();
+    assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &["--config", "b.toml"]).1, "default");
+    assert_eq!(seed(&[], &["--config", "a.toml", "--config", "generator.seed="]).0, Value::from(20_240_901));
+    // Nothing that is not named is read.
+    std::fs::write(dir.join("lanesweep.toml"), "[generator]\nseed = 9\n").unwrap();
+    assert_eq!(seed(&[], &[]).1, "default");
+}
+
+#[test]
+fn every_verb_takes_its_values_from_all_layers() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let tables = "[run]\nbackend = \"cpu\"\n[generator]\nrecordings = 2\nduration_s = 100\n[score]\nseed = 11\n\
+                  bootstrap_draws = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n\
+                  [compare]\nseed = 14\nsamples = 50\n";
+    std::fs::write(dir.join("a.toml"), tables).unwrap();
+    let fit = ["fit", "--category", "lvd", "--parameterization", "i", "--no-comparison", "--out", "lvd-i.json"];
+    let compare = ["compare", "--categories", "lvd", "--parameterization", "i", "--models", "FSM", "--thw", "1"];
+    let verbs: [(&[&str], &str, &str, &str, u64); 4] = [
+        (&["study"], "lanesweep-out/run.json", "/score/seed", "SCORE", 11),
+        (&fit, "lvd-i.json", "/p_valid/seed", "FIT", 12),
+        (&["sample", "lvd-i.json"], "lanesweep-sample/estimate.json", "/seed", "SAMPLE", 13),
+        (&compare, "lanesweep-compare/compare.json", "/seed", "COMPARE", 14),
+    ];
+    for (verb, result, pointer, table, in_file) in verbs {
+        let variable = format!("LANESWEEP_{table}_SEED");
+        let assignment = format!("{}.seed=31", table.to_lowercase());
+        let with = |variables: &[(&str, &str)], args: &[&str]| {
+            good(dir, variables, &[&["-q", "--config", "a.toml"], verb, args].concat());
+            let record = json(&dir.join(result));
+            record.pointer(pointer).and_then(Value::as_u64)
+        };
+        let environment = [(variable.as_str(), "21")];
+        assert_eq!(with(&[], &[]), Some(in_file), "{verb:?}: file");
+        assert_eq!(with(&environment, &[]), Some(21), "{verb:?}: environment");
+        assert_eq!(with(&environment, &["--config", &assignment]), Some(31), "{verb:?}: assignment");
+        assert_eq!(with(&environment, &["--config", &assignment, "--seed", "41"]), Some(41), "{verb:?}: flag");
+    }
+    let record = json(&dir.join("lanesweep-out/run.json"));
+    let settings = record["settings"].as_array().unwrap();
+    let of = |key: &str| settings.iter().find(|one| one["key"] == key).unwrap_or_else(|| panic!("{key}"));
+    assert_eq!(of("score.seed")["source"], "flag --seed");
+    assert_eq!(of("score.bootstrap_draws")["source"], "file a.toml, line 8");
+    assert_eq!(record["score"]["bootstrap_draws"], 20);
+    assert!(record["data"].as_str().unwrap().contains("2 generated recordings of 100 s"));
+}
+
+#[test]
+fn mining_is_configured_alike_for_mine_and_study() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
+    good(dir, &[], &["-q", "synth", "data", "--synth-recordings", "2", "--synth-duration", "120"]);
+    let kept = |variables: &[(&str, &str)], args: &[&str]| {
+        let text = good(dir, variables, &[&["-q", "mine", "data", "--kept"], args].concat());
+        text.lines().filter(|line| line.contains("_lvd_")).count()
+    };
+    assert!(kept(&[], &[]) > 0);
+    assert_eq!(kept(&[], &["--config", "a.toml"]), 0);
+    let environment = [("LANESWEEP_MINING_LVD_MIN_PEAK_DECELERATION_MPS2", "2")];
+    assert_eq!(kept(&environment, &["--config", "a.toml"]), kept(&[], &[]));
+    let study = ["-q", "study", "data", "--backend", "cpu", "--categories", "cut-in,lvd", "--config", "a.toml"];
+    good(dir, &[], &study);
+    let record = json(&dir.join("lanesweep-out/run.json"));
+    assert_eq!(record["mining"]["lvd"]["min_peak_deceleration_mps2"], 1e6);
+    let categories = record["categories"].as_array().unwrap();
+    assert!(categories.iter().all(|of| of["category"] != "lvd" || of["kept"] == 0), "{categories:?}");
+}
+
+#[test]
+fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let files = [
+        ("[mining]\nleader_max_thv_s = 2\n", "a.toml, line 2, `mining.leader_max_thv_s`", "`mining.leader_max_thw_s`"),
+        ("[minning]\nleader_max_thw_s = 2\n", "a.toml, line 1, `minning`: there is no such table", "`mining`"),
+        ("[mining.cutin]\n", "a.toml, line 1, `mining.cutin`", "`mining.cut_in`"),
+        ("seed = 3\n", "a.toml, line 1, `seed`: there is no such key", ".seed`"),
+        ("\n[score]\nseed = -1\n", "a.toml, line 3, `score.seed`: -1 cannot be used", "a whole number of at least 0"),
+        ("[score]\nconfidence = 1\n", "line 2, `score.confidence`: 1", "a number above 0 and below 1"),
+        ("[score]\nconfidence = nan\n", "line 2, `score.confidence`: nan", "a number above 0 and below 1"),
+        ("[generator]\nrecordings = 1.5\n", "line 2, `generator.recordings`: 1.5", "a whole number from 1 to 99"),
+        ("[run]\nbackend = \"gppu\"\n", "line 2, `run.backend`: \"gppu\"", "did you mean \"gpu\"?"),
+        ("[run]\nbackend = 3\n", "line 2, `run.backend`: 3", "one of \"auto\", \"cpu\", \"gpu\""),
+        ("[run]\nprofile = \"papr\"\n", "a.toml, line 2, `run.profile`", "did you mean `paper`?"),
+        ("[run]\ndevice = \"pci:zz\"\n", "a.toml, line 2, `run.device`", "no PCI bus id"),
+        (
+            "[mining.cut_out]\nrequire_slower_lead = 1\n",
+            "line 2, `mining.cut_out.require_slower_lead`",
+            "true or false",
+        ),
+        ("mining = 3\n", "line 1, `mining`: this is a table, no key", "write [mining]"),
+        ("[score]\nseed = 1\nseed = 2\n", "a.toml, line 3", "duplicate key"),
+        ("[score\n", "a.toml, line 1", "lanesweep config init -"),
+    ];
+    for (text, place, hint) in files {
+        std::fs::write(dir.join("a.toml"), text).unwrap();
+        for verb in [&["study"][..], &["config", "show"]] {
+            let said = refused(dir, &[], &[verb, &["--config", "a.toml"]].concat());
+            assert!(said.contains(place) && said.contains(hint), "{text:?}: {said}");
+        }
+    }
+    let said = refused(dir, &[("LANESWEEP_RUN_BAKEND", "cpu")], &["study"]);
+    assert!(said.contains("variable LANESWEEP_RUN_BAKEND") && said.contains("LANESWEEP_RUN_BACKEND?"), "{said}");
+    let said = refused(dir, &[("LANESWEEP_SAMPLE_LEVEL", "2")], &["config", "show"]);
+    assert!(said.contains("variable LANESWEEP_SAMPLE_LEVEL: 2.0 cannot be used"), "{said}");
+    let said = refused(dir, &[], &["study", "--config", "score.sed=3"]);
+    assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
+    let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);
+    assert!(said.contains("--config score.seed=x: `x` cannot be used"), "{said}");
+    let said = refused(dir, &[], &["slurm", "--config", "a.toml", "--array", "2", "--out", "x", "--", "study"]);
+    assert!(said.contains("give it to the run"), "{said}");
+    assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
+}
+
+#[test]
+fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let device = [("LANESWEEP_RUN_DEVICE", "no such device"), ("LANESWEEP_GENERATOR_RECORDINGS", "1")];
+    let gpu = [("LANESWEEP_RUN_BACKEND", "gpu"), ("LANESWEEP_GENERATOR_RECORDINGS", "1")];
+    good(dir, &device, &["-q", "study", "--dry-run", "--backend", "cpu"]);
+    good(dir, &gpu, &["-q", "study", "--dry-run", "--reference"]);
+    refused(dir, &device, &["-q", "study", "--dry-run"]);
+    // A plan's lanes are decided; what the environment says of them was there when it was made.
+    let small = [("LANESWEEP_GENERATOR_RECORDINGS", "1"), ("LANESWEEP_RUN_BACKEND", "cpu")];
+    good(dir, &small, &["-q", "study", "--plan-only", "--out", "run"]);
+    good(dir, &small, &["-q", "study", "--plan", "run/plan.json", "--dry-run"]);
+    let said = refused(dir, &small, &["study", "--plan", "run/plan.json", "--config", "score.seed=3"]);
+    assert!(said.contains("`score.seed` is decided by the plan"), "{said}");
+}
+
+#[test]
+fn the_default_file_is_written_once_and_sets_what_is_so_anyway() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    assert!(good(dir, &[], &["config", "init"]).contains("--config lanesweep.toml"));
+    let written = std::fs::read_to_string(dir.join("lanesweep.toml")).unwrap();
+    assert_eq!(written, good(dir, &[], &["config", "init", "-"]));
+    assert_eq!(written, include_str!("../../configs/default.toml"));
+    std::fs::write(dir.join("lanesweep.toml"), "[score]\nseed = 1\n").unwrap();
+    assert!(refused(dir, &[], &["config", "init"]).contains("is not overwritten"));
+    assert_eq!(std::fs::read_to_string(dir.join("lanesweep.toml")).unwrap(), "[score]\nseed = 1\n");
+    assert_eq!(good(dir, &[], &["config", "check", "lanesweep.toml"]).lines().count(), 1);
+    good(dir, &[], &["config", "init", "new/other.toml"]);
+    // What is shown as a file sets the same again.
+    let args = ["config", "show", "--format", "toml", "--config", "mining.cut_in.max_thw_s=1.5", "--threads", "1"];
+    let toml = good(dir, &[], &args);
+    std::fs::write(dir.join("again.toml"), &toml).unwrap();
+    assert_eq!(toml, good(dir, &[], &["config", "show", "--format", "toml", "--config", "again.toml"]));
+    assert!(
+        toml.contains("[run]\nthreads = 1\n") && toml.contains("[mining.cut_in]\nmin_duration_s = 0.1\n"),
+        "{toml}"
+    );
+}
+
+#[test]
+fn the_schema_has_every_key_with_a_default_in_its_own_range() {
+    let dir = tempfile::tempdir().unwrap();
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema"])).unwrap();
+    let mut leaves = BTreeSet::new();
+    walk(&schema, "", &mut |name, leaf| {
+        let within = |limit: &str, fits: &dyn Fn(f64, f64) -> bool| {
+            let pair = leaf["default"].as_f64().zip(leaf[limit].as_f64());
+            assert!(pair.is_none_or(|(value, limit)| fits(value, limit)), "{name}: {leaf}");
+        };
+        within("minimum", &|value, limit| value >= limit);
+        within("maximum", &|value, limit| value <= limit);
+        within("exclusiveMinimum", &|value, limit| value > limit);
+        within("exclusiveMaximum", &|value, limit| value < limit);
+        assert!(leaf["description"].as_str().is_some_and(|text| !text.contains("[`")), "{name}: {leaf}");
+        leaves.insert(name.to_owned());
+    });
+    let shown: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "show", "--format", "json"])).unwrap();
+    let keys = shown.as_array().unwrap().iter().map(|one| one["key"].as_str().unwrap().to_owned());
+    assert_eq!(leaves, keys.collect());
+    assert_eq!(schema["additionalProperties"], false);
+    // Every profile that ships fits the schema of profiles: its keys are the schema's.
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema", "profile"])).unwrap();
+    let mut leaves = BTreeSet::new();
+    walk(&schema, "", &mut |name, _| {
+        leaves.insert(name.to_owned());
+    });
+    let paper: toml::Table = toml::from_str(include_str!("../../configs/profiles/paper.toml")).unwrap();
+    for (table, inner) in &paper {
+        for key in inner.as_table().into_iter().flat_map(|inner| inner.keys()) {
+            assert!(leaves.contains(&format!("{table}.{key}")), "{table}.{key}");
+        }
+    }
+}
+
+/// The part of JSON Schema that [`lanesweep config schema profile`] uses.
+fn fits(value: &Value, schema: &Value, at: &str) {
+    match (schema["type"].as_str(), value) {
+        (Some("object"), Value::Object(fields)) => {
+            for key in schema["required"].as_array().into_iter().flatten() {
+                assert!(fields.contains_key(key.as_str().unwrap()), "{at} has no {key}");
+            }
+            for (key, value) in fields {
+                let property = &schema["properties"][key];
+                assert!(property.is_object(), "{at}.{key} is not in the schema");
+                fits(value, property, &format!("{at}.{key}"));
+            }
+        }
+        (Some("array"), Value::Array(items)) => items.iter().for_each(|item| fits(item, &schema["items"], at)),
+        (Some("string"), Value::String(_)) | (Some("boolean"), Value::Bool(_)) => {}
+        (Some("number" | "integer"), Value::Number(number)) => {
+            let number = number.as_f64().unwrap();
+            assert!(schema["minimum"].as_f64().is_none_or(|least| number >= least), "{at}: {number}");
+            assert!(schema["maximum"].as_f64().is_none_or(|most| number <= most), "{at}: {number}");
+        }
+        (kind, value) => panic!("{at} is {value}, the schema says {kind:?}"),
+    }
+}
+
+#[test]
+fn the_profiles_that_ship_fit_the_schema_of_profiles() {
+    let dir = tempfile::tempdir().unwrap();
+    let schema: Value = serde_json::from_str(&good(dir.path(), &[], &["config", "schema", "profile"])).unwrap();
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/profiles");
+    let mut count = 0;
+    for file in std::fs::read_dir(folder).unwrap().flatten() {
+        let profile: Value = toml::from_str(&std::fs::read_to_string(file.path()).unwrap()).unwrap();
+        fits(&profile, &schema, &file.file_name().to_string_lossy());
+        // And one that lacks a key does not.
+        let mut less = profile.clone();
+        less["cchdm"].as_object_mut().unwrap().remove("delay_s");
+        assert!(std::panic::catch_unwind(|| fits(&less, &schema, "")).is_err());
+        count += 1;
+    }
+    assert!(count >= 4);
+}
+
+fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        let name = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        if property["properties"].is_object() { walk(property, &name, each) } else { each(&name, property) }
+    }
+}
+
+#[test]
+fn a_dry_run_counts_the_lanes_of_the_run_and_writes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let lanes = |text: &str| {
+        let line = text.lines().find_map(|line| line.strip_prefix("Lanes   ")).unwrap_or_else(|| panic!("{text}"));
+        assert!(text.contains("Memory  ") && text.contains("Time    "), "{text}");
+        line.replace(',', "").replace("at most ", "").parse::<u64>().unwrap()
+    };
+    let small = [("LANESWEEP_GENERATOR_RECORDINGS", "2"), ("LANESWEEP_RUN_BACKEND", "cpu")];
+    let study = lanes(&good(dir, &small, &["-q", "study", "--dry-run"]));
+    assert_eq!(std::fs::read_dir(dir).unwrap().count(), 0, "nothing was written");
+    let fit = ["-q", "fit", "--category", "cut-in", "--parameterization", "2", "--no-comparison", "--out", "d.json"];
+    good(dir, &small, &fit);
+    let files = || std::fs::read_dir(dir).unwrap().count();
+    let before = files();
+    let compare = ["-q", "compare", "--dry-run", "--categories", "lvd", "--parameterization", "i", "--samples", "1000"];
+    let compare = lanes(&good(dir, &small, &compare));
+    assert_eq!(compare % (10 * ModelId::ALL.len() as u64), 0);
+    let sample = |args: &[&str]| lanes(&good(dir, &small, &[&["-q", "sample", "d.json", "--dry-run"], args].concat()));
+    assert_eq!(sample(&["--samples", "1000000000", "--models", "FSM,RSS"]), 20_000_000_000);
+    assert_eq!(sample(&["--estimator", "subset", "--thw", "0.6", "--models", "FSM"]), 24_000);
+    let map = ["-q", "map", "cut-in", "--preset", "jrc", "--dry-run"];
+    assert_eq!(lanes(&good(dir, &small, &map)), 29_970 * ModelId::ALL.len() as u64);
+    assert_eq!(files(), before, "nothing was written");
+    good(dir, &small, &["-q", "study", "--out", "run"]);
+    assert_eq!(json(&dir.join("run/run.json"))["lanes"], study);
+}
+
+#[test]
+fn the_variables_of_tests_and_ci_are_known() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let known: BTreeSet<String> = lanesweep::cli::settings::Key::all()
+        .iter()
+        .map(|key| lanesweep::cli::settings::variable_of(&key.name))
+        .chain(lanesweep::cli::settings::TEST_VARIABLES.map(str::to_owned))
+        .chain([lanesweep::cli::settings::FILE_VARIABLE.to_owned()])
+        .collect();
+    let programs = std::fs::read_dir(root.join("tests")).unwrap().map(|entry| entry.unwrap().path());
+    let others = [".ci", "benches", "deploy"].map(|folder| root.join(folder));
+    for folder in programs.chain(others) {
+        let Ok(files) = std::fs::read_dir(folder) else { continue };
+        for path in files.map(|file| file.unwrap().path()).filter(|path| !path.ends_with("configuration.rs")) {
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            for (at, prefix) in text.match_indices("LANESWEEP_") {
+                let rest = text[at + prefix.len()..].split(|c: char| !(c.is_ascii_uppercase() || c == '_')).next();
+                let name = format!("{prefix}{}", rest.unwrap_or_default());
+                assert!(known.contains(&name), "{}: add {name} to settings::TEST_VARIABLES", path.display());
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Every example that `--help` ends with, run as it stands there, in one folder; only sizes are smaller.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use crate::common::{shared, skipped};
+
+fn run(dir: &Path, line: &str) -> Output {
+    let args = line.split_whitespace().skip(1);
+    Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .current_dir(dir)
+        // Help in one line per example.
+        .env("COLUMNS", "1000")
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn told(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+/// The verbs of the program, or those of one of its verbs.
+fn verbs_of(dir: &Path, of: &str) -> Vec<String> {
+    let help = String::from_utf8(run(dir, &format!("lanesweep {of} --help")).stdout).unwrap();
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let verbs = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    verbs.filter_map(|line| line.split_whitespace().next()).filter(|v| *v != "help").map(str::to_owned).collect()
+}
+
+/// The verbs, those first whose results others read, and after them the verbs that they have.
+fn verbs(dir: &Path) -> Vec<String> {
+    let mut verbs = verbs_of(dir, "");
+    let first = ["synth", "mine", "study", "fit"];
+    verbs.sort_by_key(|verb| first.iter().position(|f| f == verb).unwrap_or(first.len()));
+    let inner =
+        verbs.iter().flat_map(|verb| verbs_of(dir, verb).into_iter().map(move |inner| format!("{verb} {inner}")));
+    let inner: Vec<String> = inner.collect();
+    assert!(verbs.len() >= 15 && inner.len() >= 5, "{verbs:?} {inner:?}");
+    verbs.into_iter().chain(inner).collect()
+}
+
+fn examples(dir: &Path, verb: &str) -> Vec<String> {
+    let help = String::from_utf8(run(dir, &format!("lanesweep {verb} --help")).stdout).unwrap();
+    let (_, examples) = help.split_once("\nExample").unwrap_or_else(|| panic!("{verb} ends with no example"));
+    examples.lines().map(str::trim).filter(|line| line.starts_with("lanesweep ")).map(str::to_owned).collect()
+}
+
+/// What a shell would do with the output is the shell's.
+fn without_redirection(line: String) -> String {
+    line.split(" > ").next().unwrap_or_default().to_owned()
+}
+
+/// The same command on less: fewer samples, lanes and comparisons; nothing that the example shows is left out.
+fn smaller(line: &str) -> String {
+    let mut words: Vec<&str> = line.split_whitespace().collect();
+    if let Some(at) = words.iter().position(|word| *word == "--samples") {
+        words[at + 1] = "300";
+    }
+    match words[1] {
+        "compare" if !words.contains(&"--samples") => words.extend(["--samples", "50"]),
+        "fit" => words.extend(["--no-comparison", "--valid-draws", "1000"]),
+        // One lane is little already.
+        "verify" if !words.contains(&"--lane") => {
+            words.retain(|word| !matches!(*word, "--lanes" | "20000"));
+            words.extend(["--lanes", "200", "--threshold-units", "1", "--synth-recordings", "1"]);
+        }
+        _ => {}
+    }
+    words.join(" ")
+}
+
+#[test]
+fn every_example_of_the_help_runs() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let mut ran = BTreeSet::new();
+    for verb in verbs(dir) {
+        for example in examples(dir, &verb).into_iter().map(without_redirection) {
+            if ran.contains(&example) {
+                continue;
+            }
+            // What examples name and no other example leaves behind.
+            for name in ["cut-in-1.json", "cut-in-2.json"] {
+                let fitted = dir.join("densities").join(name);
+                if fitted.exists() {
+                    std::fs::copy(fitted, dir.join(name)).unwrap();
+                }
+            }
+            for name in ["cut-in-stochastic.xosc", "cut-in-deterministic.xosc"] {
+                let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name);
+                std::fs::copy(shipped, dir.join(name)).unwrap();
+            }
+            std::fs::write(dir.join("study.toml"), "[score]\nbootstrap_draws = 100\n").unwrap();
+            if verb == "conformance" {
+                let Some(tables) = shared("golden/jrc") else { continue };
+                for name in ["cutin.csv", "lvd.csv", "cutout.csv", "functions.csv"] {
+                    std::fs::copy(tables.join(name), dir.join(name)).unwrap();
+                }
+            }
+            let output = run(dir, &smaller(&example));
+            // Without a GPU `verify` says so.
+            let is_without_device = verb == "verify" && output.status.code() == Some(7);
+            if is_without_device {
+                skipped(&format!("{example}: no such device here"));
+            }
+            assert!(output.status.success() || is_without_device, "{example}: {}", told(&output));
+            ran.insert(example);
+        }
+    }
+    assert!(ran.len() >= 30, "{ran:?}");
+}

@@ -1,0 +1,17 @@
+//! The program as its users meet it, the book, and the repository itself.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod adding_a_model;
+mod book;
+mod command_line;
+mod configuration;
+mod help_examples;
+mod messages;
+mod report_figures;
+mod report_page;
+mod report_width;
+mod shell;
+mod slurm_script;
+mod supply_chain;

@@ -1,0 +1,424 @@
+//! A run that is killed (SIGKILL, as a power cut or the system's memory killer would) at any moment leaves the files of
+//! one run beside a record, or no record; started again it ends as if undisturbed. Two processes on one folder: each ends
+//! as if alone or is refused. Every verb that writes a folder, from nothing and over the result of a run with other
+//! flags. One kill per verb and a ninth of the pairs by default; the long form is
+//! `LANESWEEP_KILLS=200 cargo test --release --test runs kills:: -- --nocapture`.
+#![cfg(unix)]
+
+use crate::common::page;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Names and content of a folder's results.
+type Files = BTreeMap<String, Vec<u8>>;
+
+/// A verb at work on the folder `out`.
+struct Verb {
+    name: &'static str,
+    /// With it, the files beside it are those of one run; none where each file is a result by itself.
+    record: Option<&'static str>,
+    /// Makes the result that is there before, with other flags; a data set is not replaced.
+    older: Option<&'static str>,
+    run: &'static str,
+}
+
+const fn verb(
+    name: &'static str,
+    record: Option<&'static str>,
+    older: Option<&'static str>,
+    run: &'static str,
+) -> Verb {
+    Verb { name, record, older, run }
+}
+
+const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
+
+const VERBS: [Verb; 16] = [
+    verb(
+        "study",
+        Some("run.json"),
+        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --lanes out/lanes.csv --out out"),
+        "study --plan plan/plan.json --threads 1 --out out",
+    ),
+    verb(
+        "study --lanes",
+        Some("run.json"),
+        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
+        "study --synth-recordings 1 --categories cut-in --lanes rows/lanes.csv --out out",
+    ),
+    verb(
+        "merge",
+        Some("run.json"),
+        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
+        "merge out",
+    ),
+    verb(
+        "sample mc",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --threads 1 --samples 400000 --thw 0.6 --models FSM,CCHDM --out out",
+    ),
+    verb(
+        "sample --rows",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --samples 20000 --thw 1.0 --models FSM --map none --rows rows/rows.csv --out out",
+    ),
+    verb(
+        "sample of a proposal",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --threads 1 --estimator is --proposal pilot/proposal-RSS.json --thw 0.6 --models RSS,FSM --samples 100000 --out out",
+    ),
+    verb(
+        "sample is",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --estimator is --pilot 2000 --samples 10000 --thw 0.6 --models RSS,FSM --out out",
+    ),
+    verb(
+        "sample ce",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --estimator ce --samples 5000 --thw 0.6 --models FSM --out out",
+    ),
+    verb(
+        "sample subset",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample d.json --estimator subset --samples 500 --thw 0.6 --models FSM --out out",
+    ),
+    verb(
+        "sample --distribution",
+        Some("estimate.json"),
+        Some(SAMPLE),
+        "sample --distribution d.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh --samples 2000 --models FSM --out out",
+    ),
+    verb(
+        "map",
+        Some("map.json"),
+        Some(
+            "map cut-in --x gap_m=1..20/1 --y lateral_speed_mps=0.5,1 --set ego_speed_kmh=90 --set other_speed_kmh=50 --models FSM,RSS --against RSS --out out",
+        ),
+        "map lvd --x deceleration_mps2=1..9/0.5 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --out out",
+    ),
+    verb(
+        "compare",
+        Some("compare.json"),
+        Some("compare --synth-recordings 1 --categories cut-in --parameterization 1 --samples 50 --thw 1.0 --out out"),
+        "compare --synth-recordings 2 --categories lvd --parameterization i --samples 300 --thw 1.0,0.6 --out out",
+    ),
+    verb(
+        "fit",
+        None,
+        Some(
+            "fit --synth-recordings 2 --category cut-in --parameterization 2 --no-comparison --valid-draws 999 --out out",
+        ),
+        "fit --synth-recordings 3 --category cut-in --no-comparison --valid-draws 1000 --out out",
+    ),
+    verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --synth-duration 30"),
+    verb(
+        "export",
+        Some("index.csv"),
+        Some(
+            "export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1 --out out",
+        ),
+        "export xosc --from old-study --worst 3 --ego external --out out",
+    ),
+    verb(
+        "slurm",
+        Some("submit.sh"),
+        Some("slurm --array 3 --out result --scripts out -- study --scenarios s.jsonl"),
+        "slurm --array 2 --out result --scripts out -- sample d.json",
+    ),
+];
+
+fn program(dir: &Path, line: &str) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .current_dir(dir)
+        .env("NO_COLOR", "1")
+        .args(["-q"])
+        .args(line.split(' '))
+        .args(if line.starts_with("study --plan") || line.starts_with("sample") || line.starts_with("map") {
+            &["--backend", "cpu"][..]
+        } else {
+            &[]
+        })
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn ended(child: Child) -> (i32, String) {
+    let Output { status, stderr, .. } = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+    (status.code().unwrap_or(-1), said)
+}
+
+fn done(dir: &Path, line: &str) {
+    let (code, said) = ended(program(dir, line));
+    assert_eq!(code, 0, "{line}: {said}");
+}
+
+fn names(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    entries.map(|entry| entry.file_name().into_string().unwrap()).collect()
+}
+
+/// Not a result: plan and parts, and what is there only while a run is at work.
+fn is_beside(name: &str) -> bool {
+    let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
+    is_of_work || name == "pilot.json" || name == "plan.json" || name == "unfinished.json" || name.starts_with("part-")
+}
+
+fn files(dir: &Path) -> Files {
+    let results = names(dir).into_iter().filter(|name| !is_beside(name));
+    results.map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
+}
+
+/// Without what belongs to the machine and the hour.
+fn settled(files: Files) -> Files {
+    let settle = |(name, mut content): (String, Vec<u8>)| {
+        if ["run.json", "estimate.json", "map.json", "compare.json"].contains(&name.as_str()) {
+            let mut record: serde_json::Value = serde_json::from_slice(&content).unwrap();
+            for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
+                record.as_object_mut().unwrap().remove(host);
+            }
+            content = record.to_string().into_bytes();
+        }
+        if name == "report.html" {
+            content = page::without_host(&String::from_utf8(content).unwrap()).into_bytes();
+        }
+        (name, content)
+    };
+    files.into_iter().map(settle).collect()
+}
+
+fn same(found: &Files, expected: &Files, what: &str) {
+    assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>(), "{what}");
+    for (name, content) in found {
+        assert!(content == &expected[name], "{what}: {name} differs");
+    }
+}
+
+/// `out` as a copy of another folder, or empty.
+fn put(dir: &Path, from: Option<&str>) {
+    for made in ["out", "rows"] {
+        let _ = std::fs::remove_dir_all(dir.join(made));
+        std::fs::create_dir(dir.join(made)).unwrap();
+    }
+    for name in from.map_or(Vec::new(), |from| names(&dir.join(from))) {
+        std::fs::copy(dir.join(from.unwrap()).join(&name), dir.join("out").join(&name)).unwrap();
+    }
+}
+
+/// What the verbs read.
+fn furnish(dir: &Path) {
+    let fit = "fit --synth-recordings 2 --category cut-in --parameterization 2 --no-comparison";
+    done(dir, &format!("{fit} --out d.json"));
+    let plan = "study --synth-recordings 1 --reference --dt 0.02 --plan-only";
+    done(dir, &format!("{plan} --out plan"));
+    done(dir, &format!("{plan} --out parts"));
+    done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
+    done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
+    done(dir, "sample d.json --estimator is --pilot 2000 --samples 100 --out pilot --thw 0.6 --models RSS");
+    done(dir, "study --synth-recordings 1 --synth-duration 200 --categories cut-in --out old-study");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples");
+    std::fs::copy(examples.join("cut-in-stochastic.xosc"), dir.join("d.xosc")).unwrap();
+}
+
+/// Where `out` starts from: parts for a merge, the older result.
+fn base(dir: &Path, verb: &Verb, is_over_older: bool) -> Option<String> {
+    let parts = (verb.name == "merge").then_some("parts");
+    let older = verb.older.filter(|_| is_over_older)?;
+    let name = format!("older-{}", verb.name);
+    if !dir.join(&name).exists() {
+        put(dir, parts);
+        done(dir, older);
+        std::fs::rename(dir.join("out"), dir.join(&name)).unwrap();
+    }
+    Some(name)
+}
+
+/// Nothing that a killed process left may stay.
+fn assert_tidy(dir: &Path, what: &str) {
+    for folder in ["out", "rows"] {
+        let left: Vec<String> = names(&dir.join(folder)).into_iter().filter(|name| name.starts_with('.')).collect();
+        assert!(left.is_empty(), "{what}: {left:?} in {folder}");
+    }
+}
+
+#[test]
+fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
+    let kills: usize = std::env::var("LANESWEEP_KILLS").map_or(VERBS.len(), |text| text.parse().unwrap());
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    furnish(dir);
+    let mut undisturbed: BTreeMap<(usize, bool), (Duration, Files)> = BTreeMap::new();
+    let (mut alive, mut continued, mut switching, mut recorded) = (0, 0, 0, 0);
+    for kill in 0..kills {
+        let (at, round) = (kill % VERBS.len(), kill / VERBS.len());
+        let verb = &VERBS[at];
+        let is_over_older = verb.older.is_some() && (at + round / 2) % 2 == 0;
+        let parts = (verb.name == "merge").then(|| "parts".to_owned());
+        let from = base(dir, verb, is_over_older).or(parts);
+        let what = format!("kill {kill} of {}, over an older run: {is_over_older}", verb.name);
+        let (took, expected) = undisturbed.entry((at, is_over_older)).or_insert_with(|| {
+            put(dir, from.as_deref());
+            let started = Instant::now();
+            done(dir, verb.run);
+            (started.elapsed(), settled(files(&dir.join("out"))))
+        });
+        put(dir, from.as_deref());
+        let before = files(&dir.join("out"));
+        let mut child = program(dir, verb.run);
+        if round % 2 == 0 && verb.record.is_some() {
+            // As soon as the files get their names, or shortly after.
+            let started = Instant::now();
+            let list = dir.join("out/unfinished.json");
+            while !list.exists() && child.try_wait().unwrap().is_none() && started.elapsed() < Duration::from_secs(60) {
+            }
+            std::thread::sleep(Duration::from_micros(kill as u64 * 377 % 3000));
+        } else {
+            // A low-discrepancy sequence of moments over the whole run.
+            let share = (kill as f64 * 0.618_033_988_749_895 + 0.5).fract();
+            std::thread::sleep(Duration::from_secs_f64(took.as_secs_f64() * share));
+        }
+        alive += usize::from(child.try_wait().unwrap().is_none());
+        // Has no effect where it has ended already.
+        child.kill().unwrap();
+        child.wait().unwrap();
+
+        let out = dir.join("out");
+        continued += usize::from(names(&out).iter().any(|name| name.ends_with(".journal")));
+        let found = files(&out);
+        match verb.record {
+            Some(record) if found.contains_key(record) => {
+                recorded += 1;
+                if found != before {
+                    same(&settled(found), expected, &what);
+                }
+            }
+            Some(_) => switching += usize::from(out.join("unfinished.json").exists()),
+            None => {
+                for (name, content) in &found {
+                    assert!(before.get(name) == Some(content) || expected.get(name) == Some(content), "{what}: {name}");
+                }
+            }
+        }
+        if verb.name == "synth" && !out.join("SYNTHETIC.txt").exists() {
+            for reader in ["mine out", "study out --out elsewhere"] {
+                let (code, said) = ended(program(dir, reader));
+                assert_eq!(code, 3, "{what}: {reader}: {said}");
+                assert!(said.contains("synth") || said.contains("no recording"), "{what}: {said}");
+            }
+        }
+        let is_whole_data = verb.name == "synth" && out.join("SYNTHETIC.txt").exists();
+        if !is_whole_data {
+            done(dir, verb.run);
+        }
+        same(&settled(files(&out)), expected, &what);
+        assert!(!out.join("pilot.json").exists(), "{what}: the run has ended, its pilot stays");
+        assert_tidy(dir, &what);
+        if at + 1 == VERBS.len() || kill + 1 == kills {
+            println!(
+                "{} kills of {} verbs: {alive} while running, {continued} with a journal, {switching} while files got \
+                 their names, {recorded} with a record; all results identical",
+                kill + 1,
+                VERBS.len()
+            );
+        }
+    }
+    assert!(alive > 0, "no run was killed before its end");
+}
+
+#[test]
+fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    for (data, seed) in [("a", 1), ("b", 2)] {
+        done(dir, &format!("synth {data} --synth-recordings 1 --synth-duration 60 --synth-seed {seed}"));
+    }
+    put(dir, None);
+    let mine = |data: &str| format!("mine {data} -o out/s.jsonl");
+    let expected = ["a", "b"].map(|data| {
+        done(dir, &mine(data));
+        files(&dir.join("out"))
+    });
+    for kill in 0..4 {
+        let (data, new, old) = if kill % 2 == 0 { ("a", 0, 1) } else { ("b", 1, 0) };
+        let mut child = program(dir, &mine(data));
+        while names(&dir.join("out")).iter().all(|name| !name.ends_with(".part")) && child.try_wait().unwrap().is_none()
+        {
+        }
+        std::thread::sleep(Duration::from_micros(kill * 700));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let found = files(&dir.join("out"));
+        if found.contains_key("s.exposure.json") {
+            assert!(found == expected[new] || found == expected[old], "kill {kill}: {:?}", found.keys());
+        }
+        done(dir, &mine(data));
+        same(&files(&dir.join("out")), &expected[new], "mine");
+        assert_tidy(dir, "mine");
+    }
+}
+
+#[test]
+fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
+    let every = if std::env::var_os("LANESWEEP_KILLS").is_some() { 1 } else { 9 };
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    furnish(dir);
+    let alone: Vec<Files> = VERBS
+        .iter()
+        .map(|verb| {
+            put(dir, Some("parts"));
+            done(dir, verb.run);
+            settled(files(&dir.join("out")))
+        })
+        .collect();
+    let (mut pairs, mut busy, mut refused) = (0, 0, 0);
+    let all = (0..VERBS.len()).flat_map(|a| (a..VERBS.len()).map(move |b| [a, b]));
+    for at in all.step_by(every) {
+        put(dir, Some("parts"));
+        let children = at.map(|k| program(dir, VERBS[k].run));
+        let codes = children.map(ended);
+        let what = format!("{} and {}: {codes:?}", VERBS[at[0]].name, VERBS[at[1]].name);
+        for (code, said) in &codes {
+            match code {
+                0 => {}
+                75 => {
+                    assert!(said.contains("another lanesweep process"), "{what}");
+                    busy += 1;
+                }
+                // It came after the other, whose result it would have mixed with its own.
+                2 => {
+                    assert!(said.contains("results of another verb") || said.contains("already holds"), "{what}");
+                    refused += 1;
+                }
+                _ => panic!("{what}"),
+            }
+        }
+        let ended: Vec<usize> = (0..2).filter(|&k| codes[k].0 == 0).map(|k| at[k]).collect();
+        assert!(!ended.is_empty(), "{what}");
+        let found = settled(files(&dir.join("out")));
+        let is_one = |k: usize| found == alone[k];
+        let both = || ended.iter().flat_map(|&k| alone[k].clone()).collect::<Files>();
+        let is_replaced = ended.len() == 2 && VERBS[at[0]].record == VERBS[at[1]].record;
+        if is_replaced && VERBS[at[0]].record.is_some() {
+            assert!(is_one(at[0]) || is_one(at[1]), "{what}: {:?}", found.keys());
+        } else {
+            same(&found, &both(), &what);
+        }
+        assert_tidy(dir, &what);
+        pairs += 1;
+    }
+    println!(
+        "{pairs} pairs: {busy} told that the other is at work, {refused} that the folder is the other's; none mixed"
+    );
+}

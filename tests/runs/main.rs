@@ -1,0 +1,15 @@
+//! Whole runs: parts, interruptions, kills, faults of the machine, repeats.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod compare;
+mod faults;
+mod interrupted;
+mod kills;
+mod map;
+mod nothing_is_lost;
+mod parts;
+mod reruns;
+mod sampling;
+mod strange_files;

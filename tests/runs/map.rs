@@ -1,0 +1,516 @@
+//! Maps: a grid's arithmetic, its cells against single lanes, and what is known of the JRC's grids.
+
+use crate::common::page;
+
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::Command;
+use lanesweep::engine::{Constants, CpuBackend, Headway, LaneCase, Silent, Start, Verdicts};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::grid::presets;
+use lanesweep::run::grid::{
+    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapBackend, Parameter, Quantity, boundary,
+    count,
+};
+use lanesweep::scenario::{Category, Tables};
+use proptest::prelude::*;
+
+fn axis(category: Category, text: &str) -> GridAxis {
+    GridAxis::parse(category, text, "--x").unwrap()
+}
+
+fn value(category: Category, key: &str, value: f64) -> (&'static Parameter, f64) {
+    (Parameter::find(category, key, "--set").unwrap(), value)
+}
+
+fn parts(category: Category, x: &str, y: &str) -> GridParts {
+    GridParts {
+        name: category.key().to_owned(),
+        category,
+        x: axis(category, x),
+        y: axis(category, y),
+        panel_axes: Vec::new(),
+        fixed: Vec::new(),
+        style: CaseStyle::Plain,
+        native_gap: false,
+        closing_only: false,
+        panel_rows: None,
+    }
+}
+
+fn profile(name: &str) -> Profile {
+    Profile::load(name).unwrap()
+}
+
+fn swept(plan: &GridPlan) -> GridMap {
+    let backend = CpuBackend::lane_arithmetic();
+    GridMap::sweep(plan, MapBackend { backend: &backend, fallback: None, recheck_seed: None }).unwrap().0
+}
+
+fn percent(map: &GridMap, model: usize) -> f64 {
+    100.0 * map.failures(model, Criterion::Collision) as f64 / map.cell_count() as f64
+}
+
+fn lanesweep(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lanesweep")).env("NO_COLOR", "1").args(args).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    // The drawing breaks long lines.
+    String::from_utf8_lossy(&output.stderr).replace('│', "").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_range_holds_its_ends_and_its_steps(from in 0_u32..500, steps in 0_u32..200, step in 1_u32..50) {
+        let (from, step) = (f64::from(from) / 10.0, f64::from(step) / 10.0);
+        let to = from + f64::from(steps) * step;
+        let axis = axis(Category::CutIn, &format!("gap_m={from}..{to}/{step}"));
+        prop_assert_eq!(axis.len(), steps as usize + 1);
+        prop_assert_eq!(axis.values[0], from);
+        prop_assert!((axis.values[steps as usize] - to).abs() < 1e-9);
+        // Decimals, as they would be typed.
+        prop_assert!(axis.values.iter().all(|v| v.to_string().len() <= 6));
+        let edges = axis.edges();
+        prop_assert_eq!(edges.len(), axis.len() + 1);
+        prop_assert!(axis.values.iter().enumerate().all(|(k, v)| edges[k] < *v && *v < edges[k + 1]));
+    }
+
+    #[test]
+    fn a_cell_and_its_places_are_one_to_one(nx in 1_u32..9, ny in 1_u32..7, egos in 1_u32..5, others in 1_u32..4) {
+        let category = Category::CutIn;
+        let mut parts = parts(
+            category,
+            &format!("gap_m=1..{nx}/1"),
+            &format!("lateral_speed_mps=1..{ny}/1"),
+        );
+        parts.panel_axes = vec![
+            axis(category, &format!("ego_speed_mps=21..{}/1", 20 + egos)),
+            axis(category, &format!("other_speed_mps=11..{}/1", 10 + others)),
+        ];
+        let grid = Grid::new(parts).unwrap();
+        prop_assert_eq!(grid.cell_count(), (nx * ny * egos * others) as usize);
+        for cell in 0..grid.cell_count() {
+            let (panel, i, j) = grid.places(cell);
+            prop_assert_eq!(grid.cell(panel, i, j), cell);
+            let point = grid.point(cell);
+            prop_assert_eq!(point.get(Quantity::Gap), Some(grid.x().values[i]));
+            prop_assert_eq!(point.get(Quantity::LateralSpeed), Some(grid.y().values[j]));
+            prop_assert_eq!(point.get(Quantity::EgoSpeed), Some(grid.panels()[panel][0]));
+            prop_assert_eq!(point.get(Quantity::OtherSpeed), Some(grid.panels()[panel][1]));
+        }
+    }
+
+    #[test]
+    fn a_boundary_has_a_line_between_two_neighbours_exactly_where_they_differ(kinds in prop::collection::vec(0_u8..3, 30)) {
+        let grid = Grid::new(GridParts {
+            fixed: vec![value(Category::Lvd, "thw_s", 1.0)],
+            ..parts(Category::Lvd, "deceleration_mps2=1..6/1", "ego_speed_mps=11..15/1")
+        }).unwrap();
+        let kind = |i: usize, j: usize| usize::from(kinds[j * 6 + i]);
+        let lines = boundary(&grid, &kind);
+        let length: usize = lines.iter().map(|((a, b), (c, d))| (c - a) + (d - b)).sum();
+        let across = (0..5).flat_map(|j| (1..6).map(move |i| (i, j))).filter(|&(i, j)| kind(i - 1, j) != kind(i, j));
+        let up = (1..5).flat_map(|j| (0..6).map(move |i| (i, j))).filter(|&(i, j)| kind(i, j - 1) != kind(i, j));
+        prop_assert_eq!(length, across.count() + up.count());
+    }
+}
+
+/// One lane of a cell by itself, in the lane arithmetic: the case, encoded alone, from its gap or headway.
+fn alone(grid: &Grid, cell: usize, model: ModelId, profile: &Profile) -> Verdicts {
+    let mut tables = Tables::default();
+    let case = LaneCase::encode(&grid.case(cell, profile).unwrap(), profile, &mut tables);
+    let start: Start<f32> = match grid.point(cell).get(Quantity::Thw) {
+        Some(thw_s) => Headway::ThwS(thw_s).start(),
+        None => Headway::GapM(grid.gap_m(cell, model, profile)).start(),
+    };
+    let constants = Constants::<f32>::resolve(profile, grid.category());
+    constants.run(model, &case.cast(), &tables.cast(), start, &mut Silent).verdicts
+}
+
+#[test]
+fn every_cell_is_the_lane_that_its_numbers_say() {
+    let (cut_in, cut_out, lvd) = (Category::CutIn, Category::CutOut, Category::Lvd);
+    let speeds = |category: Category| value(category, "ego_speed_kmh", 100.0);
+    let grids = [
+        // The gap across, upwards, in the panels and fixed; headways likewise.
+        GridParts {
+            fixed: vec![speeds(cut_in), value(cut_in, "other_speed_kmh", 60.0)],
+            ..parts(cut_in, "gap_m=2..50/4", "lateral_speed_mps=0..1.5/0.3")
+        },
+        GridParts {
+            panel_axes: vec![axis(cut_in, "ego_speed_mps=20,30")],
+            fixed: vec![value(cut_in, "other_speed_mps", 15.0)],
+            ..parts(cut_in, "lateral_speed_mps=0.3..1.5/0.3", "thw_s=0.2..2/0.2")
+        },
+        GridParts {
+            panel_axes: vec![axis(cut_out, "gap_m=10,30")],
+            fixed: vec![speeds(cut_out)],
+            ..parts(cut_out, "ahead_gap_m=5..95/10", "lateral_speed_mps=0.5..2/0.5")
+        },
+        GridParts {
+            fixed: vec![value(lvd, "thw_s", 0.8), value(lvd, "end_speed_kmh", 20.0)],
+            ..parts(lvd, "deceleration_mps2=0..9/1", "ego_speed_kmh=30..130/20")
+        },
+        GridParts { native_gap: true, ..parts(lvd, "deceleration_mps2=5..10/0.5", "ego_speed_kmh=30..130/20") },
+    ];
+    for parts in grids {
+        let grid = Grid::new(parts).unwrap();
+        for name in ["paper", "jrc-2021", "un-r157"] {
+            let profile = profile(name);
+            let map = swept(&GridPlan::new(grid.clone(), &profile, &ModelId::ALL).unwrap());
+            for (at, &model) in ModelId::ALL.iter().enumerate() {
+                for cell in 0..grid.cell_count() {
+                    let (ours, single) = (map.verdicts(at, cell), alone(&grid, cell, model, &profile));
+                    assert_eq!(ours, single, "{name}, {}, {:?}", model.name(), grid.values(cell));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cell_is_what_simulate_says_of_the_same_numbers() {
+    let grid = Grid::new(GridParts {
+        fixed: vec![value(Category::CutIn, "ego_speed_mps", 30.0), value(Category::CutIn, "other_speed_mps", 18.0)],
+        ..parts(Category::CutIn, "gap_m=7,21,35", "lateral_speed_mps=0.4,1.1")
+    })
+    .unwrap();
+    let map = swept(&GridPlan::new(grid.clone(), &profile("paper"), &[ModelId::Rss]).unwrap());
+    let mut failures = 0;
+    for cell in 0..grid.cell_count() {
+        let point = grid.point(cell);
+        let [gap, lateral] = [Quantity::Gap, Quantity::LateralSpeed].map(|q| point.get(q).unwrap().to_string());
+        let simulated = lanesweep(&[
+            "simulate",
+            "--category",
+            "cut-in",
+            "--model",
+            "RSS",
+            "--ego-speed",
+            "30",
+            "--speed",
+            "18",
+            "--gap",
+            &gap,
+            "--lateral-speed",
+            &lateral,
+        ]);
+        let said = stderr(&simulated);
+        for criterion in Criterion::ALL {
+            let failed = map.verdicts(0, cell).failed(criterion);
+            failures += u32::from(failed);
+            let word = if failed { "FAIL" } else { "pass" };
+            assert!(said.contains(&format!("{} {word}", criterion.label())), "gap {gap}, lateral {lateral}: {said}");
+        }
+    }
+    assert!((1..18).contains(&failures), "both outcomes must occur: {failures}");
+}
+
+#[test]
+fn the_presets_have_the_size_of_the_evidence() {
+    let jrc = profile("jrc-2021");
+    let presets: Vec<_> = Category::ALL.into_iter().flat_map(|c| presets::jrc(c, &jrc).unwrap()).collect();
+    let cells: Vec<usize> = presets.iter().map(|p| p.grid.cell_count()).collect();
+    assert_eq!(cells, [15_930, 14_040, 6_762, 209]);
+    // Of the models of the evidence: one that is added is mapped besides.
+    let of_evidence = [ModelId::Reg157, ModelId::Cchdm, ModelId::Rss, ModelId::Fsm];
+    let lanes = |preset: &presets::Preset| {
+        let models: Vec<ModelId> = preset.models.iter().copied().filter(|m| of_evidence.contains(m)).collect();
+        GridPlan::new(preset.grid.clone(), &jrc, &models).unwrap().lane_count()
+    };
+    assert_eq!(presets.iter().map(lanes).sum::<u64>(), 140_793);
+}
+
+/// The JRC's grids with every gap and lateral speed moved by much less than anything in them.
+fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
+    let shifted = |axis: &GridAxis| {
+        let by = match axis.parameter.quantity {
+            Quantity::Gap => gap_m,
+            Quantity::LateralSpeed => lateral_mps,
+            _ => 0.0,
+        };
+        GridAxis { parameter: axis.parameter, values: axis.values.iter().map(|v| (v + by).max(0.0)).collect() }
+    };
+    Grid::new(GridParts {
+        name: grid.name().to_owned(),
+        category: grid.category(),
+        x: shifted(grid.x()),
+        y: shifted(grid.y()),
+        panel_axes: grid.panel_axes().to_vec(),
+        fixed: grid.fixed().to_vec(),
+        style: grid.style(),
+        native_gap: grid.has_native_gap(),
+        closing_only: grid.category() == Category::CutIn,
+        panel_rows: None,
+    })
+    .unwrap()
+}
+
+/// The grids are of round numbers, so that vehicles meet bumper to bumper at a step exactly, or are beside one another
+/// exactly: there the rounding of a program decides, and two programs differ. What lies between the cells that fail
+/// however the numbers are moved by 0.1 mm and 0.01 mm/s, and those that fail for some such move, cannot be told.
+#[test]
+fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
+    let jrc = profile("jrc-2021");
+    let mut compared = 0;
+    for preset in [Category::CutIn, Category::Lvd].into_iter().flat_map(|c| presets::jrc(c, &jrc).unwrap()) {
+        let plan = |grid: Grid| GridPlan::new(grid, &jrc, &preset.models).unwrap();
+        let map = |grid: Grid| swept(&plan(grid));
+        let nominal = map(preset.grid.clone());
+        let moves = [(1e-4, 1e-5), (1e-4, -1e-5), (-1e-4, 1e-5), (-1e-4, -1e-5)];
+        let moved: Vec<GridMap> = if preset.grid.has_native_gap() {
+            // A distance that depends on the speed is no axis: another arithmetic decides ties in another way.
+            let backend = CpuBackend::reference();
+            let how = MapBackend { backend: &backend, fallback: None, recheck_seed: None };
+            vec![GridMap::sweep(&plan(preset.grid.clone()), how).unwrap().0]
+        } else {
+            moves.iter().map(|&(gap, lateral)| map(moved(&preset.grid, gap, lateral))).collect()
+        };
+        for (at, &model) in preset.models.iter().enumerate() {
+            let Some(known) = preset.known(model) else { continue };
+            let of_moved: Vec<Vec<bool>> = moved.iter().map(|m| m.failed(at, Criterion::Collision)).collect();
+            let ours = nominal.failed(at, Criterion::Collision);
+            let cells = || (0..ours.len()).map(|cell| (ours[cell], of_moved.iter().map(move |m| m[cell])));
+            let always = cells().filter(|(ours, others)| *ours && others.clone().all(|f| f)).count();
+            let ever = cells().filter(|(ours, others)| *ours || others.clone().any(|f| f)).count();
+            let [always, ever] = [always, ever].map(|n| 100.0 * n as f64 / ours.len() as f64);
+            let share = percent(&nominal, at);
+            println!(
+                "{:12} {:7} {share:6.2} %, known {known:4.1} %, rounding decides between {always:6.2} and {ever:6.2} %",
+                preset.grid.name(),
+                model.name()
+            );
+            assert!((always - 0.05..ever + 0.05).contains(&known), "{} {}", preset.grid.name(), model.name());
+            assert!((share - known).abs() < 0.5, "{} {}", preset.grid.name(), model.name());
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 11);
+}
+
+/// The cases are the same in seconds, so a finer step moves the shares by little, whatever the category and the profile.
+#[test]
+fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
+    for name in ["jrc-2021", "paper"] {
+        for category in Category::ALL {
+            let shares = |dt_s: f64| -> Vec<(String, f64)> {
+                let profile = profile(name).with_dt(dt_s).unwrap();
+                let of = |preset: presets::Preset| {
+                    let map = swept(&GridPlan::new(preset.grid.clone(), &profile, &preset.models).unwrap());
+                    let share = |at: usize| percent(&map, at);
+                    let models = preset.models.iter().enumerate();
+                    models.map(|(at, m)| (format!("{} {}", preset.grid.name(), m.name()), share(at))).collect()
+                };
+                presets::jrc(category, &profile).unwrap().into_iter().flat_map(|p| -> Vec<_> { of(p) }).collect()
+            };
+            let known = shares(0.1);
+            for dt_s in [0.02, 0.04, 0.045, 0.07] {
+                for ((what, share), (_, known)) in shares(dt_s).into_iter().zip(&known) {
+                    let what = format!("{name}, {what}: {share} % at {dt_s} s, {known} % at 0.1 s");
+                    // Four of the 209 leader decelerations are 1.9 %.
+                    assert!((share - known).abs() <= 1.5 + 0.1 * known, "{what}");
+                    assert!(share > 0.0 || *known < 2.0, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// Where no vehicle comes into the ego's lane, and where no lane is over in time, there is no map.
+#[test]
+fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check() {
+    let at_lateral_speed = |lateral: &str| {
+        let fixed =
+            vec![value(Category::CutIn, "ego_speed_mps", 30.0), value(Category::CutIn, "other_speed_mps", 20.0)];
+        Grid::new(GridParts { fixed, ..parts(Category::CutIn, "gap_m=10,20", lateral) }).unwrap()
+    };
+    let beside = || at_lateral_speed("lateral_speed_mps=0");
+    let sweep = |grid: Grid, profile: &Profile| {
+        let plan = GridPlan::new(grid, profile, &[ModelId::Fsm]).unwrap();
+        let backend = CpuBackend::lane_arithmetic();
+        GridMap::sweep(&plan, MapBackend { backend: &backend, fallback: None, recheck_seed: None })
+    };
+    let error = sweep(beside(), &profile("jrc-2021")).unwrap_err();
+    let says = format!("{error} {}", error.help().unwrap());
+    for word in ["all 2 lanes", "34.9 s", "no vehicle comes into the ego's lane", "--dt", "lateral speeds"] {
+        assert!(says.contains(word), "{says}");
+    }
+    assert!(sweep(beside(), &profile("paper")).is_ok(), "settled: the ego has passed it");
+    let mut short = profile("paper");
+    short.frame.time_cap_s = 0.2;
+    assert!(sweep(at_lateral_speed("lateral_speed_mps=1"), &short).unwrap_err().to_string().contains("0.2 s"));
+    // CCHDM avoids every collision with a decelerating leader, in runs that all go on to the cap.
+    let jrc = profile("jrc-2021");
+    let lvd = presets::jrc(Category::Lvd, &jrc).unwrap().remove(0);
+    let plan = GridPlan::new(lvd.grid, &jrc, &[ModelId::Cchdm]).unwrap();
+    assert_eq!(swept(&plan).failures(0, Criterion::Collision), 0);
+}
+
+#[test]
+fn a_difference_is_what_the_two_maps_say_and_turns_round_with_them() {
+    let grid = Grid::new(GridParts {
+        panel_axes: vec![axis(Category::CutIn, "ego_speed_kmh=60,100")],
+        fixed: vec![value(Category::CutIn, "other_speed_kmh", 40.0)],
+        ..parts(Category::CutIn, "gap_m=1..60/1", "lateral_speed_mps=0.2..1.8/0.2")
+    })
+    .unwrap();
+    let [a, b] = ["paper", "un-r157"]
+        .map(|name| swept(&GridPlan::new(grid.clone(), &profile(name), &[ModelId::Cchdm, ModelId::Fsm]).unwrap()));
+    for ((first, at), (second, of)) in [((&a, 0), (&a, 1)), ((&a, 0), (&b, 0)), ((&b, 1), (&a, 1))] {
+        for criterion in Criterion::ALL {
+            let [pass, fail, only_first, only_second] = count(&first.difference(at, (second, of), criterion));
+            assert_eq!(pass + fail + only_first + only_second, grid.cell_count() as u64);
+            assert_eq!(fail + only_first, first.failures(at, criterion));
+            assert_eq!(fail + only_second, second.failures(of, criterion));
+            assert_eq!(
+                count(&second.difference(of, (first, at), criterion)),
+                [pass, fail, only_second, only_first],
+                "the other way round"
+            );
+        }
+    }
+    assert!(a.difference(0, (&a, 0), Criterion::Ttc).iter().all(|k| *k as usize <= Agreement::BothFail as usize));
+}
+
+#[test]
+fn the_same_files_come_from_any_number_of_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let outs = ["1", "2", "5"].map(|threads| {
+        let out = dir.path().join(threads);
+        let ran = lanesweep(&[
+            "-q",
+            "map",
+            "cut-in",
+            "--x",
+            "gap_m=1..60/1",
+            "--y",
+            "lateral_speed_mps=0.1..1.7/0.1",
+            "--panel",
+            "ego_speed_kmh=60,90,120",
+            "--panel",
+            "other_speed_kmh=20,70",
+            "--closing",
+            "--models",
+            "FSM,CCHDM",
+            "--against",
+            "jrc-2021",
+            "--backend",
+            "cpu",
+            "--threads",
+            threads,
+            "--out",
+            text(&out),
+        ]);
+        assert_eq!(ran.status.code(), Some(0), "{}", stderr(&ran));
+        (out, ran.stdout)
+    });
+    let mut names: Vec<String> =
+        std::fs::read_dir(&outs[0].0).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            "cells.csv",
+            "cut_in_cchdm.svg",
+            "cut_in_cchdm_against_jrc-2021.svg",
+            "cut_in_fsm.svg",
+            "cut_in_fsm_against_jrc-2021.svg",
+            "differences.csv",
+            "map.json",
+            "report.html",
+        ]
+    );
+    // All but what tells of the machine.
+    let read = |out: &Path, name: &str| {
+        let text = std::fs::read_to_string(out.join(name)).unwrap();
+        if name == "report.html" { page::without_host(&text) } else { text }
+    };
+    for name in names.iter().filter(|n| *n != "map.json") {
+        let first = read(&outs[0].0, name);
+        assert!(outs.iter().all(|(out, _)| read(out, name) == first), "{name}");
+    }
+    assert!(outs.iter().all(|(_, stdout)| *stdout == outs[0].1));
+    // Five panels of six: an ego of 60 km/h does not close in on 70 km/h. One row per cell and model.
+    let cells = std::fs::read_to_string(outs[0].0.join("cells.csv")).unwrap();
+    assert_eq!(cells.lines().count(), 1 + 5 * 60 * 17 * 2);
+    let record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(outs[0].0.join("map.json")).unwrap()).unwrap();
+    assert_eq!(record["simulations"], 2 * 5 * 60 * 17 * 2);
+    assert_eq!(record["grids"][0]["plans"][0]["plan_sha256"].as_str().unwrap().len(), 64);
+    let svg = std::fs::read_to_string(outs[0].0.join("cut_in_fsm_against_jrc-2021.svg")).unwrap();
+    for words in ["only FSM under paper fails", "Initial gap (m)", "ego 120, other 70 km/h", "class=\"boundary\""] {
+        assert!(svg.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn known_shares_stand_beside_the_presets_under_the_profile_of_the_jrc_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let shares = |more: &[&str]| {
+        let args = [&["-q", "map", "lvd", "--preset", "jrc", "--backend", "cpu", "--out", text(dir.path())], more];
+        let ran = lanesweep(&args.concat());
+        assert_eq!(ran.status.code(), Some(0), "{}", stderr(&ran));
+        String::from_utf8(ran.stdout).unwrap()
+    };
+    let jrc = shares(&[]);
+    assert!(jrc.contains("known %") && jrc.contains("627 simulations"), "{jrc}");
+    // The grid was chosen for this share: that it comes out says nothing.
+    assert!(jrc.contains("+0.01*") && jrc.contains("* The known grid is not published. Ours was chosen"), "{jrc}");
+    let cut_in = lanesweep(&["-q", "map", "cut-in", "--preset", "jrc", "--out", text(dir.path())]);
+    let cut_in = String::from_utf8(cut_in.stdout).unwrap();
+    assert!(cut_in.contains("known %") && !cut_in.contains('*') && cut_in.contains("15,930"), "{cut_in}");
+    assert!(!shares(&["--profile", "paper"]).contains("known %"));
+    assert!(!shares(&["--criterion", "ttc"]).contains("known %"));
+    assert!(shares(&["--reference"]).contains("| FSM   |   209 |    0 |    0.00 |"));
+}
+
+#[test]
+fn what_makes_no_map_is_answered_with_what_would() {
+    let x = ["--x", "gap_m=1..60/1"];
+    let y = ["--y", "lateral_speed_mps=0.1..1.7/0.1"];
+    let set = ["--set", "ego_speed_kmh=90"];
+    let cases: &[(&[&[&str]], &str)] = &[
+        (&[&["--x", "gap_m=60..1/1"], &y, &set], "empty"),
+        (&[&["--x", "gap_m=1..60/0"], &y, &set], "a step of 0"),
+        (&[&["--x", "gap_m=1..60"], &y, &set], "has no step"),
+        (&[&["--x", "gap_m=1..sixty/1"], &y, &set], "`sixty`"),
+        (&[&["--x", "gap_m=3,2"], &y, &set], "rising order"),
+        (&[&["--x", "gap_m=nan"], &y, &set], "no number"),
+        (&[&["--x", "gap=1..60/1"], &y, &set], "did you mean `gap_m`?"),
+        (&[&["--x", "ahead_gap_m=1..60/1"], &y, &set], "a cut-in has no parameter"),
+        (&[&["--x", "gap_m=1..60/0.00001"], &y, &set], "longer step"),
+        (&[&["--x", "gap_m=0..9999/0.2"], &["--y", "lateral_speed_mps=0.1..1.7/0.01"], &set], "longer steps or fewer"),
+        (&[&["--x", "gap_m=-5..60/1"], &y, &set], "at least 0"),
+        (&[&["--x", "lateral_speed_mps=1..2/1"], &y, &set], "say the same twice"),
+        (&[&x, &y, &["--panel", "ego_speed_kmh=1..300/0.1"]], "2991 panels"),
+        (&[&x, &y], "needs the ego's speed"),
+        (&[&x, &["--y", "thw_s=1..2/1"], &set, &["--set", "lateral_speed_mps=1"]], "given twice"),
+        (&[&x, &y, &["--set", "ego_speed_kmh=90,100"]], "has 2 values"),
+        (&[&x, &y, &set, &["--set", "other_speed_kmh=100", "--closing"]], "in no panel"),
+        (&[&x, &y, &set, &["--closing"]], "must be the panel's or fixed"),
+        (&[&x, &y, &set, &["--against", "FSN"]], "neither a driver model nor a profile"),
+        (&[&x, &y, &set, &["--criterion", "thw"]], "collision, ttc or btn"),
+        (&[&x, &set], "give both --x and --y"),
+        (&[&["--preset", "jcr"]], "there is no preset"),
+        (&[&x, &y, &set, &["--reference", "--backend", "gpu"]], "--reference"),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    for (flags, words) in cases {
+        let args = [&["map", "cut-in", "--out", text(dir.path())], &flags.concat()[..]].concat();
+        let ran = lanesweep(&args);
+        let said = stderr(&ran);
+        assert_eq!(ran.status.code(), Some(2), "{flags:?}: {said}");
+        assert!(said.contains(words), "{flags:?}: {said}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}

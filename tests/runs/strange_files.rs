@@ -1,0 +1,337 @@
+//! Whatever a user names as an input file (a pipe, a folder, a device, a file whose line never ends), the program
+//! ends at once with the exit status of bad data and names the file.
+#![cfg(unix)]
+
+use crate::common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// No wait, no reading of much: an unloaded machine needs milliseconds.
+const AT_ONCE: Duration = Duration::from_secs(20);
+
+/// Exit code and stderr without the drawing; a program that does not end is an error.
+fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String) {
+    let errors = dir.join("stderr.txt");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .current_dir(dir)
+        .env("NO_COLOR", "1")
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(std::fs::File::create(&errors).unwrap())
+        .spawn()
+        .unwrap();
+    let started = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if started.elapsed() > AT_ONCE {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("{args:?} did not end within {AT_ONCE:?}");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let text = std::fs::read_to_string(errors).unwrap();
+    // The drawing breaks long lines, also after a hyphen.
+    let text = text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    (status.code().unwrap_or(-1), text.replace("- ", "-"))
+}
+
+fn pipe(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+/// A place for every kind of strange file, with the strange ones in it.
+fn strange() -> (tempfile::TempDir, Vec<(&'static str, &'static str)>) {
+    let dir = tempfile::tempdir().unwrap();
+    pipe(&dir.path().join("a_pipe"));
+    std::fs::create_dir(dir.path().join("a_folder")).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", dir.path().join("a_link")).unwrap();
+    std::fs::write(dir.path().join("not_utf8"), b"a = \xff\xfe\n").unwrap();
+    let said = vec![
+        ("a_pipe", "a pipe, a device or a socket"),
+        ("a_folder", "this is a folder"),
+        ("/dev/zero", "a pipe, a device or a socket"),
+        ("a_link", "a pipe, a device or a socket"),
+    ];
+    (dir, said)
+}
+
+/// Every flag and argument that names an input file, with what else the verb needs; `@` is the file.
+fn readers() -> Vec<Vec<&'static str>> {
+    let words = |line: &'static str| line.split(' ').collect::<Vec<_>>();
+    [
+        "study --scenarios @",
+        "study --config @",
+        "study --profile @",
+        "study --plan @",
+        "study --plan @ --shard 0/2",
+        "mine recordings --config @",
+        "fit --scenarios @",
+        "fit --config @",
+        "compare --scenarios @",
+        "compare --config @",
+        "compare --profile @",
+        "sample @",
+        "sample --plan @",
+        "sample density.json --estimator is --thw 0.6 --proposal @",
+        "sample density.json --profile @",
+        "simulate --case-file @",
+        "simulate --table @",
+        "simulate --scenarios @ --lane a/S/1.0s/FSM",
+        "simulate --profile @",
+        "conformance @",
+        "conformance --lanes lanes.csv --scenarios @",
+        "conformance --lanes @ --scenarios scenarios.jsonl",
+        "verify --backend cpu --scenarios @",
+        "verify --backend cpu --profile @",
+    ]
+    .map(words)
+    .to_vec()
+}
+
+fn with(args: &[&'static str], file: &'static str) -> Vec<&'static str> {
+    args.iter().map(|arg| if *arg == "@" { file } else { arg }).collect()
+}
+
+/// The good files that some verbs need beside the strange one.
+fn furnish(dir: &Path) {
+    std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
+    let (code, said) =
+        lanesweep(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--synth-duration", "60"]);
+    assert_eq!(code, 0, "{said}");
+    std::fs::write(dir.join("lanes.csv"), "scenario,param,thw,model\n").unwrap();
+    let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    let (code, said) = lanesweep(dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
+    assert_eq!(code, 0, "{said}");
+}
+
+#[test]
+fn pipes_folders_and_devices_are_refused_at_once_wherever_a_file_is_read() {
+    let (dir, files) = strange();
+    furnish(dir.path());
+    for args in readers() {
+        for (file, kind) in &files {
+            let args = with(&args, file);
+            let (code, said) = lanesweep(dir.path(), &args);
+            assert_eq!(code, 3, "{args:?}: {said}");
+            assert!(said.contains(file) && said.contains(kind), "{args:?}: {said}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_text_is_refused_with_its_line() {
+    let (dir, _) = strange();
+    for args in ["study --config @", "study --profile @", "simulate --case-file @", "simulate --table @"] {
+        let args = with(&args.split(' ').collect::<Vec<_>>(), "not_utf8");
+        let (code, said) = lanesweep(dir.path(), &args);
+        assert_eq!(code, 3, "{args:?}: {said}");
+        assert!(said.contains("not_utf8, line 1: not UTF-8 text"), "{args:?}: {said}");
+    }
+}
+
+/// Puts something strange under a name.
+type Put = fn(&Path);
+
+#[test]
+fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let names = [
+        ("merge", "plan.json", vec!["merge", "in"]),
+        ("rerun", "estimate.json", vec!["simulate", "--from", "in", "--lane", "a/S/1.0s/FSM"]),
+    ];
+    for (what, name, args) in names {
+        let put: [(&str, Put); 3] = [
+            ("pipe", pipe),
+            ("folder", |path| std::fs::create_dir(path).unwrap()),
+            ("device", |path| std::os::unix::fs::symlink("/dev/zero", path).unwrap()),
+        ];
+        for (kind, put) in put {
+            std::fs::create_dir(dir.join("in")).unwrap();
+            put(&dir.join("in").join(name));
+            let (code, said) = lanesweep(dir, &args);
+            assert_eq!(code, 3, "{what}, {kind}: {said}");
+            assert!(said.contains(name) && said.contains("expected a regular file"), "{what}, {kind}: {said}");
+            std::fs::remove_dir_all(dir.join("in")).unwrap();
+        }
+    }
+    // The plan of a run in parts, where the program would leave its own.
+    std::fs::create_dir(dir.join("out")).unwrap();
+    pipe(&dir.join("out/plan.json"));
+    let study = ["study", "--synth-recordings", "1", "--synth-duration", "120", "--out", "out", "--plan-only"];
+    let (code, said) = lanesweep(dir, &study);
+    assert_eq!(code, 3, "{said}");
+    assert!(said.contains("out/plan.json") && said.contains("expected a regular file"), "{said}");
+}
+
+/// A recording whose file of tracks is damaged so.
+fn recording(dir: &Path, damage: impl FnOnce(&Path)) -> PathBuf {
+    let (code, said) = lanesweep(dir, &["-q", "synth", "in", "--synth-recordings", "1", "--synth-duration", "60"]);
+    assert_eq!(code, 0, "{said}");
+    let tracks = dir.join("in/01_tracks.csv");
+    damage(&tracks);
+    tracks
+}
+
+#[test]
+fn a_line_that_does_not_end_is_given_up_and_named() {
+    let endless: [(&str, &str, &[u8], &str); 3] = [
+        ("digits", "", b"7", ""),
+        ("an open quotation mark", "\"", b"7,\n", "quotation mark"),
+        ("zero bytes", "", b"\0", ""),
+    ];
+    for (what, begin, piece, hint) in endless {
+        let dir = tempfile::tempdir().unwrap();
+        recording(dir.path(), |tracks| {
+            let mut text = std::fs::read(tracks).unwrap();
+            text.truncate(text.iter().position(|&byte| byte == b'\n').unwrap() + 1);
+            text.extend(begin.as_bytes());
+            text.extend(piece.iter().copied().cycle().take(32 << 20));
+            std::fs::write(tracks, text).unwrap();
+        });
+        let (code, said) = lanesweep(dir.path(), &["mine", "in"]);
+        assert_eq!(code, 3, "{what}: {said}");
+        assert!(said.contains("01_tracks.csv, line") && said.contains("within 1 MiB"), "{what}: {said}");
+        assert!(said.contains(hint), "{what}: {said}");
+    }
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::File::create(dir.path().join("scenarios.jsonl")).unwrap().set_len(1 << 40).unwrap();
+    let (code, said) = lanesweep(dir.path(), &["study", "--scenarios", "scenarios.jsonl"]);
+    assert_eq!(code, 3, "{said}");
+    assert!(said.contains("scenarios.jsonl, line 1: the line is longer than"), "{said}");
+}
+
+#[test]
+fn a_file_of_the_recording_that_is_no_file_is_named() {
+    for name in ["01_tracks.csv", "01_tracksMeta.csv", "01_recordingMeta.csv"] {
+        let dir = tempfile::tempdir().unwrap();
+        recording(dir.path(), |tracks| {
+            std::fs::remove_file(tracks.with_file_name(name)).unwrap();
+            pipe(&tracks.with_file_name(name));
+        });
+        for args in [&["mine", "in"][..], &["study", "in"]] {
+            let (code, said) = lanesweep(dir.path(), args);
+            assert_eq!(code, 3, "{name}: {said}");
+            assert!(said.contains(name) && said.contains("expected a regular file"), "{name}: {said}");
+        }
+    }
+}
+
+#[test]
+fn files_beyond_what_their_kind_can_be_are_not_read_to_their_end() {
+    let dir = tempfile::tempdir().unwrap();
+    // Without a byte on the disk.
+    let huge = std::fs::File::create(dir.path().join("huge")).unwrap();
+    huge.set_len(1 << 40).unwrap();
+    for args in ["study --config @", "study --profile @", "simulate --case-file @", "simulate --table @"] {
+        let args = with(&args.split(' ').collect::<Vec<_>>(), "huge");
+        let (code, said) = lanesweep(dir.path(), &args);
+        assert_eq!(code, 3, "{args:?}: {said}");
+        // A table is read row by row, so it may be of any size, but a row may not.
+        let why = if args.contains(&"--table") { "a row is longer than" } else { "larger than any file of this kind" };
+        assert!(said.contains("huge") && said.contains(why), "{args:?}: {said}");
+    }
+}
+
+/// An id that acts on a terminal, forges a line of a message, turns the direction of reading, and is a formula.
+const HOSTILE: &str = "=1+1\u{1b}[2J\u{9b}31m\u{202e}b\rc\u{7f}";
+
+/// Exit code, stdout and stderr as they are.
+fn raw(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    let program = env!("CARGO_BIN_EXE_lanesweep");
+    let ran = Command::new(program).current_dir(dir).env("NO_COLOR", "1").args(args).output().unwrap();
+    let [out, err] = [ran.stdout, ran.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (ran.status.code().unwrap_or(-1), out, err)
+}
+
+/// Golden scenarios, the first with this id.
+fn scenarios_with(dir: &Path, id: &str) {
+    let text = std::fs::read_to_string(common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let at = lines.iter().position(|line| line.contains("\"cut_in\"") && line.contains("\"kept\":true")).unwrap();
+    let mut first: serde_json::Value = serde_json::from_str(&lines[at]).unwrap();
+    first["id"] = id.into();
+    lines[at] = first.to_string();
+    std::fs::write(dir.join("s.jsonl"), lines.join("\n") + "\n").unwrap();
+}
+
+#[test]
+fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    scenarios_with(dir, HOSTILE);
+    std::fs::write(dir.join("key.toml"), "\"\\u001b[2J\\u009b\\u202e\" = 1\n").unwrap();
+    std::fs::write(dir.join("broken.jsonl"), format!("{{\"id\": \"{}\"\n", "\u{9b}\u{202e}")).unwrap();
+    let lane = format!("{HOSTILE}/S/1.2s/FSM");
+    let named = "no\u{1b}[2J\u{202e}\nsuch.jsonl";
+    let runs: [(&[&str], i32); 9] = [
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--compare", "all", "--model", "all"], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--format", "json"], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", "\u{1b}[2J/S/1.2s/FSM"], 2),
+        (&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--compare-reference"], 0),
+        (&["study", "--scenarios", "broken.jsonl"], 3),
+        (&["study", "--scenarios", named], 6),
+        (&["study", "--profile", "key.toml"], 2),
+        (&["study", "--\u{1b}[2J\u{202e}"], 2),
+    ];
+    for (args, expected) in runs {
+        let (code, out, err) = raw(dir, args);
+        assert_eq!(code, expected, "{args:?}: {err}");
+        let acts = |c: char| (c.is_control() && c != '\n') || ('\u{2028}'..='\u{202e}').contains(&c);
+        assert!(!out.chars().chain(err.chars()).any(acts), "{args:?}: {out:?} {err:?}");
+        if args.contains(&"json") {
+            let document: serde_json::Value = serde_json::from_str(&out).unwrap();
+            assert_eq!(document["lanes"][0]["lane"], lane, "JSON reads back the id itself");
+        }
+        if args.contains(&named) {
+            assert!(err.contains("\\u{1b}[2J\\u{202e}\\nsuch.jsonl"), "{err}");
+        }
+    }
+    let page = std::fs::read_to_string(dir.join("lanesweep-out/report.html")).unwrap();
+    assert!(!page.chars().any(|c| c.is_control() && c != '\n') && !page.contains('\u{202e}'));
+}
+
+#[test]
+fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    for id in ["=HYPERLINK(1)", "@a", "-2+3", "+x,y", "'=q"] {
+        scenarios_with(dir, id);
+        let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--lanes", "lanes.csv", "--thw", "1.2"];
+        let (code, _, err) = raw(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
+        assert_eq!(code, 0, "{err}");
+        let table = std::fs::read_to_string(dir.join("lanes.csv")).unwrap();
+        let fields = table.lines().flat_map(|line| line.split(','));
+        let formulas = fields.map(|f| f.trim_start_matches('"')).filter(|f| f.starts_with(['=', '+', '-', '@']));
+        let formulas: Vec<&str> = formulas.filter(|field| field.parse::<f64>().is_err()).collect();
+        assert!(formulas.is_empty() && table.contains(&format!("'{id}")), "{formulas:?}");
+        let mut reader = csv::Reader::from_path(dir.join("lanes.csv")).unwrap();
+        assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
+        // Our readers take the apostrophe away: of lanes, and of scenarios.
+        let (code, _, err) = raw(dir, &["conformance", "--scenarios", "s.jsonl", "--lanes", "lanes.csv"]);
+        assert_eq!(code, 0, "{id}: {err}");
+        let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
+        std::fs::write(dir.join("cases.csv"), row).unwrap();
+        let lane = format!("--lane={id}/S/1.2s/FSM");
+        let (code, _, err) = raw(dir, &["simulate", "--scenarios", "cases.csv", &lane]);
+        assert_eq!(code, 0, "{id}: {err}");
+    }
+}
+
+#[test]
+fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
+    let dir = tempfile::tempdir().unwrap();
+    let part = ["-q", "study", "--synth-recordings", "1", "--synth-duration", "120", "--shard", "0/2"];
+    let (code, _, err) = raw(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
+    assert_eq!(code, 0, "{err}");
+    let (code, said) = lanesweep(dir.path(), &["merge", "it's; mine"]);
+    assert_eq!(code, 3, "{said}");
+    assert!(said.contains(r"--plan 'it'\''s; mine/plan.json' --shard 1/2 --out 'it'\''s; mine'"), "{said}");
+}

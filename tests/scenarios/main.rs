@@ -1,0 +1,12 @@
+//! Scenario files, tables of users, parameterizations, OpenSCENARIO.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod openscenario;
+mod openscenario_import;
+mod printed_json;
+mod reduction_goldens;
+mod scenario_file;
+mod tables;
+mod user_tables;

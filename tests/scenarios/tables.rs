@@ -1,0 +1,243 @@
+//! Tables: what is written as Parquet is what CSV and JSON Lines say, to the last bit and with its unit; what users
+//! make themselves is read, or refused with file, row and column.
+#![cfg(feature = "parquet")]
+
+use crate::common::tables::made;
+use crate::common::tables::run;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, write_density};
+use lanesweep::support::plausibility::LIMITS;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use made::{Read, read};
+use proptest::prelude::*;
+use run::{lanesweep, said};
+
+fn synthetic() -> Vec<Scenario> {
+    let options = GeneratorOptions { recordings: 2, duration_s: 120.0, ..GeneratorOptions::default() };
+    mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
+}
+
+/// The scenarios as text, which has every bit of theirs.
+fn text_of(scenarios: &[Scenario]) -> String {
+    let mut text = Vec::new();
+    write_scenarios_to(&mut text, scenarios).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+fn through_parquet(scenarios: &[Scenario]) -> Vec<Scenario> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s.parquet");
+    write_scenarios(&path, scenarios).unwrap();
+    read_scenarios(&path).unwrap()
+}
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![-1e6_f64..1e6, Just(-0.0), Just(0.1 + 0.2), Just(5e-324), Just(-1e6), Just(1.0 / 3.0)]
+}
+
+fn positive() -> impl Strategy<Value = f64> {
+    prop_oneof![1e-3_f64..100.0, Just(f64::MIN_POSITIVE), Just(1e6)]
+}
+
+fn other(samples: usize) -> impl Strategy<Value = Other> {
+    let v = proptest::collection::vec(prop_oneof![0.0_f64..80.0, Just(0.0), Just(5e-324)], samples);
+    let y = proptest::collection::vec(number(), samples);
+    (positive(), positive(), v, y).prop_map(|(length, width, v, y)| Other { length, width, v, y })
+}
+
+prop_compose! {
+    fn scenario()(samples in 2_usize..40)(
+        (category, kept, side) in (0_usize..3, any::<bool>(), any::<bool>()),
+        (ego_id, lead_id, frame0) in (any::<u32>(), any::<Option<u32>>(), any::<i64>()),
+        (recording, reason, end_cause) in (".{0,8}", "[^\u{0}]{0,12}", proptest::option::of("[a-z,\"\n]{0,6}")),
+        (v0, length, width, lane_width, fps) in (0.0_f64..80.0, positive(), positive(), positive(), 0.1_f64..1e3),
+        (thw0, gap0, lead_gap) in (proptest::option::of(number()), proptest::option::of(number()), number()),
+        (target, lead) in (other(samples), other(samples)),
+        (truncated_start, frame_switch, tags) in (any::<Option<bool>>(), any::<Option<i64>>(), any::<Option<[i64; 2]>>()),
+    ) -> Scenario {
+        let category = Category::ALL[category];
+        let has_lead = category == Category::CutOut;
+        Scenario {
+            id: String::new(), category, recording, ego_id, target_id: 7, lead_id, frame0, frame1: -1, fps, kept, reason,
+            ego: Ego { v0, length, width }, lane_width, side: if side { Side::Left } else { Side::Right }, target,
+            lead: has_lead.then_some(lead), thw0, gap0, lead_gap: has_lead.then_some(lead_gap), peak_decel: thw0,
+            truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_scenario_survives_parquet_to_the_last_bit(mut scenarios in proptest::collection::vec(scenario(), 1..90)) {
+        for (at, scenario) in scenarios.iter_mut().enumerate() {
+            scenario.id = format!("s/{at}");
+        }
+        prop_assert_eq!(text_of(&through_parquet(&scenarios)), text_of(&scenarios));
+    }
+}
+
+#[test]
+fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "1"]);
+    lanesweep(at, &["-q", "mine", "rec", "-o", "s.jsonl"]);
+    lanesweep(at, &["-q", "mine", "rec", "-o", "s.parquet"]);
+    let study = ["-q", "study", "--backend", "cpu", "--keep-plan", "never"];
+    for (file, out, threads) in [("s.jsonl", "a", "2"), ("s.parquet", "b", "1")] {
+        for ending in ["csv", "parquet", "jsonl"] {
+            let lanes = format!("{out}.{ending}");
+            let args = ["--scenarios", file, "--out", out, "--threads", threads, "--lanes", &lanes];
+            lanesweep(at, &[&study[..], &args].concat());
+        }
+    }
+    let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
+    for name in [".csv", ".jsonl", ".parquet", "/f1.csv", "/failures.csv", "/claims.csv", "/radar-cut-in.csv"] {
+        let (a, b) = (format!("a{name}"), format!("b{name}"));
+        if name == "/radar-cut-in.csv" && !at.join(&a).exists() {
+            continue;
+        }
+        assert!(bytes(&a) == bytes(&b), "{name}");
+    }
+    assert_same_rows(&at.join("a.csv"), &read(&at.join("a.parquet")));
+    check_facts(&read(&at.join("a.parquet")), "lanes", true);
+    let scenarios = read(&at.join("s.parquet"));
+    check_facts(&scenarios, "scenarios", false);
+    assert_eq!(scenarios.key_values["lanesweep.synthetic"], "true");
+    // A density of the same scenarios, of either file: its exposure stands beside each.
+    for file in ["s.jsonl", "s.parquet"] {
+        let name = format!("{file}.json");
+        let fit = ["-q", "fit", "--scenarios", file, "--category", "lvd", "--parameterization", "i", "--out", &name];
+        lanesweep(at, &[&fit[..], &["--no-comparison"]].concat());
+    }
+}
+
+#[test]
+fn sampled_rows_are_the_same_in_every_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
+    let facts = DataFacts { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
+    let id = ParameterizationId::find(Category::Lvd, "i").unwrap();
+    write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();
+    for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
+        let args = ["-q", "sample", "d.json", "--samples", "300", "--thw", "0.6,1.2", "--backend", "cpu"];
+        lanesweep(at, &[&args[..], &["--rows", name, "--threads", threads]].concat());
+    }
+    let parquet = read(&at.join("r.parquet"));
+    assert_same_rows(&at.join("r.csv"), &parquet);
+    check_facts(&parquet, "samples", true);
+    assert!(std::fs::read(at.join("r.parquet")).unwrap() == std::fs::read(at.join("again.parquet")).unwrap());
+    let lines = std::fs::read_to_string(at.join("r.jsonl")).unwrap();
+    assert_eq!(lines.lines().count(), parquet.rows.len());
+    for (line, row) in lines.lines().zip(&parquet.rows) {
+        let object: BTreeMap<String, serde_json::Value> = serde_json::from_str(line).unwrap();
+        for (column, value) in parquet.columns.iter().zip(row) {
+            let text = match &object[column] {
+                serde_json::Value::Null => String::new(),
+                serde_json::Value::String(text) => text.clone(),
+                serde_json::Value::Bool(flag) => u8::from(*flag).to_string(),
+                number => number.as_f64().unwrap().to_string(),
+            };
+            assert_eq!(&text, value, "{column} in {line}");
+        }
+    }
+}
+
+/// The texts of CSV are those of Parquet's values.
+fn assert_same_rows(csv: &Path, parquet: &Read) {
+    let mut reader = csv::Reader::from_path(csv).unwrap();
+    assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>(), parquet.columns);
+    let mut count = 0;
+    for (record, row) in reader.records().zip(&parquet.rows) {
+        for (text, value) in record.unwrap().iter().zip(row) {
+            // 2 as `2.0`: see the headways of lanes.
+            assert_eq!(text.strip_suffix(".0").unwrap_or(text), value);
+        }
+        count += 1;
+    }
+    assert!(count > 100 && count == parquet.rows.len());
+}
+
+/// What a file says of itself, and that the chapter on tables says the same of every column.
+fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
+    assert_eq!(table.key_values["lanesweep.version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(table.key_values["lanesweep.table"], kind);
+    assert_eq!(table.key_values.contains_key("lanesweep.profile"), has_lanes);
+    assert_eq!(table.key_values.contains_key("lanesweep.plan_sha256"), has_lanes);
+    let words: Vec<serde_json::Value> = serde_json::from_str(&table.key_values["lanesweep.columns"]).unwrap();
+    assert_eq!(words.iter().map(|w| w["name"].as_str().unwrap()).collect::<Vec<_>>(), table.columns);
+    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/tables.md");
+    let chapter = std::fs::read_to_string(chapter).unwrap();
+    let section = chapter.split("\n## ").find(|part| part.starts_with(&format!("`{kind}`"))).expect(kind);
+    let cells = |line: &str| line.split('|').map(|cell| cell.trim().replace('`', "")).collect::<Vec<_>>();
+    let rows: Vec<Vec<String>> = section.lines().filter(|line| line.starts_with("| `")).map(cells).collect();
+    for (word, (unit, description)) in words.iter().zip(&table.metadata) {
+        assert_eq!((word["unit"].as_str().unwrap(), word["description"].as_str().unwrap()), (&**unit, &**description));
+        assert!(!description.is_empty() && description.ends_with('.'), "{word}");
+        let text = |key: &str| word[key].as_str().unwrap().to_owned();
+        let row = rows.iter().find(|row| row[1] == text("name"));
+        let row = match row {
+            Some(row) => row,
+            // The parameters of a density are in one row.
+            None if kind == "samples" => rows.iter().find(|row| row[1] == "…").unwrap(),
+            None => panic!("docs/src/tables.md has no row for `{}` in its section on {kind}", text("name")),
+        };
+        assert_eq!(row[2], text("type"), "the chapter's type of {}", text("name"));
+        if row[1] != "…" {
+            let shown = if unit.is_empty() { "–" } else { unit };
+            assert_eq!(row[3], shown, "the chapter's unit of {}", text("name"));
+        }
+    }
+    if kind != "samples" {
+        assert_eq!(rows.len(), words.len(), "the section on {kind} has rows for columns that are not written");
+    }
+}
+
+#[test]
+fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
+    let dir = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 4] = [
+        (&["study", "--lanes", "lanes.xlsx"], ".csv, .jsonl or .parquet"),
+        (&["mine", "rec", "-o", "s.csv"], ".jsonl or .parquet"),
+        (&["study", "--scenarios", "s.xml"], ".jsonl, .parquet or .csv"),
+        (&["simulate", "--table", "cases.jsonl"], ".csv or .parquet"),
+    ];
+    lanesweep(dir.path(), &["-q", "synth", "rec", "--synth-recordings", "1", "--synth-duration", "60"]);
+    for (args, expected) in cases {
+        let (code, text) = said(dir.path(), args);
+        assert!(code == 2 && text.contains(expected), "{args:?}: {code}, {text}");
+    }
+}
+
+#[test]
+fn a_lane_table_must_not_replace_the_scenarios_it_is_of() {
+    let dir = tempfile::tempdir().unwrap();
+    write_scenarios(&dir.path().join("s.parquet"), &synthetic()).unwrap();
+    let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet", "--lanes", "s.parquet"]);
+    assert!(code == 2 && text.contains("would be overwritten"), "{text}");
+}
+
+#[test]
+fn the_chapter_has_the_ranges_that_readers_apply() {
+    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/tables.md");
+    let chapter = std::fs::read_to_string(chapter).unwrap();
+    let section = chapter.split("\n## ").find(|part| part.starts_with("Plausible values")).unwrap();
+    let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
+    assert_eq!(rows.len(), LIMITS.len());
+    for (row, of) in rows.iter().zip(&LIMITS) {
+        let range = |(least, most): (f64, f64)| format!("{least} … {most}");
+        let (plausible, physical) = (range(of.plausible), range(of.physical));
+        let expected = format!("| {} | {} | {plausible} | {physical} |", of.name, of.unit);
+        assert!(row.starts_with(&expected), "{row} should begin with {expected}");
+    }
+}

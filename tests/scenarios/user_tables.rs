@@ -1,0 +1,440 @@
+//! Tables of scenarios and cases that users make: what is read of them, and what is said of those that cannot be read.
+#![cfg(feature = "parquet")]
+
+use crate::common::tables::made;
+use crate::common::tables::run;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int32Array, StringArray, StructArray};
+use arrow::datatypes::{DataType, Field};
+use lanesweep::scenario::{Category, Scenario, Side, read_scenarios};
+use parquet::basic::Compression;
+use run::{lanesweep, said};
+
+fn file(dir: &Path, name: &str, content: &str) -> PathBuf {
+    let path = dir.join(name);
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+fn of(name: &str, content: &str) -> lanesweep::Result<Vec<Scenario>> {
+    let dir = tempfile::tempdir().unwrap();
+    read_scenarios(&file(dir.path(), name, content))
+}
+
+const INSTANTS: &str = "\u{feff}id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
+target_width_m,target_speed_kmh,target_lateral_m,weather
+a,cut-in,10.00,108,4.5,1.8,left,4.2,1.9,72,3.5,rain
+a,cut-in,10.04,107,4.5,1.8,left,4.2,1.9,72,3.4,rain
+a,cut-in,10.08,106,4.5,1.8,left,4.2,1.9,90,3.3,sun
+b,lvd,0,90,4.5,1.8,Right,4.2,1.9,90,0,
+b,,0.1,,,,,,,36,0.1,
+";
+
+#[test]
+fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_times() {
+    let read = of("s.csv", INSTANTS).unwrap();
+    assert_eq!(read.iter().map(|s| s.id.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+    let [a, b] = &read[..] else { panic!("two scenarios") };
+    assert_eq!((a.category, a.side, a.fps, a.ego.v0), (Category::CutIn, Side::Left, 25.0, 30.0));
+    assert_eq!((&a.target.v[..], &a.target.y[..]), (&[20.0, 20.0, 25.0][..], &[3.5, 3.4, 3.3][..]));
+    assert!(a.kept && a.lead.is_none() && a.lane_width == 3.5 && a.thw0.is_none());
+    assert_eq!((b.category, b.side, b.fps, &b.target.v[..]), (Category::Lvd, Side::Right, 10.0, &[25.0, 10.0][..]));
+}
+
+#[test]
+fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() {
+    let cases = [
+        ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "not equally spaced"),
+        (
+            "a,cut-in,10.04,107,4.5",
+            "a,cut-in,10.04,107,4.6",
+            "line 3, column `ego_length_m`, scenario a",
+            "is 4.6, but 4.5",
+        ),
+        ("72,3.4", "fast,3.4", "column `target_speed_kmh[1]`, scenario a", "expected a number"),
+        ("10.04", "soon", "line 3, column `time_s`", "expected a time in seconds"),
+        ("Right,4.2", "up,4.2", "line 5, column `side`, scenario b", "\"left\", \"right\""),
+        ("b,,0.1,,,,,,,36,0.1,\n", "", "line 5, column `time_s`, scenario b", "one instant"),
+        ("side,", "sied,", "s.csv, line 1, column `sied`", "no such column"),
+        ("target_lateral_m", "target_lateral_ft", "column `target_lateral_ft`", "feet"),
+        ("ego_speed_kmh", "ego_speed_mph", "column `ego_speed_mph`", "miles per hour"),
+        ("weather", "target_v", "column `target_v`", "holds the same as the column `target_speed_kmh`"),
+        ("target_width_m,", "target_wide,", "column `target_wide`", "no such column"),
+        (",weather", "", "line 2", "12 fields, but the header has 11"),
+        ("72,3.4,rain", "-72,3.4,rain", "column `target_speed_kmh[1]`", "at least 0"),
+    ];
+    for (old, new, place, problem) in cases {
+        assert!(INSTANTS.contains(old), "{old}");
+        let error = of("s.csv", &INSTANTS.replacen(old, new, 1)).expect_err(new);
+        let text = error.to_string();
+        assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
+        assert!(error.help().is_some_and(|help| !help.is_empty()), "{text}");
+    }
+    let rows: Vec<&str> = INSTANTS.lines().collect();
+    let again = of("s.csv", &format!("{INSTANTS}{}\n{}\n", rows[1], rows[2])).unwrap_err().to_string();
+    assert!(again.contains("line 7, column `id`, scenario a: this id is that of line 2 too"), "{again}");
+    let near = of("s.csv", &INSTANTS.replace("side,", "sied,")).unwrap_err().help().unwrap();
+    assert!(near.contains("did you mean `side`?"), "{near}");
+    let kmh = of("s.csv", &INSTANTS.replace("ego_speed_kmh", "ego_speed_mph")).unwrap_err().help().unwrap();
+    assert!(kmh.contains("`ego_speed_mps`") && kmh.contains("`ego_speed_kmh`"), "{kmh}");
+    let missing = of("s.csv", "id,category,time_s,target_v\n").unwrap_err().to_string();
+    assert!(missing.contains("no column `ego_v0`, `ego_length`, `ego_width`, `side`"), "{missing}");
+    assert!(of("s.csv", "id;category;time_s\n").unwrap_err().to_string().contains("semicolons"));
+    assert!(of("s.csv", "").is_err() && of("s.csv", "id,category\n").is_err());
+}
+
+const CASES: &str = "id,category,model,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+ahead_speed_kmh,duration_s,rate_hz
+a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
+,lvd,RSS,108,30,,30,,-6,0,,,,10
+c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
+";
+
+#[test]
+fn parameters_make_the_scenarios_that_simulate_runs() {
+    let read = of("p.csv", CASES).unwrap();
+    let [a, b, c] = &read[..] else { panic!("three scenarios") };
+    assert_eq!((a.id.as_str(), a.fps, a.target.v.len(), a.ego.v0), ("a", 25.0, 89, 30.0));
+    assert_eq!((a.target.y[0], a.target.y[25], a.target.y[88]), (3.5, 2.5, 0.0));
+    assert_eq!((a.thw0, a.gap0), (Some(1.2), Some(36.0)));
+    assert_eq!((b.id.as_str(), b.fps, b.target.v.len()), ("row-2", 10.0, 51));
+    assert_eq!((b.target.v[0], b.target.v[10], b.target.v[50], b.gap0), (30.0, 24.0, 0.0, Some(30.0)));
+    assert_eq!((c.lead_gap, c.lead.as_ref().unwrap().v[7], c.target.y[25]), (Some(40.0), 10.0, 1.0));
+    assert_eq!((c.target.v.len(), c.target.v[3]), (101, 30.0));
+
+    let dir = tempfile::tempdir().unwrap();
+    file(dir.path(), "p.csv", CASES);
+    // The run of a scenario's recorded variant is the run of its row.
+    for (row, lane) in [("1", "a/S/1.2s/FSM"), ("2", "row-2/S/30m/RSS"), ("3", "c/S/1.2s/FSM")] {
+        let by_row = lanesweep(dir.path(), &["simulate", "--table", "p.csv", "--row", row]);
+        let by_lane = lanesweep(dir.path(), &["simulate", "--scenarios", "p.csv", "--lane", lane]);
+        assert!(by_row.lines().count() > 20);
+        let numbers = |text: &str| -> Vec<f64> {
+            text.lines().skip(1).flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
+        };
+        let (x, y) = (numbers(&by_row), numbers(&by_lane));
+        let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs());
+        let lines = x.len().min(y.len());
+        assert!(lines > 200 && x.iter().zip(&y).take(lines).all(near), "{lane}:\n{by_row}\n{by_lane}");
+    }
+    let study = lanesweep(dir.path(), &["-q", "study", "--scenarios", "p.csv", "--out", "out", "--backend", "cpu"]);
+    assert!(study.contains("cut-in"), "{study}");
+}
+
+#[test]
+fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
+    let cases = [
+        ("speed,thw", "sped,thw", "line 1, column `sped`", "no such column", "did you mean `speed`?"),
+        ("id,category", "id,note,category", "column `note`", "no such column", "remove it"),
+        ("lateral_speed", "lateral_speed_ms", "column `lateral_speed_ms`", "milliseconds", "`lateral_speed_mps`"),
+        ("cut-in,FSM", "cutin,FSM", "line 2, column `category`", "no category `cutin`", "use cut-in, cut-out or lvd"),
+        ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "a speed in m/s"),
+        ("1.2,,1.0,,,,", "1.2,8,1.0,,,,", "line 2, column `thw`", "both given", "leave one of the two empty"),
+        ("-6,0", "-6,40", "line 3, column `end_speed`", "cannot be reached", "sign"),
+        ("36,4,", "36,2000,", "line 4, column `duration_s`", "2000 cannot be used", "at most 120"),
+        ("108,20,", "108,fast,", "line 2, column `speed`", "expected a number", "tables"),
+    ];
+    for (old, new, place, problem, help) in cases {
+        assert!(CASES.contains(old), "{old}");
+        let content = CASES.replacen(old, new, 1);
+        let content = if new.starts_with("id,note") {
+            content.replace("\na,", "\na,x,").replace("\n,lvd", "\n,x,lvd").replace("\nc,", "\nc,x,")
+        } else {
+            content
+        };
+        let error = of("p.csv", &content).expect_err(new);
+        let text = error.to_string();
+        assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
+        assert!(error.help().unwrap().contains(help), "{new}: {:?}", error.help());
+    }
+    let rows: String = (0..6000).map(|_| "lvd,20,120,1000\n").collect();
+    let error = of("p.csv", &format!("category,ego_speed,duration_s,rate_hz\n{rows}")).unwrap_err();
+    assert!(error.to_string().contains("too many for so few rows"), "{error}");
+}
+
+fn texts(values: &[&str]) -> ArrayRef {
+    Arc::new(StringArray::from(values.to_vec()))
+}
+
+fn numbers(values: &[f64]) -> ArrayRef {
+    Arc::new(Float64Array::from(values.to_vec()))
+}
+
+/// The least that a table of series has.
+fn least() -> Vec<(&'static str, ArrayRef)> {
+    vec![
+        ("id", texts(&["a", "b"])),
+        ("category", texts(&["cut_in", "lvd"])),
+        ("fps", Arc::new(Int32Array::from(vec![25, 10]))),
+        ("ego_v0_kmh", numbers(&[108.0, 90.0])),
+        ("ego_length", numbers(&[4.5, 4.5])),
+        ("ego_width", numbers(&[1.8, 1.8])),
+        ("side", texts(&["left", "right"])),
+        ("target_length", numbers(&[4.2, 4.2])),
+        ("target_width", numbers(&[1.9, 1.9])),
+        ("target_v", made::series(&[vec![20.0, 20.0, 25.0], vec![25.0, 10.0]])),
+        ("target_y", made::series(&[vec![3.5, 3.4, 3.3], vec![0.0, 0.1]])),
+        ("kept", Arc::new(BooleanArray::from(vec![Some(true), None]))),
+        ("lead_id", numbers(&[f64::NAN, 12.0])),
+        ("__index_level_0__", numbers(&[0.0, 1.0])),
+    ]
+}
+
+fn through(columns: Vec<(&str, ArrayRef)>, compression: Compression) -> lanesweep::Result<Vec<Scenario>> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s.parquet");
+    made::write(&path, columns, compression);
+    read_scenarios(&path)
+}
+
+#[test]
+fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it() {
+    for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY] {
+        let read = through(least(), compression).unwrap();
+        let [a, b] = &read[..] else { panic!("two scenarios") };
+        assert_eq!((a.ego.v0, a.fps, &a.target.y[..], a.lead_id), (30.0, 25.0, &[3.5, 3.4, 3.3][..], None));
+        assert_eq!(
+            (b.category, b.kept, &b.target.v[..], b.lead_id),
+            (Category::Lvd, true, &[25.0, 10.0][..], Some(12))
+        );
+    }
+    // Records, as JSON read into a data frame has them.
+    let number = |name: &str| Arc::new(Field::new(name, DataType::Float64, true));
+    let ego = StructArray::from(vec![
+        (number("v0"), numbers(&[30.0, 25.0])),
+        (number("length"), numbers(&[4.5, 4.5])),
+        (number("width"), numbers(&[1.8, 1.8])),
+    ]);
+    let mut columns: Vec<_> = least().into_iter().filter(|(name, _)| !name.starts_with("ego_")).collect();
+    columns.push(("ego", Arc::new(ego)));
+    assert_eq!(through(columns, Compression::SNAPPY).unwrap(), through(least(), Compression::SNAPPY).unwrap());
+}
+
+#[test]
+fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
+    let with = |name: &'static str, array: ArrayRef| {
+        let mut columns = least();
+        match columns.iter_mut().find(|(known, _)| *known == name) {
+            Some(column) => column.1 = array,
+            None => columns.push((name, array)),
+        }
+        through(columns, Compression::UNCOMPRESSED).unwrap_err().to_string()
+    };
+    let short = with("target_y", made::series(&[vec![3.5, 3.4, 3.3], vec![0.0]]));
+    assert!(short.contains("column `target_y`, row 2, scenario b: 1 samples, but `target.v` has 2"), "{short}");
+    let nan = with("target_v", made::series(&[vec![20.0, f64::NAN, 25.0], vec![1.0, 1.0]]));
+    assert!(nan.contains("column `target_v[1]`, row 1, scenario a: is null; expected a number"), "{nan}");
+    let text = with("fps", texts(&["25", "fast"]));
+    assert!(text.contains("column `fps`, row 2, scenario b: is \"fast\"; expected a number"), "{text}");
+    let near = with("lane_widht", numbers(&[3.5, 3.5]));
+    assert!(near.contains("column `lane_widht`"), "{near}");
+    let days: ArrayRef = Arc::new(Int32Array::from(vec![1, 2]));
+    let date = with("gap0", arrow::compute::cast(&days, &DataType::Date32).unwrap());
+    assert!(date.contains("column `gap0`: holds values of the type Date32"), "{date}");
+}
+
+#[test]
+fn simulate_takes_a_row_of_a_parquet_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let columns = vec![
+        ("category", texts(&["lvd", "cut-in"])),
+        ("model", texts(&["RSS", "FSM"])),
+        ("ego_speed", numbers(&[20.0, 30.0])),
+        ("speed_kmh", numbers(&[72.0, 72.0])),
+        ("thw", numbers(&[1.0, 1.2])),
+        ("lateral_speed", numbers(&[f64::NAN, 1.0])),
+    ];
+    made::write(&dir.path().join("cases.parquet"), columns, Compression::SNAPPY);
+    let table = lanesweep(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "2"]);
+    let flags = "simulate --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
+    assert_eq!(table, lanesweep(dir.path(), &flags.split(' ').collect::<Vec<_>>()));
+    let (code, text) = said(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "3"]);
+    assert!(code == 2 && text.contains("there is no row 3"), "{text}");
+}
+
+#[test]
+fn a_damaged_parquet_file_is_told_as_one_and_no_panic_is_printed() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s.parquet");
+    made::write(&path, least(), Compression::SNAPPY);
+    let good = std::fs::read(&path).unwrap();
+    let mut refused = 0;
+    for at in (0..good.len()).step_by(7) {
+        let mut bad = good.clone();
+        bad[at] ^= 0x55;
+        std::fs::write(&path, &bad).unwrap();
+        if let Err(error) = read_scenarios(&path) {
+            assert!(error.help().is_some_and(|help| !help.is_empty()), "{error}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 50, "{refused}");
+    std::fs::write(&path, &good[..good.len() / 2]).unwrap();
+    let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet"]);
+    assert!(code == 3 && text.contains("not a Parquet file that can be read"), "{text}");
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn a_small_file_that_claims_many_values_is_refused_before_they_are_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s.parquet");
+    let mut columns = least();
+    for (name, array) in &mut columns {
+        if name.starts_with("target_v") || name.starts_with("target_y") {
+            *array = made::series(&[vec![1.0; 6 << 20], vec![1.0; 6 << 20]]);
+        }
+    }
+    made::write(&path, columns, Compression::ZSTD(Default::default()));
+    let size = std::fs::metadata(&path).unwrap().len();
+    assert!(size < 100_000, "{size}");
+    let text = read_scenarios(&path).unwrap_err().to_string();
+    assert!(text.contains("far more than a file of its size"), "{text}");
+}
+
+/// Cut-ins, a row per instant; `change` spoils the rows of some.
+fn cut_ins(count: usize, change: impl Fn(usize, usize) -> Option<String>) -> String {
+    let mut text = "id,category,time_s,ego_speed_mps,ego_length_m,ego_width_m,side,target_length_m,target_width_m,\
+                    target_speed_mps,target_lateral_m\n"
+        .to_owned();
+    for id in 0..count {
+        for k in 0..20 {
+            let (time_s, y) = (k as f64 / 10.0, 3.5 - 0.1 * k as f64);
+            let row = format!("s{id},cut-in,{time_s},{},4.5,1.8,left,4.2,1.9,20,{y}\n", 28 + id % 3);
+            text.push_str(&change(id, k).unwrap_or(row));
+        }
+    }
+    text
+}
+
+/// A row with this speed and lateral position of the target.
+fn row(id: usize, k: usize, speed: f64, y: f64) -> Option<String> {
+    Some(format!("s{id},cut-in,{},30,4.5,1.8,left,4.2,1.9,{speed},{y}\n", k as f64 / 10.0))
+}
+
+#[test]
+fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_of_them_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = |text: &str, more: &[&str]| {
+        file(dir.path(), "s.csv", text);
+        said(dir.path(), &[&["study", "--scenarios", "s.csv", "--out", "out", "--backend", "cpu"], more].concat())
+    };
+    assert_eq!(study(&cut_ins(30, |_, _| None), &[]).0, 0);
+    // 2.5 m to the side in 0.1 s.
+    let jump = |id, k| if (id, k) == (7, 10) { row(7, 10, 20.0, 0.0) } else { None };
+    let (code, text) = study(&cut_ins(30, jump), &[]);
+    assert_eq!(code, 4, "{text}");
+    assert!(text.contains("column `target_lateral_m[9]`, scenario s7: a jump to the side: -26 m/s"), "{text}");
+    let run: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    assert_eq!(run["categories"][0]["kept"].as_u64(), Some(29));
+    assert!(run["left_out"][0].as_str().unwrap().contains("scenario s7"), "{}", run["left_out"]);
+    let (code, text) = study(&cut_ins(30, jump), &["--accept-implausible"]);
+    assert!(code == 0 && text.contains("an implausible lateral speed is used as it is, once"), "{text}");
+    let run: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
+    assert!(run["notes"][0].as_str().unwrap().contains("lateral speed"), "{}", run["notes"]);
+    // Neither of two scenarios of one id is used, and both count.
+    let doubled = |times: usize| {
+        let first = cut_ins(times, |_, _| None);
+        cut_ins(30, |_, _| None) + first.split_once('\n').unwrap().1
+    };
+    assert_eq!(study(&doubled(1), &[]).0, 4);
+    let (code, text) = study(&doubled(2), &[]);
+    assert!(code == 3 && text.contains("4 of 32 scenarios cannot be used"), "{text}");
+    // A table in kilometres per hour.
+    let (code, text) = study(&cut_ins(30, |id, k| row(id, k, 108.0, 3.5)), &[]);
+    assert_eq!(code, 3, "{text}");
+    assert!(text.contains("30 of 30 scenarios cannot be used") && text.contains("and 10 more"), "{text}");
+    assert!(text.contains("scenario s0: 108 m/s") && text.contains("scenario s19: 108 m/s"), "{text}");
+    assert!(text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"), "{text}");
+    // All kinds of errors at once.
+    let spoilt = |id, k| match (id, k) {
+        (1, 3) => Some("s1,cut-in,soon,30,4.5,1.8,left,4.2,1.9,20,3\n".to_owned()),
+        (2, 3) => row(2, 3, -7.0, 3.0),
+        (3, 0) => Some("s3,cut-in,0,30,4.5,1.8,up,4.2,1.9,20,3.5\n".to_owned()),
+        (4, 19) => row(4, 25, 20.0, 1.6),
+        _ => None,
+    };
+    let (code, text) = study(&cut_ins(30, spoilt), &[]);
+    assert_eq!(code, 3, "{text}");
+    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "is \"left\", but \"up\"", "not equally spaced"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(study(&cut_ins(50, spoilt), &[]).0, 4);
+}
+
+#[test]
+fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let is_still = |name: &str, content: &str| {
+        let path = file(dir.path(), name, content);
+        let read = lanesweep::scenario::read_scenario_file(&path, Default::default()).unwrap();
+        assert!(read.problems.is_empty() && read.notes.len() == 1, "{name}: {:?}", read.notes);
+        assert!(read.notes[0].contains("between -0.5 and 0 m/s is taken as 0, once"), "{name}: {:?}", read.notes);
+        assert!(read.scenarios.iter().any(|s| s.target.v.contains(&0.0)), "{name}");
+    };
+    is_still("i.csv", &INSTANTS.replace("36,0.1", "-0.036,0.1"));
+    assert!(
+        of("i.csv", &INSTANTS.replace("36,0.1", "-1.8,0.1")).unwrap_err().to_string().contains("is -0.5; expected")
+    );
+    let cases = "category,ego_speed,speed,acceleration\nlvd,20,SPEED,0\n";
+    is_still("c.csv", &cases.replace("SPEED", "-0.01"));
+    let error = of("c.csv", &cases.replace("SPEED", "-0.5")).unwrap_err().to_string();
+    assert!(error.contains("line 2, column `speed`"), "{error}");
+    let line = |speed: f64| {
+        format!(
+            "{{\"id\":\"a\",\"category\":\"lvd\",\"fps\":10,\"side\":\"left\",\"ego\":{{\"v0\":20,\"length\":4,\"width\":2}},\
+             \"target\":{{\"length\":4,\"width\":2,\"v\":[1,{speed}],\"y\":[0,0]}}}}\n"
+        )
+    };
+    is_still("s.jsonl", &line(-0.01));
+    assert!(of("s.jsonl", &line(-0.5)).unwrap_err().to_string().contains("`target.v[1]`"));
+    let of_parquet = |speed: f64| {
+        let mut columns = least();
+        columns.retain(|(name, _)| *name != "target_v");
+        columns.push(("target_v", made::series(&[vec![20.0, 20.0, 25.0], vec![1.0, speed]])));
+        through(columns, Compression::UNCOMPRESSED)
+    };
+    assert_eq!(of_parquet(-0.49).unwrap()[1].target.v, [1.0, 0.0]);
+    assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
+
+    let lvd = |speed: &str| ["simulate --category lvd --model FSM --ego-speed 30 --gap 30 --speed", speed].join(" ");
+    let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    let (code, text) = simulate(&lvd("-0.01"));
+    assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");
+    assert_eq!(simulate(&lvd("-0.5")).0, 2);
+    let map = |speed: &str| {
+        let set = format!("other_speed_mps={speed}");
+        let map = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", "deceleration_mps2=1"];
+        said(dir.path(), &[&map[..], &["--set", &set, "--out", "map"]].concat())
+    };
+    let (code, text) = map("-0.01");
+    assert!(code == 0 && text.contains("taken as 0, once: other_speed_mps = -0.01"), "{text}");
+    assert_eq!(map("-0.5").0, 2);
+    assert_eq!(map("108").0, 2);
+}
+
+#[test]
+fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
+    let dir = tempfile::tempdir().unwrap();
+    let cut_in = "simulate --category cut-in --model FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
+    let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
+    let (code, text) = simulate("108");
+    assert!(
+        code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
+        "{text}"
+    );
+    let (code, text) = simulate("108 --accept-implausible");
+    assert!(code == 0 && text.contains("WARN an implausible speed is used as it is"), "{text}");
+    let (code, text) = simulate("90");
+    assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
+    let (code, text) = simulate("30 --acceleration 6");
+    assert!(code == 2 && text.contains("acceleration: it leads to a speed that no vehicle has: 740 m/s"), "{text}");
+    assert_eq!(simulate("30 --acceleration 6 --end-speed 40").0, 0);
+    let (code, text) = simulate("30 --length 430");
+    assert!(code == 2 && text.contains("430 looks like cm: 4.3 m"), "{text}");
+}

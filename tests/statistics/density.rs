@@ -1,0 +1,609 @@
+//! Densities: what published programs give, what must hold of any density, and the way from a scenario to a
+//! point and on to a case.
+
+use crate::common;
+
+use std::sync::OnceLock;
+
+use lanesweep::scenario::parameterization::{
+    CutInParameters, CutOutParameters, Kind, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale,
+    Sizes, SvdLateral, fit_svd,
+};
+use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
+use lanesweep::stats::density::{
+    Bandwidth, BandwidthRule, DataFacts, DensityModel, Driven, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
+    ValidShare, metric, normal_cdf, read_density, wasserstein, write_density,
+};
+use lanesweep::stats::random::Stream;
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use serde_json::Value;
+
+#[test]
+fn a_case_that_needs_a_lateral_speed_is_not_made_without_one() {
+    let sizes = |s: &Scenario| Sizes::of(s);
+    let options = ParameterizationOptions::default();
+    let first = |category: Category| scenarios().iter().find(|s| s.category == category && s.kept).unwrap();
+    let (cut_in, cut_out) = (first(Category::CutIn), first(Category::CutOut));
+    let without = CutInParameters { lateral_speed_mps: None, ..CutInParameters::of(cut_in, &options) };
+    for (key, is_made) in [("1", false), ("2", false), ("3", true), ("4", true)] {
+        assert_eq!(without.case(key, &sizes(cut_in), &options).is_ok(), is_made, "cut-in {key}");
+    }
+    let of = CutOutParameters::of(cut_out, &options).unwrap();
+    let without = CutOutParameters { lateral_speed_mps: None, ..of };
+    for (key, is_made) in [("a", false), ("b", false), ("c", true), ("d", true)] {
+        assert_eq!(without.case(key, &sizes(cut_out), &options).is_ok(), is_made, "cut-out {key}");
+    }
+}
+
+fn golden(name: &str) -> Value {
+    // Python writes infinities, which JSON does not know; they are the scores that underflow.
+    let text = std::fs::read_to_string(common::golden(name)).unwrap().replace("-Infinity", "null");
+    serde_json::from_str(&text).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn assert_near(ours: f64, theirs: f64, tolerance: f64, what: &str) {
+    assert!((ours - theirs).abs() <= tolerance * (1.0 + theirs.abs()), "{what}: {ours} instead of {theirs}");
+}
+
+fn names(d: usize) -> Vec<&'static str> {
+    ["x1", "x2", "x3", "x4", "x5", "x6", "x7"][..d].to_vec()
+}
+
+fn with_bandwidth(points: Vec<Vec<f64>>, scale: Vec<f64>, value: f64) -> Kde {
+    let bandwidth = Bandwidth { value, rule: BandwidthRule::Wide, silverman: value, end: SearchEnd::Inside };
+    Kde::from_parts(points, scale, bandwidth).unwrap()
+}
+
+#[test]
+fn scale_bandwidth_density_and_probabilities_are_those_of_the_published_program() {
+    let golden = golden("kde.json");
+    for case in golden["cases"].as_array().unwrap() {
+        let data = rows(&case["data"]);
+        let (n, d) = (data.len(), data[0].len());
+        let wide = Kde::fit(data.clone(), &names(d), BandwidthRule::Wide).unwrap();
+        for (ours, theirs) in wide.scale().iter().zip(numbers(&case["std_used"])) {
+            assert_near(*ours, theirs, 1e-9, "scale");
+        }
+        let silverman = number(&case["silverman"]);
+        assert_near(wide.bandwidth().silverman, silverman, 1e-12, "Silverman's bandwidth");
+        assert_near(wide.bandwidth().value, number(&case["bandwidth_default"]), 2e-5, "bandwidth");
+        assert_eq!(wide.bandwidth().end, SearchEnd::Inside);
+        let narrow = Kde::fit(data.clone(), &names(d), BandwidthRule::Reduction).unwrap();
+        assert_near(narrow.bandwidth().value, number(&case["bandwidth_maxbw_silverman"]), 2e-5, "bounded bandwidth");
+        assert_eq!(narrow.bandwidth().end, SearchEnd::Upper);
+
+        let scaled: Vec<Vec<f64>> =
+            data.iter().map(|p| p.iter().zip(wide.scale()).map(|(v, s)| v / s).collect()).collect();
+        let scores = LeaveOneOut::new(&scaled);
+        let logs: f64 = wide.scale().iter().map(|s| s.ln()).sum();
+        for score in case["loo_scores"].as_array().unwrap() {
+            // At narrow bandwidths the program lets distant kernels underflow; its search does not go there.
+            let Some(theirs) = score[2].as_f64().filter(|_| number(&score[0]) > 0.5) else { continue };
+            let ours = scores.log_likelihood(number(&score[0])) - n as f64 * logs;
+            assert_near(ours, theirs, 1e-11, "leave-one-out likelihood");
+        }
+
+        let theirs = with_bandwidth(data, wide.scale().to_vec(), number(&case["bandwidth_default"]));
+        let mut sum = 0.0;
+        let queries = rows(&case["query"]);
+        for (x, (density, cdf)) in queries.iter().zip(numbers(&case["density"]).into_iter().zip(numbers(&case["cdf"])))
+        {
+            assert!((theirs.density(x) / density - 1.0).abs() < 1e-9, "density {} {density}", theirs.density(x));
+            assert!((theirs.cdf(x) - cdf).abs() < 1e-9, "cdf {} {cdf}", theirs.cdf(x));
+            sum += theirs.log_density(x);
+        }
+        assert_near(sum, number(&case["loglik_sum"]), 1e-9, "sum of log densities");
+        if let Some(inside) = case["box"]["prob"].as_f64() {
+            let ours = theirs.probability(&numbers(&case["box"]["lower"]), &numbers(&case["box"]["upper"]));
+            assert_near(ours, inside, 1e-9, "probability of a box");
+        }
+    }
+}
+
+#[test]
+fn kernels_under_constraints_weigh_as_in_the_published_program_and_draws_keep_the_constraints() {
+    let golden = golden("kde_constrained.json");
+    let (data, scale) = (rows(&golden["data"]), numbers(&golden["std"]));
+    let kde = with_bandwidth(data, scale, number(&golden["bandwidth"]));
+    let (a, b) = (rows(&golden["A"]), numbers(&golden["b"]));
+    let constrained = kde.constrained(&a, &b).unwrap();
+    for (ours, theirs) in constrained.component_probabilities().iter().zip(numbers(&golden["component_probabilities"]))
+    {
+        assert_near(*ours, theirs, 1e-9, "weight of a kernel on a plane");
+    }
+    let stream = Stream { seed: 3, purpose: 9 };
+    for index in 0..200 {
+        let x = constrained.draw(&stream, index);
+        assert_near(x[0] + 0.5 * x[1], 11.0, 1e-12, "A x");
+    }
+    let given = &golden["conditional"];
+    let (index, value) = (given["i_given"][0].as_u64().unwrap() as usize, number(&given["values"][0]));
+    let conditional = kde.conditional(&[(index, value)]).unwrap();
+    for (ours, theirs) in conditional.component_probabilities().iter().zip(numbers(&given["component_probabilities"])) {
+        assert_near(*ours, theirs, 1e-9, "weight of a kernel given a value");
+    }
+    for index in 0..50 {
+        assert_eq!(conditional.draw(&stream, index)[0], 10.5, "a given value is kept exactly");
+    }
+}
+
+#[test]
+fn draws_on_a_plane_have_the_distribution_of_draws_that_happen_to_lie_near_it() {
+    let data = rows(&golden("kde_constrained.json")["data"]);
+    let kde = Kde::fit(data, &names(3), BandwidthRule::Reduction).unwrap();
+    let plane = kde.constrained(&[vec![1.0, 0.5, 0.0]], &[11.0]).unwrap();
+    let stream = Stream { seed: 11, purpose: 1 };
+    let near: Vec<Vec<f64>> =
+        kde.draws(&stream, 0..400_000).into_iter().filter(|x| (x[0] + 0.5 * x[1] - 11.0).abs() < 0.02).collect();
+    let drawn: Vec<Vec<f64>> = (0..20_000).map(|index| plane.draw(&stream, index)).collect();
+    assert!(near.len() > 2000, "{}", near.len());
+    for j in 0..3 {
+        let moments = |set: &[Vec<f64>]| {
+            let mean = set.iter().map(|x| x[j]).sum::<f64>() / set.len() as f64;
+            (mean, (set.iter().map(|x| (x[j] - mean).powi(2)).sum::<f64>() / set.len() as f64).sqrt())
+        };
+        let ((m1, s1), (m2, s2)) = (moments(&near), moments(&drawn));
+        assert!((m1 - m2).abs() < 5.0 * s1 / (near.len() as f64).sqrt(), "parameter {j}: mean {m1} {m2}");
+        assert!((s1 / s2 - 1.0).abs() < 0.1, "parameter {j}: deviation {s1} {s2}");
+    }
+}
+
+#[test]
+fn constraints_that_make_no_sense_are_refused() {
+    let kde = with_bandwidth(vec![vec![0.0, 0.0], vec![1.0, 2.0]], vec![1.0, 1.0], 0.5);
+    let twice = kde.constrained(&[vec![1.0, 2.0], vec![2.0, 4.0]], &[1.0, 2.0]).unwrap_err();
+    assert!(twice.to_string().contains("depend on each other"), "{twice}");
+    assert!(kde.conditional(&[(0, 1.0), (0, 1.0)]).is_err());
+    assert!(kde.conditional(&[(2, 1.0)]).is_err() && kde.conditional(&[]).is_err());
+    assert!(kde.conditional(&[(0, f64::NAN)]).is_err() && kde.constrained(&[vec![1.0]], &[1.0]).is_err());
+}
+
+#[test]
+fn transport_and_representativeness_are_those_of_the_published_program() {
+    let golden_w = golden("wasserstein.json");
+    for case in golden_w["emd_cases"].as_array().unwrap() {
+        assert_near(wasserstein(&rows(&case["a"]), &rows(&case["b"])), number(&case["W"]), 1e-9, "W");
+    }
+    // Scenarios drawn under the reduction: coefficients with unit vectors u, as the golden has them.
+    let svd = golden("svd.json");
+    let data = rows(&svd["cutin_data"]);
+    let basis = fit_svd(&data, 2, 50, 5, SeriesScale::PerInstant, "golden cut-ins").unwrap();
+    let weighted: Vec<Vec<f64>> =
+        data.iter().map(|z| z.iter().zip(&basis.weights).map(|(z, w)| z * w).collect()).collect();
+    let generated: Vec<Vec<f64>> = rows(&golden_w["kde_samples_U"])
+        .iter()
+        .map(|u| {
+            let mut z = basis.mean.clone();
+            for (j, u) in u.iter().enumerate() {
+                let direction = &basis.directions[j];
+                // The golden's sign: the entry of the largest size is positive.
+                let largest = direction.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+                for (z, v) in z.iter_mut().zip(direction) {
+                    *z += u * basis.singular_values[j] * v * largest.signum();
+                }
+            }
+            z
+        })
+        .collect();
+    for (ours, theirs) in generated.iter().zip(rows(&golden_w["generated_weighted"])) {
+        for (k, theirs) in theirs.iter().enumerate() {
+            assert!((ours[10 * k] - theirs).abs() < 1e-7, "generated scenario: {} {theirs}", ours[10 * k]);
+        }
+    }
+    let (train, test) = weighted.split_at(28);
+    assert_near(wasserstein(&generated, test), number(&golden_w["W_gen_test"]), 1e-9, "W(gen, test)");
+    assert_near(wasserstein(&generated, train), number(&golden_w["W_gen_train"]), 1e-9, "W(gen, train)");
+    assert_near(wasserstein(train, test), number(&golden_w["W_train_test"]), 1e-9, "W(train, test)");
+    assert_near(metric(&generated, train, test), number(&golden_w["M"]), 1e-9, "M");
+
+    let unit: Vec<Vec<f64>> = data
+        .iter()
+        .map(|z| basis.coefficients(z, 3).iter().zip(&basis.singular_values).map(|(c, s)| c / s).collect())
+        .collect();
+    let kde = Kde::fit(unit, &names(3), BandwidthRule::Reduction).unwrap();
+    assert_near(kde.bandwidth().value, number(&golden_w["kde_bandwidth_on_U3"]), 2e-5, "bandwidth on u");
+    for (ours, theirs) in kde.scale().iter().zip(numbers(&golden_w["kde_std"])) {
+        assert_near(*ours, theirs, 1e-9, "scale of u");
+    }
+}
+
+#[test]
+fn draws_have_the_moments_of_the_density_and_any_part_can_be_drawn_alone() {
+    let data = rows(&golden("kde.json")["cases"][2]["data"]);
+    let kde = Kde::fit(data.clone(), &names(3), BandwidthRule::Wide).unwrap();
+    let stream = Stream { seed: 157, purpose: 2 };
+    let n = 200_000;
+    let draws = kde.draws(&stream, 0..n);
+    assert_eq!(draws[1234], kde.draw(&stream, 1234));
+    for j in 0..3 {
+        let moments = |set: &[Vec<f64>]| {
+            let mean = set.iter().map(|x| x[j]).sum::<f64>() / set.len() as f64;
+            (mean, set.iter().map(|x| (x[j] - mean).powi(2)).sum::<f64>() / set.len() as f64)
+        };
+        let ((mean, variance), (of_draws, variance_of_draws)) = (moments(&data), moments(&draws));
+        let expected = variance + kde.spread()[j].powi(2);
+        assert!((mean - of_draws).abs() < 5.0 * (expected / n as f64).sqrt(), "{mean} {of_draws}");
+        assert!((variance_of_draws / expected - 1.0).abs() < 0.02, "{variance_of_draws} {expected}");
+    }
+    // As many draws below a point as the density says.
+    let x = [1.0, 1.5, 6.0];
+    let below = draws.iter().filter(|d| (0..3).all(|j| d[j] <= x[j])).count() as f64 / n as f64;
+    let expected = kde.cdf(&x);
+    assert!((below - expected).abs() < 5.0 * (expected * (1.0 - expected) / n as f64).sqrt(), "{below} {expected}");
+}
+
+#[test]
+fn ten_thousand_points_are_fitted_and_the_bits_do_not_depend_on_the_number_of_threads() {
+    let stream = Stream { seed: 5, purpose: 5 };
+    let source = with_bandwidth(vec![vec![0.0, 10.0], vec![3.0, -4.0]], vec![1.0, 2.0], 1.0);
+    let points = source.draws(&stream, 0..2000);
+    let fit = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Kde::fit(points.clone(), &names(2), BandwidthRule::Wide).unwrap())
+    };
+    let (one, three) = (fit(1), fit(3));
+    assert_eq!(one, three);
+    assert_eq!(one.log_density(&[1.0, 1.0]).to_bits(), three.log_density(&[1.0, 1.0]).to_bits());
+}
+
+/// Not among the quick ones: N² distances, 25 times. `cargo test --release --test statistics density:: -- --ignored`
+#[test]
+#[ignore = "N² distances, 25 times"]
+fn ten_thousand_points_take_seconds() {
+    let stream = Stream { seed: 5, purpose: 5 };
+    let source = with_bandwidth(vec![vec![0.0; 5], vec![3.0; 5]], vec![1.0; 5], 1.0);
+    let points = source.draws(&stream, 0..10_000);
+    let start = std::time::Instant::now();
+    let kde = Kde::fit(points, &names(5), BandwidthRule::Wide).unwrap();
+    println!("10,000 points, 5 parameters: {:?}, h {}", start.elapsed(), kde.bandwidth().value);
+    assert!(start.elapsed().as_secs() < 120);
+}
+
+#[test]
+fn a_density_that_cannot_be_told_is_refused_with_the_reason() {
+    let fit = |points: Vec<Vec<f64>>| Kde::fit(points, &names(2), BandwidthRule::Reduction).unwrap_err().to_string();
+    assert!(fit(vec![]).contains("no scenario"));
+    assert!(fit(vec![vec![1.0, 2.0]]).contains("1 scenario cannot"));
+    assert!(fit(vec![vec![1.0, 2.0], vec![2.0, 1.0]]).contains("2 scenarios cannot tell a density of 2 parameters"));
+    let flat = fit(vec![vec![1.0, 2.0], vec![2.0, 2.0], vec![4.0, 2.0]]);
+    assert!(flat.contains("`x2`") && flat.contains("is 2 in all 3 scenarios"), "{flat}");
+    let nan = fit(vec![vec![1.0, 2.0], vec![f64::NAN, 2.5], vec![4.0, 3.0]]);
+    assert!(nan.contains("kernel 2") && nan.contains("`x1`"), "{nan}");
+}
+
+/// Kept scenarios of all categories, mined from generated recordings.
+fn scenarios() -> &'static [Scenario] {
+    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
+    MINED.get_or_init(|| {
+        let generator = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+    })
+}
+
+fn kept(category: Category) -> Vec<&'static Scenario> {
+    scenarios().iter().filter(|s| s.category == category && s.kept).collect()
+}
+
+fn space(id: ParameterizationId, options: &ParameterizationOptions, with_thw: bool) -> ParameterSpace {
+    let reduction = Reduction::fit(id.category, &kept(id.category), options).unwrap();
+    ParameterSpace::new(id, options, Some(&reduction), with_thw).unwrap()
+}
+
+fn facts() -> DataFacts {
+    DataFacts {
+        data: "SYNTHETIC DATA".to_owned(),
+        synthetic: true,
+        scenarios_sha256: "0".repeat(64),
+        driven: Some(Driven { hours: Some(10.0), kilometres: Some(1000.0) }),
+    }
+}
+
+fn model(category: Category, key: &str) -> DensityModel {
+    let id = ParameterizationId::find(category, key).unwrap();
+    let options = FitOptions { valid_draws: 20_000, representativeness: false, with_thw: true, ..Default::default() };
+    DensityModel::fit(id, scenarios(), &facts(), &options).unwrap().model
+}
+
+/// Equal up to the rounding of T = (v0 − v1)/ā.
+fn assert_same_case(ours: &Case, theirs: &Case, what: &str) {
+    let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{what}: {a} instead of {b}");
+    let series = |a: &[f64], b: &[f64]| {
+        assert_eq!(a.len(), b.len(), "{what}: length of a series");
+        a.iter().zip(b).for_each(|(a, b)| near(*a, *b));
+    };
+    let speed = |a: &Speed, b: &Speed| match (a, b) {
+        (
+            Speed::Kinematic { initial_mps, acceleration_mps2, until_s },
+            Speed::Kinematic { initial_mps: i, acceleration_mps2: a, until_s: u },
+        ) => {
+            near(*initial_mps, *i);
+            near(*acceleration_mps2, *a);
+            near(*until_s, *u);
+        }
+        (Speed::Sampled(a), Speed::Sampled(b)) => series(a, b),
+        _ => panic!("{what}: another kind of speed"),
+    };
+    let lateral = |a: &Lateral, b: &Lateral| match (a, b) {
+        (
+            Lateral::Sampled { position_m, towards_mps },
+            Lateral::Sampled { position_m: position, towards_mps: towards },
+        ) => {
+            series(position_m, position);
+            series(towards_mps, towards);
+        }
+        _ => assert_eq!(a, b, "{what}"),
+    };
+    near(ours.horizon_s, theirs.horizon_s);
+    near(ours.ego_speed_mps, theirs.ego_speed_mps);
+    speed(&ours.principal.speed, &theirs.principal.speed);
+    lateral(&ours.principal.lateral, &theirs.principal.lateral);
+    assert_eq!(ours.ahead.is_some(), theirs.ahead.is_some(), "{what}");
+    if let (Some(a), Some(b)) = (&ours.ahead, &theirs.ahead) {
+        near(a.gap_m, b.gap_m);
+        speed(&a.vehicle.speed, &b.vehicle.speed);
+        lateral(&a.vehicle.lateral, &b.vehicle.lateral);
+        assert_eq!((a.vehicle.length_m, a.vehicle.width_m), (b.vehicle.length_m, b.vehicle.width_m), "{what}");
+    }
+    let sizes = |c: &Case| (c.ego_length_m, c.ego_width_m, c.principal.length_m, c.principal.width_m);
+    assert_eq!(sizes(ours), sizes(theirs), "{what}");
+}
+
+/// A point of a decomposition with left-positive series belongs to the left.
+fn mirrored(mut case: Case) -> Case {
+    if let Lateral::Sampled { position_m, .. } = &mut case.principal.lateral {
+        position_m.iter_mut().for_each(|y| *y = -*y);
+    }
+    case
+}
+
+#[test]
+fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
+    for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
+        let options = ParameterizationOptions { svd_lateral, ..ParameterizationOptions::default() };
+        let mut compared = 0;
+        for id in ParameterizationId::ALL {
+            let space = space(id, &options, true);
+            for scenario in kept(id.category) {
+                let what = format!("{} under {}", scenario.id, id.key);
+                let point = space.point(scenario).unwrap();
+                space.check(&point).unwrap_or_else(|invalid| panic!("{what}: {invalid}"));
+                assert_eq!(space.thw_s(&point), scenario.thw0);
+                let ours = space.case(&point, &Sizes::of(scenario), 0.04).unwrap();
+                let theirs = match (id.kind, space.reduction()) {
+                    (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, 0.04).unwrap(),
+                    _ => id.kinematic_case(scenario, 0.04, &options).unwrap(),
+                };
+                let from_right = svd_lateral == SvdLateral::Signed && scenario.side == Side::Right;
+                if id.category == Category::Lvd && id.kind == Kind::Kinematic {
+                    assert_same_case(&ours, &theirs, &what);
+                } else if from_right {
+                    assert_eq!(mirrored(ours), theirs, "{what}");
+                } else {
+                    assert_eq!(ours, theirs, "{what}");
+                }
+                compared += 1;
+            }
+        }
+        assert!(compared > 19 * 20, "{compared}");
+    }
+}
+
+#[test]
+fn every_kind_of_impossible_point_is_refused_by_its_parameter() {
+    let options = ParameterizationOptions::default();
+    let find = |category, key| space(ParameterizationId::find(category, key).unwrap(), &options, true);
+    let refused = |space: &ParameterSpace, point: &[f64]| space.check(point).unwrap_err().parameter;
+    let two = find(Category::CutIn, "2");
+    // v_target, lateral speed, v_ego, acceleration, T, THW
+    let good = [20.0, 1.0, 25.0, -0.5, 3.0, 1.2];
+    two.check(&good).unwrap();
+    for (at, value, parameter) in [
+        (0, -0.1, "v_target_mps"),
+        (1, 0.0009, "lateral_speed_mps"),
+        (2, -1e-9, "v_ego_mps"),
+        (3, f64::NAN, "acceleration_target_mps2"),
+        (4, 0.09, "duration_s"),
+        (4, 1e9, "duration_s"),
+        (5, 0.0, "thw_s"),
+        (0, f64::INFINITY, "v_target_mps"),
+    ] {
+        let mut point = good;
+        point[at] = value;
+        assert_eq!(refused(&two, &point), parameter);
+        assert!(!two.is_valid(&point) && two.case(&point, &Sizes::of(kept(Category::CutIn)[0]), 0.04).is_err());
+    }
+    assert_eq!(refused(&two, &good[..5]), "number of parameters");
+    let i = find(Category::Lvd, "i");
+    i.check(&[20.0, 10.0, 2.0, 1.0]).unwrap();
+    assert_eq!(refused(&i, &[20.0, 20.0, 2.0, 1.0]), "v1_mps");
+    assert_eq!(refused(&i, &[20.0, 10.0, 0.0, 1.0]), "mean_deceleration_mps2");
+    assert_eq!(refused(&i, &[20.0, 19.9, 2.0, 1.0]), "duration_s");
+    assert_eq!(refused(&i, &[20.0, 10.0, 1e-9, 1.0]), "duration_s");
+    let b = find(Category::CutOut, "b");
+    let at = b.index_of("gap_lead_m").unwrap();
+    let mut point = b.point(kept(Category::CutOut)[0]).unwrap();
+    point[at] = -0.1;
+    assert_eq!(refused(&b, &point), "gap_lead_m");
+    let error = b.index_of("gap_m").unwrap_err();
+    assert!(error.to_string().contains("did you mean `gap_lead_m`"), "{error}");
+}
+
+#[test]
+fn a_reconstruction_is_refused_where_its_own_duration_speed_or_gap_is_impossible() {
+    let options = ParameterizationOptions::default();
+    for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "g"), (Category::Lvd, "v")] {
+        let space = space(ParameterizationId::find(category, key).unwrap(), &options, false);
+        let reduction = space.reduction().unwrap();
+        let (mut refused, mut clamped) = (std::collections::BTreeSet::new(), 0);
+        let stream = Stream { seed: 8, purpose: 3 };
+        let points: Vec<Vec<f64>> = kept(category).iter().map(|s| space.point(s).unwrap()).collect();
+        let far = Kde::fit(points, &names(space.dimensions()), BandwidthRule::Wide).unwrap();
+        let speeds = match category {
+            Category::CutIn => 50..100,
+            Category::CutOut => 50..150,
+            Category::Lvd => 0..50,
+        };
+        for mut point in far.draws(&stream, 0..4000) {
+            point.iter_mut().for_each(|c| *c *= 6.0);
+            let z = reduction.basis.reconstruct(&point);
+            let (duration, ego) = (z[reduction.duration_column()], z[reduction.ego_speed_column()]);
+            let gap = reduction.lead_gap_column().map_or(1.0, |c| z[c]);
+            let possible = (0.1..=600.0).contains(&duration) && ego >= 0.0 && gap >= 0.0;
+            match space.check(&point) {
+                Ok(()) => assert!(possible),
+                Err(invalid) => {
+                    assert!(!possible, "{invalid}");
+                    refused.insert(invalid.parameter);
+                }
+            }
+            if possible && z[speeds.clone()].iter().any(|v| *v < 0.0) {
+                let reduced = space.reduced(&point).unwrap();
+                assert!(reduced.v.iter().chain(&reduced.v_lead).all(|v| *v >= 0.0));
+                clamped += 1;
+            }
+        }
+        assert!(refused.contains("duration_s") && refused.contains("v_ego_mps"), "{key}: {refused:?}");
+        assert!(clamped > 0, "{key}: speeds inside a series are set to 0, not refused");
+    }
+}
+
+#[test]
+fn the_valid_share_counts_what_the_density_says() {
+    // Ego speeds near 0: the share above it is known of the normal kernels.
+    let id = ParameterizationId::find(Category::CutIn, "3").unwrap();
+    let space = ParameterSpace::new(id, &ParameterizationOptions::default(), None, false).unwrap();
+    let kde = with_bandwidth(vec![vec![1.0, 0.5], vec![2.0, 3.0]], vec![1.0, 1.0], 1.0);
+    let expected = 0.5 * (normal_cdf(1.0) * normal_cdf(0.5) + normal_cdf(2.0) * normal_cdf(3.0));
+    assert!((kde.probability(&[0.0; 2], &[f64::INFINITY; 2]) - expected).abs() < 1e-14);
+    let share = ValidShare::count(&kde, &space, 100_000, 1).unwrap();
+    assert!((share.estimate - expected).abs() < 0.006, "{} {expected}", share.estimate);
+    assert!(share.low < expected && expected < share.high, "{share:?} {expected}");
+    let nowhere = with_bandwidth(vec![vec![-100.0, -100.0]], vec![1.0, 1.0], 1.0);
+    assert!(ValidShare::count(&nowhere, &space, 1000, 1).is_err());
+}
+
+#[test]
+fn a_density_file_gives_the_same_density_to_the_last_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "g"), (Category::Lvd, "iii")] {
+        let written = model(category, key);
+        let path = dir.path().join("density.json");
+        write_density(&path, &written).unwrap();
+        let read = read_density(&path).unwrap();
+        assert_eq!(read.kde, written.kde);
+        assert_eq!((read.valid, read.sizes, read.exposure), (written.valid, written.sizes, written.exposure));
+        assert_eq!(read.provenance, written.provenance);
+        assert_eq!(read.space.parameters(), written.space.parameters());
+        assert_eq!(read.content_sha256().unwrap(), written.content_sha256().unwrap());
+        assert_eq!(read.to_json().unwrap(), std::fs::read(&path).unwrap());
+        let stream = Stream { seed: 4, purpose: 4 };
+        let mut valid = 0;
+        for point in read.kde.draws(&stream, 0..200) {
+            assert_eq!(read.space.is_valid(&point), written.space.is_valid(&point));
+            if read.space.is_valid(&point) {
+                let case = |m: &DensityModel| m.space.case(&point, &m.sizes, 0.04).unwrap();
+                assert_eq!(case(&read), case(&written));
+                assert!(read.log_truncated_density(&point).is_finite());
+                valid += 1;
+            }
+        }
+        assert!(valid > 100);
+        assert_eq!(read.mixture().unwrap().dimensions(), read.space.dimensions());
+    }
+}
+
+#[test]
+fn spoiled_density_files_are_told_with_file_and_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("density.json");
+    write_density(&path, &model(Category::CutIn, "1")).unwrap();
+    let good = std::fs::read_to_string(&path).unwrap();
+    let edited = |from: &str, to: &str| {
+        assert!(good.contains(from), "{from}");
+        good.replacen(from, to, 1)
+    };
+    let first_kernel = good.split("\"kernels\": [[").nth(1).unwrap().split(']').next().unwrap().to_owned();
+    for (text, expected) in [
+        (edited("\"lanesweep_density\": 1", "\"lanesweep_density\": 2"), "version 2, but this program reads version 1"),
+        (edited("\"lanesweep_density\": 1,", ""), "`lanesweep_density` is missing"),
+        (edited("\"scale\"", "\"scales\""), "unknown field `scales`"),
+        (edited("\"with_thw\": true,", ""), "missing field `with_thw`"),
+        (edited(&first_kernel, "1e999, 1, 1, 1"), "number out of range"),
+        (edited(&first_kernel, "NaN, 1, 1, 1"), "expected value"),
+        (edited(&first_kernel, "1, 1, 1, 1"), "changed after it was written"),
+        (good.replacen('{', "", 1), "not a density file"),
+        (String::new(), "not a density file"),
+        (good[..good.len() / 2].to_owned(), "not a density file"),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let error = read_density(&path).unwrap_err().to_string();
+        assert!(error.contains("density.json") && error.contains(expected), "{expected}: {error}");
+    }
+    let absent = read_density(&dir.path().join("absent.json")).unwrap_err();
+    assert!(absent.to_string().contains("absent.json"), "{absent}");
+}
+
+#[test]
+fn white_space_may_change_but_lengths_must_fit() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("density.json");
+    let written = model(Category::CutIn, "5");
+    let good: Value = serde_json::from_slice(&written.to_json().unwrap()).unwrap();
+    let place = lanesweep::Place::file(&path);
+    let compact = serde_json::to_vec(&good).unwrap();
+    assert_eq!(DensityModel::from_json(&compact, &place).unwrap().kde, written.kde);
+    // A hand-made file with the right checksum is checked all the same; the checksum is told in the error.
+    for (pointer, value, expected) in [
+        ("/kernels/3", serde_json::json!([1.0]), "kernel 4"),
+        ("/scale", serde_json::json!([1.0, 1.0]), "2 numbers"),
+        ("/scale/1", serde_json::json!(-1.0), "not above 0"),
+        ("/bandwidth/value", serde_json::json!(0.0), "bandwidth 0"),
+        ("/bandwidth/value", serde_json::json!(1e308), "1e308; expected 1e-9 to 1000"),
+        ("/scale/1", serde_json::json!(1e-300), "`c2` is 1e-300 1; expected 1e-9 to 1000000 1"),
+        ("/kernels/2/0", serde_json::json!(1e308), "kernel 3: `c1` is 1e308 1; expected −1000000 to 1000000 1"),
+        ("/sizes/target/width_m", serde_json::json!(1e39), "expected 0.1 to 100 m"),
+        ("/basis/mean", serde_json::json!([1.0]), "a row of 1 numbers"),
+        ("/basis/weights/7", serde_json::json!(0.0), "a weight is not above 0"),
+        ("/basis", Value::Null, "needs a decomposition"),
+        ("/parameterization", serde_json::json!("9"), "there is no `9`"),
+        ("/parameters/0/unit", serde_json::json!("km"), "unit and bounds"),
+        ("/p_valid/estimate", serde_json::json!(1.5), "no share"),
+        ("/sizes/ego/length_m", serde_json::json!(0.0), "expected 0.1 to 100 m"),
+    ] {
+        let mut file = good.clone();
+        *file.pointer_mut(pointer).unwrap() = value;
+        let told = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
+        let hash = told.split("the content has ").nth(1).unwrap()[..64].to_owned();
+        file["content_sha256"] = Value::String(hash);
+        let error = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
+        assert!(error.contains("density.json") && error.contains(expected), "{pointer}: {error}");
+    }
+}
+
+#[test]
+fn scenarios_without_a_headway_are_left_out_of_a_density_with_it_and_counted() {
+    let id = ParameterizationId::find(Category::CutIn, "1").unwrap();
+    let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
+    some[0].thw0 = None;
+    some[1].target.v[0] = 0.0;
+    let options = FitOptions { valid_draws: 1000, representativeness: false, with_thw: true, ..Default::default() };
+    let fitted = DensityModel::fit(id, &some, &facts(), &options).unwrap();
+    assert_eq!(fitted.left_out.len(), 1);
+    assert!(fitted.left_out[0].to_string().contains("thw0"), "{}", fitted.left_out[0]);
+    assert_eq!(fitted.model.provenance.left_out, 1);
+    assert_eq!(fitted.model.kde.points().len(), some.len() - 1);
+    assert_eq!(fitted.model.exposure.unwrap().events, some.len() as u64);
+}

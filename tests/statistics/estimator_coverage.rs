@@ -1,0 +1,361 @@
+//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator, and how far estimates of
+//! 10⁻⁶ lie off. Minutes long:
+//!
+//! ```text
+//! cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture
+//! ```
+
+use lanesweep::engine::Confusion;
+use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
+use lanesweep::stats::density::{Mixture, normal_quantile};
+use lanesweep::stats::estimate::{
+    BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot,
+    StandardNormal, StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy,
+    from_counts, from_pilot, monte_carlo, subset,
+};
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+
+use crate::common::reliability::{four_branch, four_branch_probability, linear, silverman, tail, unit_mixture};
+
+const REPEATS: u64 = 1000;
+
+/// What many repeats of one estimator on one problem came to.
+struct Row {
+    name: String,
+    truth: f64,
+    coverage: f64,
+    median_error: f64,
+    bias: f64,
+    runs: f64,
+    gain: f64,
+    sound: f64,
+}
+
+fn repeat(name: &str, truth: f64, repeats: u64, estimate: impl Fn(u64) -> Estimate + Sync) -> Row {
+    let started = std::time::Instant::now();
+    let all: Vec<Estimate> = (0..repeats).into_par_iter().map(|seed| estimate(1000 + seed)).collect();
+    let n = repeats as f64;
+    let mean = |f: &dyn Fn(&Estimate) -> f64| all.iter().map(f).sum::<f64>() / n;
+    let mut errors: Vec<f64> = all.iter().map(|e| (e.probability / truth - 1.0).abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    let variance = mean(&|e| (e.probability - truth).powi(2));
+    let row = Row {
+        name: name.to_owned(),
+        truth,
+        coverage: mean(&|e| f64::from(u8::from(e.interval.holds(truth)))),
+        median_error: errors[errors.len() / 2],
+        bias: mean(&|e| e.probability) / truth - 1.0,
+        runs: mean(&|e| e.runs as f64),
+        gain: truth * (1.0 - truth) / (mean(&|e| e.runs as f64) * variance),
+        sound: mean(&|e| f64::from(u8::from(e.trust.verdict() == Verdict::Sound))),
+    };
+    println!(
+        "{:44} {:10.3e} {:8.1} % {:8.1} % {:+8.1} % {:9.0} {:10.1} {:6.1} % {:6.1} s",
+        row.name,
+        row.truth,
+        100.0 * row.coverage,
+        100.0 * row.median_error,
+        100.0 * row.bias,
+        row.runs,
+        row.gain,
+        100.0 * row.sound,
+        started.elapsed().as_secs_f64(),
+    );
+    row
+}
+
+fn heading() {
+    println!(
+        "{:44} {:>10} {:>10} {:>10} {:>10} {:>9} {:>10} {:>8} {:>8}",
+        "estimator and problem", "truth", "coverage", "median err", "bias", "runs", "gain", "sound", "took"
+    );
+}
+
+/// Collects rows that miss their goal, so that one run shows all of them.
+#[derive(Default)]
+struct Misses(Vec<String>);
+
+impl Misses {
+    fn want(&mut self, holds: bool, row: &Row, goal: &str) {
+        if !holds {
+            self.0.push(format!("{}: coverage {:.1} %, wanted {goal}", row.name, 100.0 * row.coverage));
+        }
+    }
+}
+
+impl Drop for Misses {
+    fn drop(&mut self) {
+        assert!(std::thread::panicking() || self.0.is_empty(), "{}", self.0.join("\n"));
+    }
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn binomial_intervals_hold() {
+    heading();
+    let mut misses = Misses::default();
+    for (beta, dimensions, samples) in [(2.0, 2, 440), (2.0, 10, 2200), (2.5, 5, 3000), (3.0, 2, 20_000)] {
+        let density = StandardNormal { dimensions };
+        for (interval, name) in
+            [(BinomialInterval::Wilson, "Wilson"), (BinomialInterval::ClopperPearson, "Clopper-Pearson")]
+        {
+            let row = repeat(&format!("{name}, linear {beta}, d = {dimensions}"), tail(beta), REPEATS, |seed| {
+                let options = MonteCarlo { interval, ..MonteCarlo::new(seed, samples) };
+                monte_carlo(&density, &linear(beta), &options).expect("an estimate")
+            });
+            match interval {
+                BinomialInterval::Wilson => {
+                    misses.want((0.93..=0.97).contains(&row.coverage), &row, "93-97 %");
+                }
+                BinomialInterval::ClopperPearson => misses.want(row.coverage >= 0.95, &row, "95 %"),
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn importance_sampling_intervals_hold() {
+    heading();
+    let mut misses = Misses::default();
+    let mut of = |name: &str, truth: f64, density: &dyn Density, limit: &dyn LimitState| {
+        let limit = |points: &[Vec<f64>]| limit.evaluate(points);
+        let row = repeat(name, truth, REPEATS, |seed| {
+            from_pilot(density, &limit, &silverman, &Pilot::guarded(5000), &Importance::new(seed, 5000))
+                .expect("an estimate")
+        });
+        misses.want(row.coverage >= 0.92, &row, "92 %");
+    };
+    for (beta, d) in [(2.0, 2), (3.0, 2), (3.5, 2), (2.5, 5), (3.0, 5), (2.0, 10)] {
+        let density = StandardNormal { dimensions: d };
+        of(&format!("pilot KDE, linear {beta}, d = {d}"), tail(beta), &density, &linear(beta));
+    }
+    let truth = four_branch_probability(3.0, 3.5);
+    of("pilot KDE, four branches", truth, &StandardNormal { dimensions: 2 }, &four_branch(3.0, 3.5));
+    // Half of the plane cut off: the first parameter is a speed.
+    let half = Truncated::with_share(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a share");
+    let slow = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
+    of("pilot KDE, half cut off", 2.0 * tail(3.0), &half, &slow);
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn balanced_proposals_hold() {
+    heading();
+    let mut misses = Misses::default();
+    let density = StandardNormal { dimensions: 2 };
+    let at = |x: f64, y: f64| Mixture::of_kernels(vec![vec![x, y]], &[1.0, 1.0]).expect("well formed");
+    // One proposal for each branch: with a branch left out the nominal draws meet it once or so, and no interval can
+    // hold (the weights then warn of few effective failures).
+    let branches = [at(2.3, 2.3), at(-2.3, -2.3), at(2.7, -2.7), at(-2.7, 2.7)];
+    let row = repeat("balance, four branches", four_branch_probability(3.0, 3.5), REPEATS, |seed| {
+        let mut techniques = vec![Technique { proposal: &density, draws: 1000 }];
+        techniques.extend(branches.iter().map(|proposal| Technique { proposal, draws: 1000 }));
+        balance_heuristic(&density, &techniques, &four_branch(3.0, 3.5), seed, 0.95).expect("an estimate")
+    });
+    misses.want(row.coverage >= 0.92, &row, "92 %");
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn cross_entropy_intervals_hold() {
+    heading();
+    let mut misses = Misses::default();
+    for (beta, d) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.0, 10), (5.0, 2)] {
+        let density = StandardNormal { dimensions: d };
+        let row = repeat(&format!("cross-entropy, linear {beta}, d = {d}"), tail(beta), REPEATS, |seed| {
+            let options = CrossEntropy::new(seed, 2000, 5000);
+            cross_entropy(&density, &linear(beta), &options).expect("an estimate").estimate
+        });
+        misses.want(row.coverage >= 0.90, &row, "90 %");
+    }
+    let density = StandardNormal { dimensions: 2 };
+    let row = repeat("cross-entropy, four branches", four_branch_probability(3.0, 3.5), REPEATS, |seed| {
+        let options = CrossEntropy::new(seed, 2000, 5000);
+        cross_entropy(&density, &four_branch(3.0, 3.5), &options).expect("an estimate").estimate
+    });
+    misses.want(row.coverage >= 0.90, &row, "90 %");
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn subset_simulation_intervals_hold() {
+    heading();
+    let mut misses = Misses::default();
+    let mut of = |name: String, truth: f64, density: &dyn Density, limit: &dyn LimitState| {
+        let limit = |points: &[Vec<f64>]| limit.evaluate(points);
+        let row = repeat(&name, truth, REPEATS, |seed| {
+            subset(density, &limit, &Subset::new(seed, 2000)).expect("an estimate").estimate
+        });
+        misses.want(row.coverage >= 0.85, &row, "85 %");
+    };
+    for (beta, d) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.0, 10), (5.0, 2)] {
+        let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
+        of(format!("subset, mixture, linear {beta}, d = {d}"), tail(beta), &walked, &linear(beta));
+        of(format!("subset, pCN, linear {beta}, d = {d}"), tail(beta), &standard, &linear(beta));
+    }
+    // Kernels in two heaps: far from any Gaussian; the share of each kernel beyond the limit is known.
+    let points: Vec<Vec<f64>> = (0..200)
+        .map(|i| vec![if i % 4 == 0 { 3.0 } else { 0.0 } + 0.005 * f64::from(i), 0.01 * f64::from(i)])
+        .collect();
+    let kernels = Mixture::of_kernels(points.clone(), &[0.5, 0.3]).expect("well formed");
+    let truth = points.iter().map(|p| tail((6.0 - p[0]) / 0.5)).sum::<f64>() / 200.0;
+    let first = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 6.0 - x[0]).collect());
+    of("subset, mixture, two heaps of kernels".to_owned(), truth, &kernels, &first);
+    let truth = four_branch_probability(3.0, 3.5);
+    of("subset, mixture, four branches".to_owned(), truth, &unit_mixture(2), &four_branch(3.0, 3.5));
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn one_in_a_million_is_reached_with_a_hundred_thousand_runs() {
+    heading();
+    let beta = 4.753_424_308_822_899;
+    let truth = tail(beta);
+    assert!((truth / 1e-6 - 1.0).abs() < 1e-9);
+    let mut missed = Vec::new();
+    for d in [2, 5, 10] {
+        let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
+        let rows = [
+            repeat(&format!("subset, mixture, 1e-6, d = {d}"), truth, 100, |seed| {
+                subset(&walked, &linear(beta), &Subset::new(seed, 15_000)).expect("an estimate").estimate
+            }),
+            repeat(&format!("subset, pCN, 1e-6, d = {d}"), truth, 100, |seed| {
+                subset(&standard, &linear(beta), &Subset::new(seed, 15_000)).expect("an estimate").estimate
+            }),
+            repeat(&format!("cross-entropy, 1e-6, d = {d}"), truth, 100, |seed| {
+                let options = CrossEntropy::new(seed, 5000, 40_000);
+                cross_entropy(&standard, &linear(beta), &options).expect("an estimate").estimate
+            }),
+        ];
+        missed.extend(rows.into_iter().filter(|r| r.runs > 1e5 || r.median_error > 0.2).map(|r| r.name));
+    }
+    assert!(missed.is_empty(), "more than 100,000 runs, or a median error above 20 %: {missed:?}");
+}
+
+/// Draws of a scenario: hardness is Φ(μ + σZ), which has the mean Φ(μ/√(1 + σ²)).
+fn sampled_scenarios(n: usize, [mean, spread]: [f64; 2], seed: u64) -> (Vec<u64>, Vec<u64>) {
+    const DRAWS: u64 = 4000;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let hardness: Vec<f64> = (0..n).map(|_| tail(-(mean + spread * normal_quantile(uniform().max(1e-12))))).collect();
+    let (mut runs, mut failures) = (vec![0; n], vec![0; n]);
+    for _ in 0..DRAWS {
+        let kernel = (uniform() * n as f64) as usize;
+        runs[kernel] += 1;
+        failures[kernel] += u64::from(uniform() < hardness[kernel]);
+    }
+    (runs, failures)
+}
+
+/// Lanes in which S, S' and either of them fail, of one scenario.
+fn confusion(random: &mut ChaCha8Rng, failing: f64, wrong: f64) -> Confusion<u32> {
+    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let s = if uniform() < failing { 1 + (uniform() * uniform() * 10.0) as i32 } else { 0 };
+    let shift = 1 + (uniform() * 2.0) as i32;
+    let shift = if uniform() < 0.5 { shift } else { -shift };
+    let is_wrong = uniform() < if s > 0 { wrong } else { 0.2 * wrong * failing };
+    let s_prime = if is_wrong { (s + shift).clamp(0, 10) } else { s };
+    let count = |n: i32| n.max(0) as u32;
+    Confusion {
+        tp: count(s.min(s_prime)),
+        fn_: count(s - s_prime),
+        fp: count(s_prime - s),
+        tn: count(10 - s.max(s_prime)),
+    }
+}
+
+/// The interval that resampling the scenarios gives.
+fn percentiles(n: usize, seed: u64, of: impl Fn(&[usize]) -> Option<f64>) -> Option<(f64, f64)> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(1);
+    let mut draw = || -> Vec<usize> { (0..n).map(|_| (random.next_u64() % n as u64) as usize).collect() };
+    let mut values: Vec<f64> = (0..200).filter_map(|_| of(&draw())).collect();
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
+    (!values.is_empty()).then(|| (at(0.025), at(0.975)))
+}
+
+fn held(truth: f64, intervals: &[(f64, f64)]) -> f64 {
+    let n = intervals.iter().filter(|(low, high)| *low <= truth && truth <= *high).count();
+    100.0 * n as f64 / intervals.len().max(1) as f64
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn intervals_over_scenarios_hold() {
+    println!("{:>9} {:>8} | coverage of: draws alone, resampled scenarios, ours", "scenarios", "P");
+    let mut missed = Vec::new();
+    for n in [9, 30, 100, 300] {
+        for population in [[-2.3, 0.7], [-3.0, 1.0], [-1.5, 1.5], [0.5, 1.0], [-4.0, 1.5]] {
+            let truth = tail(-population[0] / (1.0_f64 + population[1] * population[1]).sqrt());
+            let of = |seed: u64| {
+                let (runs, failures) = sampled_scenarios(n, population, seed);
+                let (all, failed) = (runs.iter().sum(), failures.iter().sum());
+                let counts = Counts { runs: all, failures: failed, voids: 0, tries: all };
+                let draws = from_counts(&counts, BinomialInterval::Wilson, 0.95, StopReason::Samples).interval;
+                let ours = cluster_rate(Clusters { runs: &runs, failures: &failures }, 0.95).interval;
+                let sum = |of: &[u64], drawn: &[usize]| drawn.iter().map(|at| of[*at]).sum::<u64>() as f64;
+                let rate = |drawn: &[usize]| Some(sum(&failures, drawn) / sum(&runs, drawn).max(1.0));
+                let resampled = percentiles(n, seed, rate).expect("a rate");
+                [(draws.low, draws.high), resampled, (ours.low, ours.high)]
+            };
+            let all: Vec<[(f64, f64); 3]> = (0..REPEATS).into_par_iter().map(of).collect();
+            let coverage = [0, 1, 2].map(|way| held(truth, &all.iter().map(|i| i[way]).collect::<Vec<_>>()));
+            println!("{n:9} {truth:8.4} | {:6.1} % {:6.1} % {:6.1} %", coverage[0], coverage[1], coverage[2]);
+            if coverage[2] < 91.0 {
+                missed.push((n, truth, coverage));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "below 91 %: {missed:?}");
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn intervals_of_f1_hold() {
+    println!("{:>9} {:>7} {:>8} | coverage of: resampled scenarios, ours; mean width", "scenarios", "F1", "S fails");
+    let mut missed = Vec::new();
+    for n in [9, 30, 100] {
+        for failing in [0.03, 0.1, 0.3] {
+            for wrong in [0.02, 0.1, 0.3] {
+                let total = |units: &[Confusion<u32>]| {
+                    let mut sum = Confusion::<u64>::default();
+                    units.iter().for_each(|unit| sum.add(unit));
+                    sum
+                };
+                let mut random = ChaCha8Rng::seed_from_u64(1);
+                let population: Vec<Confusion<u32>> =
+                    (0..200_000).map(|_| confusion(&mut random, failing, wrong)).collect();
+                let truth = f1(&total(&population)).expect("failures");
+                let of = |seed: u64| {
+                    let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
+                    let units: Vec<Confusion<u32>> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
+                    // None below ten failures of S.
+                    let ours = f1_interval(units.iter(), &ScoreOptions::default())?;
+                    let score = |drawn: &[usize]| f1(&total(&drawn.iter().map(|at| units[*at]).collect::<Vec<_>>()));
+                    let value = f1(&total(&units)).expect("failures");
+                    assert!(ours.low <= value && value <= ours.high, "{ours:?} excludes {value}");
+                    let sum = total(&units);
+                    let failures = sum.tp + sum.fn_;
+                    Some(([percentiles(n, seed, score)?, (ours.low, ours.high)], failures))
+                };
+                let all: Vec<([(f64, f64); 2], u64)> = (0..REPEATS).into_par_iter().filter_map(of).collect();
+                if all.len() < 100 {
+                    continue;
+                }
+                let fails = all.iter().map(|(_, failures)| *failures as f64).sum::<f64>() / all.len() as f64;
+                let ways = [0, 1].map(|way| all.iter().map(|(i, _)| i[way]).collect::<Vec<_>>());
+                let coverage = [held(truth, &ways[0]), held(truth, &ways[1])];
+                let width = ways[1].iter().map(|(low, high)| high - low).sum::<f64>() / all.len() as f64;
+                println!("{n:9} {truth:7.4} {fails:8.1} | {:6.1} % {:6.1} %   {width:.2}", coverage[0], coverage[1]);
+                if coverage[1] < 94.0 {
+                    missed.push((n, truth, coverage));
+                }
+            }
+        }
+    }
+    assert!(missed.is_empty(), "below 94 %: {missed:?}");
+}

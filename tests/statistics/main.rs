@@ -1,0 +1,10 @@
+//! Densities and estimators.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod density;
+mod estimator_coverage;
+mod estimators;
+mod estimators_on_lanes;
+mod fit;

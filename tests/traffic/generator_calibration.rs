@@ -1,0 +1,225 @@
+//! The synthetic recordings beside the published figures they are calibrated to.
+//!
+//! Run `cargo test --release --test traffic generator_calibration:: -- --nocapture` to see the tables: figure,
+//! published, ours, and the span outside of which the test fails.
+
+mod traffic;
+
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::traffic::mining::{Mined, MiningOptions, mine};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate};
+use lanesweep::traffic::trajectory::{Recording, VehicleClass};
+use rayon::prelude::*;
+use traffic::{Traffic, class_index, mean, measure, mode, noise_sd_and_correlation, quantile, share};
+
+/// What the paper found in 109,986 data sets: (category, found, kept).
+const PUBLISHED: [(Category, f64, f64); 3] =
+    [(Category::CutIn, 2992.0, 362.0), (Category::CutOut, 3069.0, 819.0), (Category::Lvd, 20351.0, 482.0)];
+const PUBLISHED_SETS: f64 = 109_986.0;
+const PUBLISHED_CROSSINGS_PER_KM: f64 = 0.24;
+
+/// A table that remembers what was outside its span.
+#[derive(Default)]
+struct Table {
+    outside: Vec<String>,
+}
+
+impl Table {
+    fn new(title: &str) -> Table {
+        println!("\n{title}\n{:<58} {:>13} {:>9} {:>19}", "figure", "published", "ours", "must lie in");
+        Table::default()
+    }
+
+    fn row(&mut self, figure: &str, published: &str, ours: f64, low: f64, high: f64) {
+        let ok = (low..=high).contains(&ours);
+        let (digits, mark) = (if ours.abs() < 1.0 { 4 } else { 2 }, if ok { "ok" } else { "OUTSIDE" });
+        println!("{figure:<58} {published:>13} {ours:>9.digits$} {:>19} {mark}", format!("{low:.4} – {high:.4}"));
+        if !ok {
+            self.outside.push(format!("{figure}: {ours} is not in {low} – {high} (published: {published})"));
+        }
+    }
+
+    /// A row whose span is a published number times two factors.
+    fn ratio_row(&mut self, figure: &str, published: f64, ours: f64, low: f64, high: f64) {
+        self.row(figure, &format!("{published:.4}"), ours, low * published, high * published);
+    }
+
+    fn finish(self) {
+        assert!(self.outside.is_empty(), "figures outside their span:\n{}", self.outside.join("\n"));
+    }
+}
+
+struct Counted {
+    recordings: Vec<Recording>,
+    sets: f64,
+    scenarios: Vec<Scenario>,
+}
+
+impl Counted {
+    fn of(options: &GeneratorOptions) -> Counted {
+        let recordings = generate(options).unwrap();
+        let mined: Vec<Mined> = recordings.par_iter().map(|r| mine(r, &MiningOptions::default())).collect();
+        let sets = mined.iter().map(|m| m.data_sets).sum::<u64>() as f64;
+        Counted { recordings, sets, scenarios: mined.into_iter().flat_map(|m| m.scenarios).collect() }
+    }
+
+    fn found(&self, category: Category) -> f64 {
+        self.scenarios.iter().filter(|s| s.category == category).count() as f64
+    }
+
+    fn kept(&self, category: Category) -> impl Iterator<Item = &Scenario> {
+        self.scenarios.iter().filter(move |s| s.category == category && s.kept)
+    }
+
+    fn traffic(&self, options: &GeneratorOptions) -> Traffic {
+        measure(&self.recordings, options.duration_s, options.window_m)
+    }
+}
+
+#[test]
+fn the_default_recordings_look_like_published_motorway_traffic() {
+    let options = GeneratorOptions::default();
+    let counted = Counted::of(&options);
+    let t = counted.traffic(&options);
+    println!("{}", options.describe());
+    let mut table = Table::new("Traffic of the default recordings");
+    let (car, truck) = (class_index(VehicleClass::Car), class_index(VehicleClass::Truck));
+
+    table.row("rows", "≤ 2,000,000", t.rows as f64, 1e6, 2e6);
+    table.row("flow per direction, veh/h", "3350", t.flow_per_direction_vehph, 3150.0, 3550.0);
+    table.row("density, veh/km and lane", "11 – 17", t.density_per_lane_vehpkm, 11.0, 17.0);
+    table.row("visible, median, s", "13.6", quantile(&t.visible_s, 0.5), 12.6, 14.6);
+    let trucks = t.lengths_m[truck].len() as f64 / t.vehicles as f64;
+    table.row("share of trucks", "0.2", trucks, 0.17, 0.23);
+    table.row("speed peak of cars, m/s", "33", mode(&t.mean_speeds_mps[car], 1.5), 31.0, 35.0);
+    table.row("speed peak of trucks, m/s", "23", mode(&t.mean_speeds_mps[truck], 1.0), 22.0, 24.5);
+    table.row("length of cars, mean, m", "4.6", mean(&t.lengths_m[car]), 4.5, 4.75);
+    table.row("width of cars, mean, m", "1.9", mean(&t.widths_m[car]), 1.85, 1.95);
+    table.row("length of trucks, mean, m", "12", mean(&t.lengths_m[truck]), 11.3, 12.7);
+    table.row("width of trucks, mean, m", "2.5", mean(&t.widths_m[truck]), 2.4, 2.6);
+    // Another motorway, with less traffic: its free headways are longer.
+    for (share, published) in [(0.05, 0.71), (0.25, 1.38), (0.5, 2.37), (0.75, 4.14)] {
+        let figure = format!("headway, {} % (DLR-HT, less dense), s", share * 100.0);
+        table.ratio_row(&figure, published, quantile(&t.headways_s, share), 0.65, 1.2);
+    }
+    // Two cars a minute, so that nobody meets anybody: what is left is the noise.
+    let quiet = GeneratorOptions { flow_vehph: 120.0, truck_share: 0.0, event_rate_factor: 0.0, ..options };
+    let (sd, correlation_s) = noise_sd_and_correlation(&generate(&quiet).unwrap());
+    table.row("acceleration noise on an empty road, sd, m/s²", "0.20 – 0.24", sd, 0.2, 0.24);
+    table.row("its correlation time, s", "1.5", correlation_s, 1.3, 1.7);
+    table.finish();
+}
+
+#[test]
+fn lane_changes_and_cut_ins_look_as_published() {
+    let options = GeneratorOptions::default();
+    let counted = Counted::of(&options);
+    let t = counted.traffic(&options);
+    let mut table = Table::new("Lane changes of the default recordings, given that they happen");
+    let complete = t.complete_changes as f64 / t.crossings as f64;
+    table.row("complete among line crossings", "5600/11000", complete, 0.4, 0.75);
+    table.row("duration, 5 %, s", "≥ 2.9", quantile(&t.change_durations_s, 0.05), 2.7, 4.0);
+    table.row("duration, median, s", "2.9 – 7.3", quantile(&t.change_durations_s, 0.5), 4.0, 5.5);
+    table.row("duration, 95 %, s", "≤ 7.3", quantile(&t.change_durations_s, 0.95), 5.5, 7.5);
+    let residual = quantile(&t.quintic_residuals, 0.5);
+    table.row("distance from a quintic, share of the way, median", "close", residual, 0.002, 0.03);
+    let headways = &t.cut_in_headways_s;
+    table.row("THW at cut-in, mode, s", "0.8 – 1.0", mode(headways, 0.2), 0.75, 1.1);
+    table.row("THW at cut-in, share below 0.5 s", "0.04", share(headways, |h| h < 0.5), 0.025, 0.055);
+    table.row("THW at cut-in, share 0.5 – 2.5 s", "bulk", share(headways, |h| (0.5..2.5).contains(&h)), 0.65, 0.9);
+    table.finish();
+}
+
+#[test]
+fn at_rate_factor_one_scenarios_are_as_frequent_as_published() {
+    let options = GeneratorOptions { event_rate_factor: 1.0, recordings: 36, ..GeneratorOptions::default() };
+    let counted = Counted::of(&options);
+    let t = counted.traffic(&options);
+    let mut table = Table::new("Rates at rate factor 1 (36 recordings)");
+    let crossings = t.crossings as f64 / t.driven_km;
+    table.ratio_row("line crossings per vehicle and km", PUBLISHED_CROSSINGS_PER_KM, crossings, 0.8, 1.25);
+    for (category, published_found, published_kept) in PUBLISHED {
+        let (found, kept) = (counted.found(category), counted.kept(category).count() as f64);
+        let name = category.label();
+        let rate = published_found / PUBLISHED_SETS;
+        table.ratio_row(&format!("{name}: found per data set"), rate, found / counted.sets, 0.7, 1.35);
+        let ratio = published_kept / published_found;
+        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, 1.5);
+        let rate = published_kept / PUBLISHED_SETS;
+        table.ratio_row(&format!("{name}: kept per data set"), rate, kept / counted.sets, 0.65, 1.5);
+    }
+    table.finish();
+}
+
+#[test]
+fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
+    let options = GeneratorOptions::default();
+    let factor = options.event_rate_factor;
+    let counted = Counted::of(&options);
+    let t = counted.traffic(&options);
+    let mut table = Table::new(&format!("Scenarios of the default recordings (rates divided by the factor {factor})"));
+    let crossings = t.crossings as f64 / t.driven_km / factor;
+    table.ratio_row("line crossings per vehicle and km", PUBLISHED_CROSSINGS_PER_KM, crossings, 0.75, 1.25);
+    for (category, published_found, published_kept) in PUBLISHED {
+        let (found, kept) = (counted.found(category), counted.kept(category).count() as f64);
+        let name = category.label();
+        table.row(&format!("{name}: found (number)"), "", found, 300.0, 5000.0);
+        table.row(&format!("{name}: kept (number)"), "≥ 150", kept, 150.0, 400.0);
+        // Rates rise a little less than the factor says, since lane changes get in each other's way.
+        // Gentle decelerations are not raised: per data set they lie between once and `factor` times.
+        let raised = if category == Category::Lvd { 1.0 / factor } else { 0.5 };
+        let rate = published_found / PUBLISHED_SETS;
+        table.ratio_row(&format!("{name}: found per data set"), rate, found / counted.sets / factor, raised, 1.35);
+        let rate = published_kept / PUBLISHED_SETS;
+        table.ratio_row(&format!("{name}: kept per data set"), rate, kept / counted.sets / factor, 0.5, 1.5);
+        // For the same reason more of the found LVDs are kept, at most `factor` times as many.
+        let most = if category == Category::Lvd { factor } else { 1.8 };
+        let ratio = published_kept / published_found;
+        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, most);
+    }
+
+    let excess: Vec<f64> = counted.kept(Category::Lvd).filter_map(|s| s.peak_decel).map(|p| p - 2.0).collect();
+    table.row("LVD kept: mean excess of the peak over 2 m/s²", "tail", mean(&excess), 0.2, 0.6);
+    table.row("LVD kept: share with a peak below 2.5 m/s²", "most", share(&excess, |e| e < 0.5), 0.55, 0.9);
+    let bin = |k: i32| share(&excess, |e| (0.5 * f64::from(k)..0.5 * f64::from(k + 1)).contains(&e));
+    table.row("LVD kept: peaks of 2.5–3 beside those of 2–2.5 m/s²", "falling", bin(1) / bin(0), 0.1, 0.7);
+    table.row("LVD kept: peaks of 3–3.5 beside those of 2.5–3 m/s²", "falling", bin(2) / bin(1), 0.05, 0.8);
+    let slower: Vec<f64> = counted.kept(Category::CutIn).map(|s| s.target.v[0] / s.ego.v0).collect();
+    table.row("cut-in kept: speed over the ego's, 5 %", "< 0.95", quantile(&slower, 0.05), 0.75, 0.9);
+    table.row("cut-in kept: speed over the ego's, median", "< 0.95", quantile(&slower, 0.5), 0.88, 0.945);
+    table.finish();
+}
+
+#[test]
+fn recorded_motions_are_neither_straight_lines_nor_sinusoids() {
+    let counted = Counted::of(&GeneratorOptions::default());
+    let mut table = Table::new("What parameterizations with few numbers cannot reproduce");
+    // Deviation of the recorded speed from the straight line between its ends.
+    let bend = |v: &[f64]| {
+        let n = (v.len() - 1) as f64;
+        let line = |k: usize| v[0] + (v[v.len() - 1] - v[0]) * k as f64 / n;
+        (0..v.len()).map(|k| (v[k] - line(k)).abs()).fold(0.0, f64::max)
+    };
+    let bends = |category| counted.kept(category).map(|s| bend(&s.target.v)).collect::<Vec<_>>();
+    table.row("cut-in: largest bend of the speed, median, m/s", "", quantile(&bends(Category::CutIn), 0.5), 0.05, 2.0);
+    table.row(
+        "cut-out: largest bend of the speed, median, m/s",
+        "",
+        quantile(&bends(Category::CutOut), 0.5),
+        0.05,
+        2.0,
+    );
+    table.row("LVD: largest bend of the speed, median, m/s", "", quantile(&bends(Category::Lvd), 0.5), 0.2, 3.0);
+    let sinusoid = |v: &[f64]| {
+        let n = (v.len() - 1) as f64;
+        let drop = v[0] - v[v.len() - 1];
+        let curve = |k: usize| v[0] - 0.5 * drop * (1.0 - (std::f64::consts::PI * k as f64 / n).cos());
+        (0..v.len()).map(|k| (v[k] - curve(k)).abs()).fold(0.0, f64::max)
+    };
+    let off: Vec<f64> = counted.kept(Category::Lvd).map(|s| sinusoid(&s.target.v)).collect();
+    table.row("LVD: largest distance from the sinusoid, median, m/s", "", quantile(&off, 0.5), 0.2, 3.0);
+    let lasting: Vec<f64> = counted.kept(Category::Lvd).map(|s| s.duration_s()).collect();
+    table.row("LVD: duration, 5 %, s", "", quantile(&lasting, 0.05), 0.5, 2.5);
+    table.row("LVD: duration, 95 %, s", "", quantile(&lasting, 0.95), 4.0, 15.0);
+    table.finish();
+}

@@ -1,0 +1,317 @@
+//! Claims about reading and writing highD files.
+
+use crate::common;
+
+use std::fs;
+
+use crate::common::small;
+use lanesweep::traffic::trajectory::highd::{self, Precision, RecordingInfo};
+use lanesweep::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
+use proptest::prelude::*;
+
+fn read_back(recording: &Recording, precision: Precision) -> highd::Loaded {
+    let dir = tempfile::tempdir().unwrap();
+    let info = RecordingInfo { precision, ..RecordingInfo::default() };
+    highd::write(dir.path(), recording, &info).unwrap();
+    let names = fs::read_dir(dir.path()).unwrap().count();
+    assert_eq!(names, 3, "nothing but the three files is left in the folder");
+    let inventory = highd::inventory(dir.path()).unwrap();
+    assert!(inventory.problems.is_empty());
+    let loaded = highd::read(&inventory.recordings[0]).unwrap();
+    assert_eq!(loaded.recording.synthetic, recording.synthetic);
+    loaded
+}
+
+/// Every number of a recording, bit for bit: `==` would let 0 pass for −0.
+fn bits(recording: &Recording) -> Vec<u64> {
+    let lines = recording.carriageways.iter().flat_map(|carriageway| &carriageway.lane_lines_m);
+    let tracks = recording.tracks.iter().flat_map(|t| {
+        let series = [&t.s_m, &t.d_m, &t.v_s_mps, &t.v_d_mps, &t.a_s_mps2];
+        series.into_iter().flatten().chain([&t.length_m, &t.width_m]).copied().collect::<Vec<_>>()
+    });
+    lines.copied().chain(tracks).map(f64::to_bits).collect()
+}
+
+prop_compose! {
+    fn track()(
+        carriageway in 0usize..2,
+        sizes in [0.5..25.0f64, 0.5..3.0f64],
+        truck: bool,
+        first_frame in -5i64..2000,
+        samples in prop::collection::vec(
+            ([-500.0..500.0f64, -60.0..60.0f64], [0.0..50.0f64, -3.0..3.0f64, -9.0..9.0f64], prop::sample::select(vec![0u16, 1, 2, 9, NO_LANE])),
+            1..12,
+        ),
+    ) -> Track {
+        Track {
+            id: 0,
+            class: if truck { VehicleClass::Truck } else { VehicleClass::Car },
+            length_m: sizes[0],
+            width_m: sizes[1],
+            carriageway,
+            first_frame,
+            s_m: samples.iter().map(|sample| sample.0[0]).collect(),
+            d_m: samples.iter().map(|sample| sample.0[1]).collect(),
+            v_s_mps: samples.iter().map(|sample| sample.1[0]).collect(),
+            v_d_mps: samples.iter().map(|sample| sample.1[1]).collect(),
+            a_s_mps2: samples.iter().map(|sample| sample.1[2]).collect(),
+            lane: samples.iter().map(|sample| sample.2).collect(),
+        }
+    }
+}
+
+prop_compose! {
+    fn recording()(
+        mut tracks in prop::collection::vec(track(), 1..6),
+        which in 0usize..3,
+        rate in prop::sample::select(vec![25.0, 20.0, 10.0, 12.5, 29.97, 1.0 / 0.04]),
+        shift in -0.5..0.5f64,
+    ) -> Recording {
+        let upper = Carriageway { name: "1".to_owned(), lane_lines_m: vec![12.0 + shift, 8.3 + shift, 4.4] };
+        let lower = Carriageway { name: "2".to_owned(), lane_lines_m: vec![-16.0 + shift, -19.3, -23.4, -27.1 + shift] };
+        let carriageways = match which {
+            0 => vec![upper, lower],
+            1 => vec![upper],
+            _ => vec![lower],
+        };
+        for (at, track) in tracks.iter_mut().enumerate() {
+            track.id = 3 * at as u32 + 1;
+            track.carriageway %= carriageways.len();
+        }
+        Recording { id: "07".to_owned(), frame_rate_hz: rate, carriageways, tracks, synthetic: rate < 20.0 }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn a_quantized_recording_survives_its_own_files_bit_for_bit(recording in recording()) {
+        for precision in [Precision::Hundredths, Precision::Shortest] {
+            let mut quantized = recording.clone();
+            highd::quantize(&mut quantized, precision).unwrap();
+            let read = read_back(&quantized, precision).recording;
+            prop_assert_eq!(&read, &quantized);
+            prop_assert_eq!(bits(&read), bits(&quantized));
+            let mut again = quantized.clone();
+            highd::quantize(&mut again, precision).unwrap();
+            prop_assert_eq!(bits(&again), bits(&quantized), "quantizing twice changes nothing more");
+        }
+    }
+
+    #[test]
+    fn reading_back_an_unquantized_recording_gives_its_quantized_form(recording in recording()) {
+        let mut quantized = recording.clone();
+        highd::quantize(&mut quantized, Precision::Hundredths).unwrap();
+        let read = read_back(&recording, Precision::Hundredths).recording;
+        prop_assert_eq!(bits(&read), bits(&quantized));
+        // Position and half a size are each off by half a hundredth and a quarter of one, at most.
+        for (a, b) in read.tracks.iter().zip(&recording.tracks) {
+            for (a, b) in a.s_m.iter().zip(&b.s_m).chain(a.d_m.iter().zip(&b.d_m)) {
+                prop_assert!((a - b).abs() < 0.0076, "{} {}", a, b);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_reads_back_with_its_checksums_rows_and_no_notes() {
+    let recording = small::recording();
+    let loaded = read_back(&recording, Precision::Hundredths);
+    assert_eq!(loaded.recording, recording);
+    assert_eq!(loaded.rows, 8 + 5 + 8 + 5);
+    assert_eq!(loaded.notes, [""; 0]);
+    assert_eq!(loaded.bytes, loaded.checksum_sha256.iter().map(|file| file.bytes).sum::<u64>());
+    let names: Vec<&str> = loaded.checksum_sha256.iter().map(|file| file.file.as_str()).collect();
+    assert_eq!(names, ["01_tracks.csv", "01_tracksMeta.csv", "01_recordingMeta.csv"]);
+}
+
+#[test]
+fn the_checksum_is_the_sha_256_of_the_whole_file() {
+    // Expected value from `sha256sum` (GNU coreutils) of these bytes.
+    let mut texts = small::Texts::small();
+    texts.recording_meta =
+        "id,frameRate,upperLaneMarkings,lowerLaneMarkings\r\n1,25,8.00;11.75;15.50;19.25,24.00;27.50;31.25\r\n"
+            .to_owned();
+    let loaded = texts.read().unwrap();
+    assert_eq!(loaded.checksum_sha256[2].sha256, "88e3d2e2d572562aa604405e09046eb88c878d2f92c2f2f68623bcb201c383b0");
+}
+
+#[test]
+fn windows_line_ends_a_byte_order_mark_and_blank_lines_change_nothing() {
+    let texts = small::Texts::small();
+    let plain = texts.read().unwrap();
+    let windows = |text: &str| text.replace('\n', "\r\n");
+    let marked = |text: &str| format!("\u{feff}{text}");
+    let spaced = |text: &str| text.replace('\n', "\n\n");
+    let quoted = |text: &str| {
+        let quote =
+            |line: &str| line.split(',').map(|field| format!("\"{field}\"")).collect::<Vec<_>>().join(",") + "\n";
+        text.lines().map(quote).collect::<String>()
+    };
+    let open = |text: &str| text.trim_end().to_owned();
+    let edits: [&dyn Fn(&str) -> String; 6] =
+        [&windows, &marked, &spaced, &quoted, &open, &|text: &str| marked(&windows(text))];
+    for edit in edits {
+        let edited = small::Texts {
+            tracks: edit(&texts.tracks),
+            tracks_meta: edit(&texts.tracks_meta),
+            recording_meta: edit(&texts.recording_meta),
+        };
+        let loaded = edited.read().unwrap();
+        assert_eq!(loaded.recording, plain.recording);
+        assert_eq!(bits(&loaded.recording), bits(&plain.recording));
+        assert_eq!((loaded.rows, loaded.notes), (plain.rows, plain.notes.clone()));
+    }
+}
+
+#[test]
+fn lines_by_vehicle_and_lines_by_frame_give_the_same_recording() {
+    let texts = small::Texts::small();
+    let (header, lines) = texts.tracks.split_once('\n').unwrap();
+    let mut lines: Vec<&str> = lines.lines().collect();
+    lines.sort_by_key(|line| line.split(',').next().unwrap().parse::<i64>().unwrap());
+    let by_frame = small::Texts { tracks: format!("{header}\n{}\n", lines.join("\n")), ..texts.clone() };
+    assert_ne!(by_frame.tracks, texts.tracks);
+    assert_eq!(by_frame.read().unwrap().recording, texts.read().unwrap().recording);
+}
+
+#[test]
+fn columns_may_come_in_any_order_and_only_the_needed_ones_need_to_be_there() {
+    let texts = small::Texts::small();
+    let mut lines = texts.tracks.clone();
+    for column in ["width", "height", "yAcceleration", "dhw", "thw", "ttc", "precedingId", "leftAlongsideId"] {
+        lines = small::without_column(&lines, column);
+    }
+    let backwards: String =
+        lines.lines().map(|line| line.split(',').rev().collect::<Vec<_>>().join(",") + "\n").collect();
+    let reordered = small::Texts { tracks: backwards, ..texts.clone() };
+    assert_eq!(reordered.read().unwrap().recording, texts.read().unwrap().recording);
+}
+
+#[test]
+fn without_lane_ids_the_geometry_tells_the_lanes_and_a_note_says_so() {
+    let texts = small::Texts::small();
+    let without = small::Texts { tracks: small::without_column(&texts.tracks, "laneId"), ..texts.clone() };
+    let loaded = without.read().unwrap();
+    assert_eq!(loaded.recording, texts.read().unwrap().recording);
+    assert!(loaded.notes[0].contains("laneId"), "{:?}", loaded.notes);
+}
+
+#[test]
+fn a_recording_with_one_carriageway_needs_lane_lines_only_there() {
+    let mut recording = small::recording();
+    recording.carriageways.remove(0);
+    recording.tracks.retain(|track| track.carriageway == 1);
+    recording.tracks.iter_mut().for_each(|track| track.carriageway = 0);
+    let texts = small::Texts::of(&recording);
+    assert!(texts.recording_meta.contains(",,24.00;27.50;31.25"), "{}", texts.recording_meta);
+    assert!(texts.tracks.lines().nth(1).unwrap().ends_with(",2"), "without upper lines the first lane has the id 2");
+    assert_eq!(texts.read().unwrap().recording, recording);
+}
+
+#[test]
+fn the_name_comes_from_the_files_and_the_rate_from_the_meta_file() {
+    for rate in ["10", "12.5", "20", "25.00", "29.97"] {
+        let mut texts = small::Texts::small();
+        texts.recording_meta = small::with_field(&texts.recording_meta, 2, "id", "99");
+        texts.recording_meta = small::with_field(&texts.recording_meta, 2, "frameRate", rate);
+        let recording = texts.read().unwrap().recording;
+        assert_eq!(recording.id, "01");
+        assert_eq!(recording.frame_rate_hz, rate.parse::<f64>().unwrap());
+    }
+}
+
+#[test]
+fn a_lane_id_outside_the_vehicles_carriageway_is_no_lane() {
+    let texts = small::Texts::small();
+    // Vehicle 1 drives in the upper lanes, 2 to 4; 5 is the median, 6 the first lower lane.
+    for (id, lane) in [("2", 2), ("4", 0), ("1", NO_LANE), ("5", NO_LANE), ("6", NO_LANE), ("-3", NO_LANE)] {
+        let edited = small::Texts { tracks: small::with_field(&texts.tracks, 2, "laneId", id), ..texts.clone() };
+        assert_eq!(edited.read().unwrap().recording.tracks[0].lane[0], lane, "laneId {id}");
+    }
+}
+
+#[test]
+fn announced_vehicles_without_frames_are_left_out_and_strange_ones_are_noted() {
+    let mut texts = small::Texts::small();
+    texts.tracks_meta += "9,4.00,1.80,0,0,0,Car,2,0.00,0.00,0.00,0.00,-1.00,-1.00,-1.00,0\n";
+    assert_eq!(texts.read().unwrap().recording, small::recording());
+    // All of vehicle 5 with the direction of the other half: its positions go backwards, and it is in no lane.
+    for line in 15..=22 {
+        texts.tracks = small::with_field(&texts.tracks, line, "xVelocity", "-25.00");
+    }
+    texts.tracks_meta = small::with_field(&texts.tracks_meta, 4, "drivingDirection", "1");
+    let notes = texts.read().unwrap().notes;
+    assert_eq!(notes.len(), 2, "{notes:?}");
+    assert!(notes.iter().all(|note| note.contains("vehicle 5")), "{notes:?}");
+}
+
+#[test]
+fn written_files_have_every_column_of_the_format() {
+    let texts = small::Texts::small();
+    let columns = |text: &str| text.lines().map(|line| line.split(',').count()).collect::<Vec<_>>();
+    assert!(columns(&texts.tracks).iter().all(|&count| count == 25));
+    assert!(columns(&texts.tracks_meta).iter().all(|&count| count == 16));
+    assert_eq!(columns(&texts.recording_meta), [15, 15]);
+    let vehicle_1 = "1,5.00,1.80,1,8,8,Car,1,5.88,21.00,21.00,21.00,-1.00,-1.00,-1.00,0";
+    assert_eq!(texts.tracks_meta.lines().nth(1).unwrap(), vehicle_1);
+}
+
+#[test]
+fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
+    type Spoil<'a> = &'a dyn Fn(&mut Recording);
+    let spoiled: [(&str, Spoil); 8] = [
+        ("carriageway `north`", &|r| r.carriageways[1].name = "north".to_owned()),
+        ("carriageway `2`", &|r| r.carriageways[1].lane_lines_m = vec![-24.0]),
+        ("carriageway `1`", &|r| r.carriageways[0].lane_lines_m.reverse()),
+        ("above carriageway `2`", &|r| r.carriageways[1].lane_lines_m.iter_mut().for_each(|line| *line += 20.0)),
+        ("vehicle 2", &|r| r.tracks[1].s_m[2] = f64::NAN),
+        ("vehicle 2", &|r| r.tracks[1].length_m = 0.004),
+        ("sorted by id", &|r| r.tracks.swap(0, 1)),
+        ("file name", &|r| r.id = "../01".to_owned()),
+    ];
+    for (expected, spoil) in spoiled {
+        let mut recording = small::recording();
+        spoil(&mut recording);
+        let dir = tempfile::tempdir().unwrap();
+        let error = highd::write(dir.path(), &recording, &RecordingInfo::default()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+        assert!(error.help().is_some());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+        assert!(highd::quantize(&mut recording, Precision::Hundredths).is_err());
+    }
+}
+
+#[test]
+fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
+    let Some(dir) = common::sumo_recordings() else { return };
+    let inventory = highd::inventory(&dir).unwrap();
+    assert_eq!(
+        inventory.recordings.iter().map(|files| files.id.as_str()).collect::<Vec<_>>(),
+        ["01", "02", "03", "04"]
+    );
+    // Numbers from recordingMeta: vehicles, lanes above, lanes below.
+    let expected = [(349, 3, 3), (222, 2, 2), (439, 3, 3), (376, 3, 4)];
+    for (files, (vehicles, upper, lower)) in inventory.recordings.iter().zip(expected) {
+        let loaded = highd::read(files).unwrap();
+        let recording = &loaded.recording;
+        assert!(loaded.notes.iter().all(|note| note.contains("is taken as 0, 47 times")), "{:?}", loaded.notes);
+        assert_eq!(recording.tracks.len(), vehicles);
+        assert_eq!(recording.carriageways.iter().map(Carriageway::lane_count).collect::<Vec<_>>(), [upper, lower]);
+        let samples: usize = recording.tracks.iter().map(Track::len).sum();
+        let in_lane = |t: &Track| {
+            t.lane
+                .iter()
+                .zip(&t.d_m)
+                .filter(|&(&lane, d)| {
+                    let lines = recording.carriageways[t.carriageway].lane(lane.into());
+                    lines.is_some_and(|lines| lines.left_m + 0.02 >= *d && *d >= lines.right_m - 0.02)
+                })
+                .count()
+        };
+        let agreeing: usize = recording.tracks.iter().map(in_lane).sum();
+        assert!(agreeing as f64 > 0.999 * samples as f64, "laneId and geometry agree: {agreeing} of {samples}");
+        assert_eq!(read_back(recording, Precision::Hundredths).recording, *recording);
+    }
+}

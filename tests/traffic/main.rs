@@ -1,0 +1,13 @@
+//! Recordings and mining: what is read, what is refused, which scenarios are found.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bad_recordings;
+mod generator_calibration;
+mod generator_physics;
+mod highd_round_trip;
+mod highd_turned;
+mod mining_activities;
+mod mining_claims;
+mod mining_recordings;

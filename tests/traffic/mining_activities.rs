@@ -1,0 +1,161 @@
+//! The detectors and the search against golden tables: other implementations of the published text.
+
+use crate::common;
+
+use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
+use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
+use lanesweep::traffic::mining::tags::Tags;
+use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, cut_in, lvd, search};
+use lanesweep::traffic::trajectory::Lane;
+use serde_json::Value;
+
+fn cases(name: &str) -> Vec<Value> {
+    let text = std::fs::read_to_string(common::golden(name)).unwrap();
+    let golden: Value = serde_json::from_str(&text).unwrap();
+    golden["cases"].as_array().unwrap().clone()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+/// `[[time, tag], …]` in samples.
+fn events(value: &Value, fs: f64) -> Vec<(usize, String)> {
+    let event = |e: &Value| ((e[0].as_f64().unwrap() * fs).round() as usize, e[1].as_str().unwrap().to_owned());
+    value.as_array().unwrap().iter().map(event).collect()
+}
+
+#[test]
+fn longitudinal_activities_are_those_of_the_published_formula() {
+    let cases = cases("activity_longitudinal.json");
+    assert_eq!(cases.len(), 16);
+    for case in cases {
+        let (fs, params) = (case["fs"].as_f64().unwrap(), &case["params"]);
+        let options = LongitudinalOptions {
+            window_s: params["time_horizon"].as_f64().unwrap(),
+            cruise_acceleration_mps2: params["a_cruise"].as_f64().unwrap(),
+            min_speed_change_mps: params["delta_v"].as_f64().unwrap(),
+            min_cruise_s: params["min_cruising_time"].as_f64().unwrap(),
+        };
+        let found: Vec<(usize, String)> = longitudinal_events(&numbers(&case["speed"]), fs, &options)
+            .into_iter()
+            .map(|e| {
+                let letter = match e.activity {
+                    Longitudinal::Cruising => "c",
+                    Longitudinal::Accelerating => "a",
+                    Longitudinal::Decelerating => "d",
+                };
+                (e.start, letter.to_owned())
+            })
+            .collect();
+        assert_eq!(found, events(&case["events_published_formula"], fs), "{}", case["name"]);
+    }
+}
+
+#[test]
+fn lane_changes_are_those_of_the_published_formula() {
+    let cases = cases("activity_lateral_target.json");
+    assert_eq!(cases.len(), 12);
+    for case in cases {
+        let fs = case["fs"].as_f64().unwrap();
+        let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
+        let options = LateralOptions { lc_end: LaneChangeEnd::Published, ..LateralOptions::default() };
+        let mut found = vec![(0, "fl".to_owned())];
+        for change in lane_changes(&numbers(&case["target_dy"]), lane, fs, &options) {
+            let name = match change.kind {
+                LaneChangeKind::LeftIn => "li",
+                LaneChangeKind::RightIn => "ri",
+                LaneChangeKind::LeftOut => "lo",
+                LaneChangeKind::RightOut => "ro",
+            };
+            found.push((change.start, name.to_owned()));
+            found.push((change.end, "fl".to_owned()));
+        }
+        assert_eq!(found, events(&case["events_published_formula"], fs), "{}", case["name"]);
+    }
+}
+
+#[test]
+fn a_mirrored_track_has_the_mirrored_lane_changes() {
+    for case in cases("activity_lateral_target.json") {
+        let fs = case["fs"].as_f64().unwrap();
+        let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
+        let mirror = Lane { left_m: -lane.right_m, right_m: -lane.left_m };
+        let d = numbers(&case["target_dy"]);
+        let mirrored: Vec<f64> = d.iter().map(|d| -d).collect();
+        for lc_end in [LaneChangeEnd::Published, LaneChangeEnd::Observed] {
+            let options = LateralOptions { lc_end, ..LateralOptions::default() };
+            let here = lane_changes(&d, lane, fs, &options);
+            let there = lane_changes(&mirrored, mirror, fs, &options);
+            assert_eq!(here.len(), there.len());
+            for (a, b) in here.iter().zip(&there) {
+                assert_eq!((a.start, a.crossing, a.end), (b.start, b.crossing, b.end), "{}", case["name"]);
+                assert_eq!(a.kind.is_in(), b.kind.is_in());
+                assert_ne!(a.kind, b.kind);
+            }
+        }
+    }
+}
+
+/// The observed end comes when the window behind is calm, the published one when the window ahead is:
+/// the motion is over in between.
+#[test]
+fn the_observed_end_of_a_lane_change_comes_after_the_published_one() {
+    let mut compared = 0;
+    for case in cases("activity_lateral_target.json") {
+        let fs = case["fs"].as_f64().unwrap();
+        let lane = Lane { left_m: case["line_left"].as_f64().unwrap(), right_m: case["line_right"].as_f64().unwrap() };
+        let ends = |lc_end| -> Vec<usize> {
+            let options = LateralOptions { lc_end, ..LateralOptions::default() };
+            lane_changes(&numbers(&case["target_dy"]), lane, fs, &options).iter().map(|c| c.end).collect()
+        };
+        for (published, observed) in ends(LaneChangeEnd::Published).into_iter().zip(ends(LaneChangeEnd::Observed)) {
+            assert!(observed > published && observed <= published + fs as usize, "{}", case["name"]);
+            compared += 1;
+        }
+    }
+    assert!(compared >= 10, "{compared}");
+}
+
+/// Rows `[time, tags…]` at a sample every half second: a value holds until the next row.
+fn row_at(rows: &[Value], t: f64) -> &Value {
+    rows.iter().rev().find(|r| r[0].as_f64().unwrap() <= t).unwrap()
+}
+
+#[test]
+fn the_search_finds_the_golden_intervals() {
+    const STEP_S: f64 = 0.5;
+    let cases = cases("tag_search.json");
+    assert_eq!(cases.len(), 8);
+    for case in cases {
+        let target = case["target_rows"].as_array().unwrap();
+        let ego = case.get("ego_rows").and_then(Value::as_array);
+        let ends = std::iter::once(target).chain(ego).map(|rows| rows.last().unwrap()[0].as_f64().unwrap());
+        let last = (ends.fold(f64::INFINITY, f64::min) / STEP_S) as usize;
+        let tags: Vec<Tags> = (0..=last)
+            .map(|k| {
+                let t = k as f64 * STEP_S;
+                let row = row_at(target, t);
+                Tags::default()
+                    .with(Tags::DECELERATES, row[1] == "d")
+                    .with(Tags::CHANGES_IN, row[2] == "li" || row[2] == "ri")
+                    .with(Tags::CHANGES_OUT, row[2] == "lo" || row[2] == "ro")
+                    .with(Tags::LEADER, row[3] == "y")
+                    .with(Tags::EGO_KEEPS_LANE, ego.is_none_or(|rows| row_at(rows, t)[2] == "fl"))
+            })
+            .collect();
+        let (items, pause): (&[search::Item<Tags>], usize) = match case["kind"].as_str().unwrap() {
+            "cut-in" => (&cut_in::ITEMS, (5.0 / STEP_S) as usize),
+            "LVD" => (&lvd::ITEMS, 0),
+            other => panic!("{other}"),
+        };
+        let mut found = Vec::new();
+        let mut from = 0;
+        while let Some(m) = search::find(&tags, items, from) {
+            found.push(vec![m.start() as f64 * STEP_S, m.end as f64 * STEP_S]);
+            from = m.end.max(m.last_item().end) + pause;
+        }
+        let expected: Vec<Vec<f64>> = case["found"].as_array().unwrap().iter().map(numbers).collect();
+        assert_eq!(found, expected, "{} {}", case["kind"], case["name"]);
+    }
+}
