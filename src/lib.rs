@@ -44,7 +44,7 @@
 //! use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 //! use lanesweep::model::profile::Profile;
 //! use lanesweep::run::score::{ScoreOptions, f1, score};
-//! use lanesweep::engine::{CpuBackend, Partial, SweepOptions, Wanted, sweep};
+//! use lanesweep::engine::{CpuBackend, Executor, Partial, Wanted};
 //! use lanesweep::run::study::{StudyOptions, plan_study};
 //! use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 //!
@@ -52,9 +52,9 @@
 //! let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
 //! let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
 //! let plan = plan_study(&mined.scenarios, &Profile::load("paper")?, &StudyOptions::default())?.plan;
-//! let options = SweepOptions::plain(Wanted::Verdicts);
+//! let backend = CpuBackend::lane_arithmetic();
 //! let mut parts = Vec::new();
-//! sweep(&plan, 0..plan.unit_count(), &CpuBackend::lane_arithmetic(), &options, |chunk| {
+//! Executor::new(&backend).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
 //!     parts.push(Partial::from_chunk(&plan, &chunk)?);
 //!     Ok(())
 //! })?;

@@ -104,8 +104,7 @@ impl Run<'_> {
             model,
             criterion: self.criterion,
             headway: self.headways.clone(),
-            backend: self.opened.backend(),
-            fallback: self.opened.fallback(),
+            executor: self.opened.executor(),
         }
     }
 

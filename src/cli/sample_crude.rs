@@ -13,10 +13,10 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::sample_plan::PlannedSample;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
-use crate::engine::{ONE_IN, Outcome, Recheck, Wanted, forecast};
+use crate::engine::{Outcome, Wanted, forecast};
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
 use crate::run::sampling::{
-    BootstrapRecord, CrudeRun, Lanes, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
+    BootstrapRecord, CrudeRun, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
 };
 use crate::stats::estimate::StopRule;
 use crate::support::atomic_file::StagedFile;
@@ -75,10 +75,9 @@ pub(super) fn run(
     // Rows are written on the way: a run that writes them begins anew.
     let is_journalled = flags.rows.is_none();
     let mut work = desk.begin::<SampleTally>(&checkpoints(plan.unit_count()), is_journalled)?;
-    let recheck = Recheck::new(plan, planned.facts.seed, ONE_IN);
-    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: Some(&recheck) };
+    let executor = opened.executor().with_recheck(planned.facts.seed);
     let counting = planned.counting();
-    tracing::info!("{} samples on {}", count(work.units.end - work.units.start), lanes.backend.describe());
+    tracing::info!("{} samples on {}", count(work.units.end - work.units.start), executor.backend.describe());
     if work.units.is_empty() {
         desk.finish(work, [0, 0])?;
         return Ok(Exit::Ok);
@@ -86,7 +85,7 @@ pub(super) fn run(
     let rows = flags.rows.as_deref().map(|path| (path, &planned.density));
     let (crude, rows) = {
         let _resumable = is_journalled.then(interrupt::resumable);
-        sample_lanes::run(plan, &mut work.ledger, &lanes, &counting, &planned.options(stop), rows, verbosity)?
+        sample_lanes::run(plan, &mut work.ledger, &executor, &counting, &planned.options(stop), rows, verbosity)?
     };
     if shard.is_some() {
         rows.map_or(Ok(()), StagedFile::publish)?;
@@ -100,7 +99,7 @@ pub(super) fn run(
                 &planned.density,
                 &planned.facts.profile,
                 &planned.facts.plan_options(),
-                &lanes,
+                &executor,
                 flags.bootstrap,
                 flags.bootstrap_samples,
                 || bar.inc(1),

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use super::console::{self, Verbosity};
-use crate::engine::{LanePlan, LaneRunner, Outcome};
+use crate::engine::{Executor, LanePlan, LaneRunner, Outcome};
 use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::run::parts::Ledger;
-use crate::run::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
+use crate::run::sampling::{CrudeOptions, CrudeRun, SampleTally, TallyOptions, sample_into};
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
 use crate::support::run_dir::Results;
@@ -21,7 +21,7 @@ use crate::{Error, Result};
 pub(super) fn run(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
-    how: &Lanes,
+    executor: &Executor,
     counting: &TallyOptions,
     options: &CrudeOptions,
     rows: Option<(&Path, &DensityModel)>,
@@ -31,7 +31,7 @@ pub(super) fn run(
     let left: u64 = ledger.missing(units)?.iter().map(|range| range.end - range.start).sum();
     let bar = console::progress(verbosity, left, "sampling");
     let Some((path, density)) = rows else {
-        let run = sample_into(plan, ledger, how, counting, options, |chunk| {
+        let run = sample_into(plan, ledger, executor, counting, options, |chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             Ok(())
         });
@@ -48,7 +48,7 @@ pub(super) fn run(
     };
     let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
     let mut table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
-    let run = sample_into(plan, ledger, how, &counting, options, |chunk| {
+    let run = sample_into(plan, ledger, executor, &counting, options, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         sampled_rows::write_chunk(&mut table, plan, density, chunk)
     });

@@ -13,7 +13,7 @@ use super::sample::Sample;
 use super::sample_lanes;
 use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use super::weighted_plan::{PILOT_FILE, PlannedWeighted};
-use crate::engine::{CpuBackend, Forecast, lanes_within_seconds};
+use crate::engine::{CpuBackend, Executor, Forecast, lanes_within_seconds};
 use crate::model::driver::ModelId;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::{Countable, Ledger};
@@ -163,8 +163,7 @@ fn sample(
         model,
         criterion: facts.criterion,
         headway: planned.headways(),
-        backend: opened.backend(),
-        fallback: opened.fallback(),
+        executor: opened.executor(),
     };
     let (units, chunk) = (ledger.units(), planned.chunk_samples());
     for missing in ledger.missing(units)? {
@@ -228,8 +227,7 @@ fn write_run(
             model: *model,
             criterion: facts.criterion,
             headway: planned.headways(),
-            backend: &cpu,
-            fallback: None,
+            executor: Executor::new(&cpu),
         };
         let proposal = &planned.proposals[at % planned.proposals.len()];
         let shares = scenario_shares(&lanes, proposal, facts.defence, facts.seed)?;

@@ -14,10 +14,10 @@ use super::format::FormatFlag;
 use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan, units_of};
 use super::source::{self, PlausibilityFlag, Source};
 use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
-use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
+use super::study_run::{Host, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Partial, Wanted, forecast};
+use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::report::distributions::parameter_histograms;
 use crate::report::lanes::Digits;
@@ -269,7 +269,7 @@ impl Study {
         let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let how = How { backend, fallback: opened.fallback(), recheck: study.facts.score.seed };
+        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(study.facts.score.seed);
         let desk = Desk {
             out: &self.out,
             record: STUDY_RECORD,
@@ -285,7 +285,7 @@ impl Study {
         let mut work = desk.begin::<Partial>(&[], true)?;
         let lanes = plan.first_lane_of(work.units.end) - plan.first_lane_of(work.units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
-        let mut swept = timed(&mut timings.sweep_s, || run_units(&study.study, &mut work, &how, verbosity))?;
+        let mut swept = timed(&mut timings.sweep_s, || run_units(&study.study, &mut work, &executor, verbosity))?;
         if self.shards.is_part() {
             desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;
             return Ok(Exit::Ok);
@@ -294,13 +294,13 @@ impl Study {
         let mut results = work.folder.results()?;
         if let Some(path) = &self.lanes {
             let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-            let (again, table) = write_lanes(path, &study.study, &how, digits, study.facts.synthetic)?;
+            let (again, table) = write_lanes(path, &study.study, &executor, digits, study.facts.synthetic)?;
             swept.add(&again);
             results.join(table);
         }
         let comparison = self.compare_reference.then(|| compare_reference(&study.study)).transpose()?;
         let host = Host {
-            backend: match (how.fallback, swept.redone_lanes) {
+            backend: match (executor.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },

@@ -10,8 +10,7 @@ use super::shard_flags::Work;
 use super::study_plan::PlannedStudy;
 use crate::Result;
 use crate::engine::{
-    Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, SweepOptions, SweepSummary, Wanted,
-    chunks, sweep,
+    Backend, Chunk, CpuBackend, ENGINE_VERSION, Executor, LanePlan, Partial, SweepSummary, Wanted, chunks,
 };
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
@@ -31,45 +30,28 @@ pub(super) const WINDOW: u64 = 2048;
 /// The same for a device, which wants many lanes at once.
 const DEVICE_WINDOW: u64 = 16_384;
 
-/// Who computes the lanes, who stands in, who checks.
-pub(super) struct How<'a> {
-    pub backend: &'a dyn Backend,
-    pub fallback: Option<&'a dyn Backend>,
-    /// Seed of the lanes that are checked.
-    pub recheck: u64,
-}
-
-impl How<'_> {
-    fn window(&self) -> u64 {
-        if self.fallback.is_some() { DEVICE_WINDOW } else { WINDOW }
-    }
-
-    /// Sweeps an interval, window by window; chunks come with the plan of their window.
-    fn sweep(
-        &self,
-        study: &Study,
-        units: Range<u64>,
-        wanted: Wanted,
-        mut each: impl FnMut(&LanePlan, Chunk) -> Result<()>,
-    ) -> Result<SweepSummary> {
-        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        study.in_windows(units, self.window(), |plan, units| {
-            let recheck = Recheck::new(plan, self.recheck, ONE_IN);
-            let options = SweepOptions { wanted, fallback: self.fallback, recheck: Some(&recheck) };
-            summary.add(&sweep(plan, units, self.backend, &options, |chunk| each(plan, chunk))?);
-            Ok(())
-        })?;
-        Ok(summary)
-    }
+/// Sweeps an interval, window by window; chunks come with the plan of their window.
+fn sweep(
+    study: &Study,
+    units: Range<u64>,
+    wanted: Wanted,
+    executor: &Executor,
+    mut each: impl FnMut(&LanePlan, Chunk) -> Result<()>,
+) -> Result<SweepSummary> {
+    let window = if executor.fallback.is_some() { DEVICE_WINDOW } else { WINDOW };
+    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+    study.in_windows(units, window, |plan, units| {
+        summary.add(&executor.sweep(plan, units, wanted, |chunk| each(plan, chunk))?);
+        Ok(())
+    })?;
+    Ok(summary)
 }
 
 /// Every lane of a plan, counted.
-pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
+pub(super) fn run_plan(plan: &LanePlan, executor: &Executor, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
-    let recheck = Recheck::new(plan, how.recheck, ONE_IN);
-    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: Some(&recheck) };
-    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
+    let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
@@ -82,7 +64,7 @@ pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Resu
 pub(super) fn run_units(
     study: &Study,
     work: &mut Work<Partial>,
-    how: &How,
+    executor: &Executor,
     verbosity: Verbosity,
 ) -> Result<SweepSummary> {
     let _resumable = interrupt::resumable();
@@ -91,7 +73,7 @@ pub(super) fn run_units(
     let bar = console::progress(verbosity, left, "sweeping");
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     for range in missing {
-        let part = how.sweep(study, range, Wanted::Verdicts, |plan, chunk| {
+        let part = sweep(study, range, Wanted::Verdicts, executor, |plan, chunk| {
             bar.inc(chunk.units.end - chunk.units.start);
             work.ledger.add(Partial::from_chunk(plan, &chunk)?)
         })?;
@@ -121,7 +103,7 @@ pub(super) fn compare_reference(study: &Study) -> Result<ReferenceComparison> {
 pub(super) fn write_lanes(
     path: &Path,
     study: &Study,
-    how: &How,
+    executor: &Executor,
     digits: Digits,
     synthetic: bool,
 ) -> Result<(SweepSummary, StagedFile)> {
@@ -136,7 +118,7 @@ pub(super) fn write_lanes(
         synthetic,
     };
     let mut table = TableWriter::create(path, lane_format(path)?, lanes::columns(digits), &facts)?;
-    let swept = how.sweep(study, 0..plan.unit_count(), Wanted::Outcomes, |plan, chunk| {
+    let swept = sweep(study, 0..plan.unit_count(), Wanted::Outcomes, executor, |plan, chunk| {
         lanes::write_chunk(&mut table, plan, &chunk)
     })?;
     Ok((swept, table.stage()?))
