@@ -19,7 +19,7 @@ use lanesweep::run::sampling::{
     CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
     plan_samples, sample_into,
 };
-use lanesweep::run::study::{Study, StudyHead, StudyOptions, outline_study};
+use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
@@ -77,7 +77,7 @@ fn study(folder: &Path) {
         })
     });
     let scenarios: Vec<Scenario> = many.collect();
-    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().study;
+    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().cases;
     let plan = study.window(0..study.outline().unit_count()).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
@@ -140,7 +140,7 @@ fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run:
 }
 
 /// What a shard that is given the plan pays for it, should it compute all of it.
-fn plan_file(folder: &Path, study: &Study) {
+fn plan_file(folder: &Path, study: &StudyCases) {
     let path = folder.join("plan.json");
     let start = Instant::now();
     let (head, _) = seal("plan", study.head()).unwrap();

@@ -183,7 +183,7 @@ fn a_device_that_fails_while_counts_are_checked_leaves_complete_counts() {
         let fault = Some(Fault { at_job, kind: FaultKind::Lost });
         let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
         let recheck = Some(RecheckOptions { seed: 1, one_in: 1 });
-        let executor = Executor { backend: &gpu, fallback: Some(&cpu), recheck };
+        let executor = Executor { recheck, ..Executor::new(&gpu).with_fallback(Some(&cpu)) };
         let mut chunks = Vec::new();
         let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Counts, |chunk| {
             chunks.push(chunk);

@@ -28,7 +28,7 @@ fn plan() -> LanePlan {
 fn swept(plan: &LanePlan, gpu: &GpuBackend) -> (Vec<Verdicts>, SweepSummary) {
     let cpu = CpuBackend::lane_arithmetic();
     let recheck = Some(RecheckOptions { seed: 157, one_in: 100 });
-    let executor = Executor { backend: gpu, fallback: Some(&cpu), recheck };
+    let executor = Executor { recheck, ..Executor::new(gpu).with_fallback(Some(&cpu)) };
     let mut verdicts = Vec::new();
     let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
         Partial::from_chunk(plan, &chunk)?;

@@ -33,6 +33,7 @@ use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, Results, RunFolder};
+use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
@@ -138,7 +139,7 @@ impl Compare {
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source::counts(&collection.scenarios));
+        tracing::info!("{}", counts_text(&collection.scenarios));
         let facts = fit::facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
@@ -156,7 +157,7 @@ impl Compare {
         if plan.unit_count() == 0 {
             return Err(Error::input(
                 Place::item(facts.data),
-                format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
+                format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
                 "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use super::simulate_lanes::{find, model};
-use super::study_run::WINDOW;
 use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::limit_state;
-use crate::run::study::Study;
+use crate::run::study::{StudyCases, WINDOW};
 use crate::support::input_file;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
@@ -23,7 +22,7 @@ const MAX_LANES: usize = 10_000;
 /// # Errors
 /// [`Error::Usage`] for variants or models that the run does not have, and for too many lanes.
 pub(super) fn worst_of_study(
-    study: &Study,
+    study: &StudyCases,
     is_reference: bool,
     count: usize,
     criterion: Criterion,

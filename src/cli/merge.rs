@@ -6,14 +6,12 @@ use clap::Args;
 
 use super::Exit;
 use super::format::FormatFlag;
-use super::shard_flags::PLAN_FILE;
-use super::study_plan::{self, PlannedStudy};
 use super::study_run::{Host, finish_study};
 use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
-use crate::engine::{Partial, SweepSummary};
 use crate::interop::cluster::quoted_word;
 use crate::report::run_record::Timings;
-use crate::run::parts::{Countable, Part, Shard, collect, kind_of, read_part};
+use crate::run::parts::{PLAN_FILE, Shard, kind_of};
+use crate::run::study::Study;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::{Error, Place, Result};
@@ -62,7 +60,7 @@ impl Merge {
         }
         let kind = kind_of(&plan)?;
         let (record, merge): (_, Merging) = match kind.as_str() {
-            study_plan::KIND => (STUDY_RECORD, merge_study),
+            Study::KIND => (STUDY_RECORD, merge_study),
             sample_plan::KIND => (ESTIMATE_RECORD, sample_crude::merge),
             weighted_plan::KIND => (ESTIMATE_RECORD, sample_weighted::merge),
             other => {
@@ -81,60 +79,21 @@ impl Merge {
 /// Makes the result of the parts in a folder.
 type Merging = fn(&RunFolder, &Path, FormatFlag) -> Result<Exit>;
 
-fn merge_study(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
+fn merge_study(folder: &RunFolder, _: &Path, format: FormatFlag) -> Result<Exit> {
     let dir = folder.dir();
-    // Counts are all that is joined: no scenario is needed.
-    let (study, run_sha256) = PlannedStudy::read_some(plan, |_| 0..0)?;
-    let parts = read_parts::<Partial>(dir, plan, "study", &run_sha256, study.plan().unit_count())?;
-    let mut swept = SweepSummary { lanes: study.plan().lane_count(), ..SweepSummary::default() };
-    let count = parts.len();
-    let mut partial = Partial::empty(study.plan());
-    for part in parts {
-        swept.redone_lanes += part.lanes_redone_and_rechecked[0];
-        swept.rechecked_lanes += part.lanes_redone_and_rechecked[1];
-        partial = part.segments.into_iter().try_fold(partial, Partial::merge)?;
-    }
-    if !partial.is_complete(study.plan()) || !partial.fits(study.plan()) {
-        let problem = "the parts do not hold every unit that their names stand for";
-        return Err(Error::input(Place::file(dir), problem, "make them again"));
-    }
+    let (study, result) = Study::merge_or(dir, &command(dir, "study"))?;
     let host = Host {
-        backend: format!("{count} parts merged"),
+        backend: format!("{} parts merged", result.parts),
         device: None,
-        swept,
+        swept: result.summary,
         timings: Timings::default(),
         settings: Vec::new(),
     };
-    finish_study(&study, &partial, None, host, folder.results()?, format)
+    finish_study(&study, &result.counts, None, host, folder.results()?, format)
 }
 
-/// All parts of a folder, checked: of this run, whole, together everything exactly once.
-pub(super) fn read_parts<T: Countable>(
-    dir: &Path,
-    plan: &Path,
-    verb: &str,
-    run_sha256: &str,
-    units: u64,
-) -> Result<Vec<Part<T>>> {
-    let [plan, out] = [plan, dir].map(|path| quoted_word(&path.display().to_string()));
-    let command = |shard: Shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
-    let found = collect(dir, units, command)?;
-    let read = |(shard, path): &(Shard, PathBuf)| {
-        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &command(*shard))?;
-        let wrong = |problem: &str| {
-            let help = format!("delete it and make it again: {}", command(*shard));
-            Error::input(Place::file(path), problem, help)
-        };
-        let mut covered: Vec<_> = part.segments.iter().flat_map(Countable::covered).collect();
-        covered.sort_by_key(|range| range.start);
-        let mut at = part.units.start;
-        for range in covered {
-            if range.start != at {
-                return Err(wrong("it does not hold each of its units exactly once"));
-            }
-            at = range.end;
-        }
-        if at == part.units.end { Ok(part) } else { Err(wrong("it does not hold all of its units")) }
-    };
-    found.parts.iter().map(read).collect()
+/// The command that makes a shard of the run in this folder.
+pub(super) fn command(dir: &Path, verb: &'static str) -> impl Fn(Shard) -> String {
+    let [plan, out] = [&dir.join(PLAN_FILE), dir].map(|path| quoted_word(&path.display().to_string()));
+    move |shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}")
 }

@@ -39,7 +39,6 @@ mod simulate_lanes;
 mod slurm;
 mod source;
 mod study;
-mod study_plan;
 mod study_run;
 mod synth;
 mod verify;

@@ -6,7 +6,6 @@ use std::path::Path;
 use serde_json::value::RawValue;
 
 use super::sample_plan::{self, PlannedSample, SampleFacts};
-use super::study_plan::{self, PlannedStudy};
 use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -14,12 +13,11 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::seal;
 use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
-use crate::run::score::ScoreOptions;
-use crate::run::study::{StudyOptions, outline_study};
+use crate::run::study::Study;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
+use crate::scenario::parameterization::ParameterizationId;
 use crate::stats::density::{DataFacts, DensityModel, FitOptions};
-use crate::traffic::mining::{MiningOptions, mine_generated};
+use crate::traffic::mining::{Collection, MiningOptions, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::{Error, Result};
 
@@ -66,32 +64,16 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     };
     let weighted = PlannedWeighted::new(density, vec![proposal], weighted).unwrap().facts;
     let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
-    let study = PlannedStudy {
-        study: outline_study(&few, &profile, &StudyOptions::default()).unwrap().study,
-        facts: study_plan::StudyFacts {
-            data: "synthetic".into(),
-            synthetic: true,
-            published: false,
-            reference: false,
-            incomplete: false,
-            scenario_file_sha256: None,
-            recordings: Vec::new(),
-            left_out: Vec::new(),
-            notes: Vec::new(),
-            categories: Vec::new(),
-            mining: MiningOptions::default(),
-            parameterization: ParameterizationOptions::default(),
-            score: ScoreOptions::default(),
-        },
-    };
+    let few = Collection { scenarios: few, ..Collection::default() };
+    let study = Study::builder(&few, profile).plan().unwrap();
     let text = |facts: serde_json::Result<String>| facts.unwrap();
     let crude = text(serde_json::to_string(&crude));
     try_all(sample_plan::KIND, &crude, &[], &|path| PlannedSample::read(path).map(drop));
     let weighted = text(serde_json::to_string(&weighted));
     try_all(weighted_plan::KIND, &weighted, &[], &|path| PlannedWeighted::read(path).map(drop));
-    let records = study.study.records().unwrap().to_vec();
+    let records = study.cases().records().unwrap().to_vec();
     let study: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
-    try_all(study_plan::KIND, &study["content"].to_string(), &records, &|path| PlannedStudy::read(path).map(drop));
+    try_all(Study::KIND, &study["content"].to_string(), &records, &|path| Study::read(path, None).map(drop));
 }
 
 /// Content as it is and changed, each with a checksum that fits and followed by the same bytes.

@@ -8,13 +8,13 @@ use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
-use super::merge::read_parts;
+use super::merge::command;
 use super::sample::Sample;
 use super::sample_lanes;
 use super::sample_plan::PlannedSample;
-use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use crate::engine::{Outcome, Wanted, forecast};
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
+use crate::run::parts::{PLAN_FILE, RunDir, leave_plan, read_parts};
 use crate::run::sampling::{
     BootstrapRecord, CrudeRun, SampleTally, bootstrap, checkpoints, conditional, crude_of_segments,
 };
@@ -67,19 +67,20 @@ pub(super) fn run(
             tracing::info!("{left:.1} of {of} scenarios are near the given values");
         }
     }
-    let desk = Desk { out, record: ESTIMATE_RECORD, run_sha256: &run_sha256, shard, unit_count: plan.unit_count() };
-    if desk.is_done::<SampleTally>()? {
+    let run_dir =
+        RunDir { out: out.clone(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count: plan.unit_count() };
+    if run_dir.is_done::<SampleTally>()? {
         tracing::info!("this part is there already, and whole");
         return Ok(Exit::Ok);
     }
     // Rows are written on the way: a run that writes them begins anew.
     let is_journalled = flags.rows.is_none();
-    let mut work = desk.begin::<SampleTally>(&checkpoints(plan.unit_count()), is_journalled)?;
+    let mut work = run_dir.begin::<SampleTally>(&checkpoints(plan.unit_count()), is_journalled)?;
     let executor = opened.executor().with_recheck(planned.facts.seed);
     let counting = planned.counting();
     tracing::info!("{} samples on {}", count(work.units.end - work.units.start), executor.backend.describe());
     if work.units.is_empty() {
-        desk.finish(work, [0, 0])?;
+        run_dir.finish(work, [0, 0])?;
         return Ok(Exit::Ok);
     }
     let rows = flags.rows.as_deref().map(|path| (path, &planned.density));
@@ -89,7 +90,7 @@ pub(super) fn run(
     };
     if shard.is_some() {
         rows.map_or(Ok(()), StagedFile::publish)?;
-        desk.finish(work, [crude.summary.redone_lanes, crude.summary.rechecked_lanes])?;
+        run_dir.finish(work, [crude.summary.redone_lanes, crude.summary.rechecked_lanes])?;
         return Ok(Exit::Ok);
     }
     let record = (flags.bootstrap > 0)
@@ -144,7 +145,7 @@ fn forecast_crude(planned: &PlannedSample, opened: &Opened, stop: &StopRule, for
 pub(super) fn merge(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let dir = folder.dir();
     let (planned, run_sha256) = PlannedSample::read(plan)?;
-    let parts = read_parts::<SampleTally>(dir, plan, "sample", &run_sha256, planned.plan.unit_count())?;
+    let parts = read_parts::<SampleTally>(dir, &run_sha256, planned.plan.unit_count(), &command(dir, "sample"))?;
     let rechecked = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
     let host = HostRecord::of_parts(parts.len(), rechecked);
     let segments: Vec<SampleTally> = parts.into_iter().flat_map(|part| part.segments).collect();

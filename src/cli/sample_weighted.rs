@@ -8,15 +8,14 @@ use super::backend_flags::Opened;
 use super::console::{self, Verbosity};
 use super::dry_run::{BUDGET, DryRun, Part};
 use super::format::FormatFlag;
-use super::merge::read_parts;
+use super::merge::command;
 use super::sample::Sample;
 use super::sample_lanes;
-use super::shard_flags::{Desk, PLAN_FILE, leave_plan};
 use super::weighted_plan::{PILOT_FILE, PlannedWeighted};
 use crate::engine::{CpuBackend, Executor, Forecast, lanes_within_seconds};
 use crate::model::driver::ModelId;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::run::parts::{Countable, Ledger};
+use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, leave_plan, read_parts};
 use crate::run::sampling::{EstimateRow, LaneLimitState, WeightedTally, proposal_text, scenario_shares, truncated};
 use crate::stats::density::Mixture;
 use crate::stats::estimate::{
@@ -65,12 +64,12 @@ pub(super) fn run(
         flags.format.print_plan(lanes, &out.join(PLAN_FILE))?;
         return Ok(Exit::Ok);
     }
-    let desk = Desk { out, record: ESTIMATE_RECORD, run_sha256: &run_sha256, shard, unit_count: samples };
-    if desk.is_done::<WeightedTally>()? {
+    let run_dir = RunDir { out: out.clone(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count: samples };
+    if run_dir.is_done::<WeightedTally>()? {
         tracing::info!("this part is there already, and whole");
         return Ok(Exit::Ok);
     }
-    let mut work = desk.begin::<WeightedTally>(&[], true)?;
+    let mut work = run_dir.begin::<WeightedTally>(&[], true)?;
     let left: u64 = work.ledger.missing(work.units.clone())?.iter().map(|range| range.end - range.start).sum();
     tracing::info!("{} samples on {}", count(left), opened.backend().describe());
     {
@@ -81,7 +80,7 @@ pub(super) fn run(
         sampled?;
     }
     if shard.is_some() {
-        desk.finish(work, [0, 0])?;
+        run_dir.finish(work, [0, 0])?;
         return Ok(Exit::Ok);
     }
     let host = opened.host(0, started);
@@ -187,7 +186,7 @@ fn sample(
 pub(super) fn merge(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
     let dir = folder.dir();
     let (planned, run_sha256) = PlannedWeighted::read(plan)?;
-    let parts = read_parts::<WeightedTally>(dir, plan, "sample", &run_sha256, planned.facts.samples)?;
+    let parts = read_parts::<WeightedTally>(dir, &run_sha256, planned.facts.samples, &command(dir, "sample"))?;
     let host = HostRecord::of_parts(parts.len(), 0);
     let mut segments = parts.into_iter().flat_map(|part| part.segments);
     let first = segments.next();

@@ -17,6 +17,8 @@ pub struct Executor<'a> {
     pub fallback: Option<&'a dyn Backend>,
     /// The lanes that the CPU computes again, as [`Backend::rechecked_by`] says; `None` checks none.
     pub recheck: Option<RecheckOptions>,
+    /// Maximum lanes of a chunk; `None` leaves it to the backend. A run is journalled and interrupted between chunks.
+    pub chunk_lanes: Option<u64>,
 }
 
 /// How a sweep went.
@@ -48,7 +50,7 @@ impl SweepSummary {
 impl<'a> Executor<'a> {
     /// A backend without fallback or check.
     pub fn new(backend: &'a dyn Backend) -> Self {
-        Executor { backend, fallback: None, recheck: None }
+        Executor { backend, fallback: None, recheck: None, chunk_lanes: None }
     }
 
     /// The same with a fallback, where there is one.
@@ -87,7 +89,8 @@ impl<'a> Executor<'a> {
         recheck: Option<&Recheck>,
         mut each: impl FnMut(Chunk) -> Result<()>,
     ) -> Result<SweepSummary> {
-        let &Executor { backend, fallback, .. } = self;
+        let &Executor { backend, fallback, chunk_lanes, .. } = self;
+        let most = chunk_lanes.unwrap_or(u64::MAX);
         let mut summary = SweepSummary::default();
         let mut redo: Option<Box<dyn Session + '_>> = None;
         let mut session = match (backend.prepare(plan), fallback) {
@@ -103,7 +106,7 @@ impl<'a> Executor<'a> {
         let mut redo_until = if session.is_some() { units.start } else { units.end };
         while from < units.end {
             if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
-                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted));
+                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
                 let by = backend.rechecked_by(wanted);
                 match (chunk_and_samples(plan, session.as_mut(), range.clone(), wanted, recheck, by), fallback) {
                     (Ok((chunk, samples)), _) => {
@@ -136,7 +139,7 @@ impl<'a> Executor<'a> {
                 Some(session) => session,
                 none => none.insert(fallback.prepare(plan)?),
             };
-            let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted));
+            let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(most));
             let chunk = session.run(range.clone(), wanted)?;
             chunk.check_asked(plan, &range, wanted)?;
             if let Some(recheck) = recheck {
