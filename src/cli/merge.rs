@@ -1,16 +1,17 @@
 //! `lanesweep merge`: the parts of a run become its result, bit for bit that of the run in one piece.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::Exit;
 use super::format::FormatFlag;
+use super::sample_run;
 use super::study_run::{Host, finish_study};
-use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
 use crate::interop::cluster::quoted_word;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, Shard, kind_of};
+use crate::run::sampling::Sample;
 use crate::run::study::Study;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
@@ -59,29 +60,25 @@ impl Merge {
             return Err(self.no_parts());
         }
         let kind = kind_of(&plan)?;
-        let (record, merge): (_, Merging) = match kind.as_str() {
-            Study::KIND => (STUDY_RECORD, merge_study),
-            sample_plan::KIND => (ESTIMATE_RECORD, sample_crude::merge),
-            weighted_plan::KIND => (ESTIMATE_RECORD, sample_weighted::merge),
+        let [plan_word, out] = [&plan, &self.dir].map(|path| quoted_word(&path.display().to_string()));
+        let again = |verb: &'static str| {
+            move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
+        };
+        match kind.as_str() {
+            Study::KIND => merge_study(&RunFolder::open(&self.dir, STUDY_RECORD)?, &again("study"), self.format),
+            kind if Sample::is_kind(kind) => {
+                sample_run::merge(&RunFolder::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
+            }
             other => {
                 let help = "give the folder (--out) of a run in parts";
-                return Err(Error::input(
-                    Place::file(plan),
-                    format!("this is a `{other}`, not the plan of a run"),
-                    help,
-                ));
+                Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
             }
-        };
-        merge(&RunFolder::open(&self.dir, record)?, &plan, self.format)
+        }
     }
 }
 
-/// Makes the result of the parts in a folder.
-type Merging = fn(&RunFolder, &Path, FormatFlag) -> Result<Exit>;
-
-fn merge_study(folder: &RunFolder, _: &Path, format: FormatFlag) -> Result<Exit> {
-    let dir = folder.dir();
-    let (study, result) = Study::merge_or(dir, &command(dir, "study"))?;
+fn merge_study(folder: &RunFolder, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
+    let (study, result) = Study::merge_or(folder.dir(), again)?;
     let host = Host {
         backend: format!("{} parts merged", result.parts),
         device: None,
@@ -90,10 +87,4 @@ fn merge_study(folder: &RunFolder, _: &Path, format: FormatFlag) -> Result<Exit>
         settings: Vec::new(),
     };
     finish_study(&study, &result.counts, None, host, folder.results()?, format)
-}
-
-/// The command that makes a shard of the run in this folder.
-pub(super) fn command(dir: &Path, verb: &'static str) -> impl Fn(Shard) -> String {
-    let [plan, out] = [&dir.join(PLAN_FILE), dir].map(|path| quoted_word(&path.display().to_string()));
-    move |shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}")
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Exit;
 use super::console::{self, Verbosity};
 use super::rerun::record_of;
-use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
+use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
 use super::sample_lanes;
 use crate::engine::{Headway, LanePlan, LaneRunner};
@@ -21,7 +21,6 @@ use crate::run::grid::Parameter;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
-use crate::stats::estimate::{BinomialInterval, Checkpoints, StopRule};
 use crate::support::hex::sha256;
 use crate::support::input_file;
 use crate::support::plausibility::Doubts;
@@ -113,16 +112,8 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let executor = opened.executor().with_recheck(seed);
     let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
     let options = CrudeOptions {
-        stop: StopRule {
-            samples: count,
-            relative_half_width: flags.until,
-            time_limit: flags.time_limit.map(std::time::Duration::from_secs_f64),
-            checkpoints: Checkpoints::Doubling,
-        },
-        interval: match flags.interval {
-            IntervalFlag::Wilson => BinomialInterval::Wilson,
-            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
-        },
+        stop: flags.stop(count),
+        interval: flags.interval(),
         level: flags.level,
         // Nobody said how often such scenarios occur.
         exposure: None,

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::sample_distribution;
-use super::sample_plan::{self, PlannedSample};
 use super::source::scenarios_of;
 use crate::engine::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
+use crate::run::sampling::crude_plan::{self, CrudePlan};
 use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::support::input_file;
@@ -128,8 +128,8 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
         return Err(Error::input(Place::file(dir), "there is no run here", help));
     }
     match kind_of(&plan)?.as_str() {
-        sample_plan::KIND => {
-            let sample = PlannedSample::read(&plan)?.0;
+        crude_plan::KIND => {
+            let sample = CrudePlan::read(&plan)?.0;
             Ok(Run::Sample(Box::new(sample.plan), Box::new(sample.density)))
         }
         // Its reader refuses every other kind.

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use serde_json::value::RawValue;
 
-use super::sample_plan::{self, PlannedSample, SampleFacts};
-use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::seal;
+use crate::run::sampling::crude_plan::{self, CrudeFacts, CrudePlan};
+use crate::run::sampling::weighted_plan::{self, WeightedFacts, WeightedPlan};
 use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
 use crate::run::study::Study;
 use crate::scenario::Category;
@@ -45,8 +45,8 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
         headways: SampleHeadways::Each(vec![headway]),
     };
     let map = MapAxes::of(&density, "v_ego_mps", "v_target_mps").unwrap();
-    let crude = SampleFacts { map: Some(map), worst: 3, ..SampleFacts::new(&plan_options, &profile, &[]) };
-    let crude = PlannedSample::new(density.clone(), crude).unwrap().facts;
+    let crude = CrudeFacts { map: Some(map), worst: 3, ..CrudeFacts::new(&plan_options, &profile, &[]) };
+    let crude = CrudePlan::new(density.clone(), crude).unwrap().facts;
     let proposal = density.mixture().unwrap();
     let weighted = WeightedFacts {
         density: String::new(),
@@ -62,15 +62,15 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
         seed: 1,
         level: 0.95,
     };
-    let weighted = PlannedWeighted::new(density, vec![proposal], weighted).unwrap().facts;
+    let weighted = WeightedPlan::new(density, vec![proposal], weighted).unwrap().facts;
     let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
     let few = Collection { scenarios: few, ..Collection::default() };
     let study = Study::builder(&few, profile).plan().unwrap();
     let text = |facts: serde_json::Result<String>| facts.unwrap();
     let crude = text(serde_json::to_string(&crude));
-    try_all(sample_plan::KIND, &crude, &[], &|path| PlannedSample::read(path).map(drop));
+    try_all(crude_plan::KIND, &crude, &[], &|path| CrudePlan::read(path).map(drop));
     let weighted = text(serde_json::to_string(&weighted));
-    try_all(weighted_plan::KIND, &weighted, &[], &|path| PlannedWeighted::read(path).map(drop));
+    try_all(weighted_plan::KIND, &weighted, &[], &|path| WeightedPlan::read(path).map(drop));
     let records = study.cases().records().unwrap().to_vec();
     let study: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
     try_all(Study::KIND, &study["content"].to_string(), &records, &|path| Study::read(path, None).map(drop));
