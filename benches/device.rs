@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
 use lanesweep::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose};
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, LaneRunner, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::{Counting, OperationCount};
@@ -75,7 +75,7 @@ fn time(
     repetition: usize,
 ) {
     let start = Instant::now();
-    let summary = sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(wanted), |_| Ok(())).unwrap();
+    let summary = Executor::new(backend).sweep(plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let (category, model, lanes) = (category.key(), model.name(), plan.lane_count());
     let device = summary.device_s.map_or(String::new(), |s| s.to_string());

@@ -10,16 +10,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use common::paper_size_scenarios;
-use lanesweep::engine::{CpuBackend, Headway, Partial, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::run::sampling::{
-    CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
+    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
     plan_samples, sample_into,
 };
-use lanesweep::run::study::{Study, StudyHead, StudyOptions, outline_study};
+use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
@@ -53,7 +53,7 @@ fn sampling(folder: &Path) {
     let density = density();
     let plan = plan_samples(&density, &density.mixture().unwrap(), &Profile::load("paper").unwrap(), &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
-    let lanes = Lanes { backend: &backend, fallback: None, recheck: None };
+    let executor = Executor::new(&backend);
     let counting = TallyOptions { worst: 20, criterion: Criterion::Collision, map: None };
     let crude = CrudeOptions {
         stop: StopRule::samples(samples),
@@ -63,7 +63,7 @@ fn sampling(folder: &Path) {
         is_sampled_headway: false,
     };
     pairs("sample", folder, plan.unit_count(), &checkpoints(samples), |ledger: &mut Ledger<SampleTally>| {
-        sample_into(&plan, ledger, &lanes, &counting, &crude, |_| Ok(())).unwrap();
+        sample_into(&plan, ledger, &executor, &counting, &crude, |_| Ok(())).unwrap();
     });
 }
 
@@ -77,15 +77,14 @@ fn study(folder: &Path) {
         })
     });
     let scenarios: Vec<Scenario> = many.collect();
-    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().study;
+    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().cases;
     let plan = study.window(0..study.outline().unit_count()).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
         let units = ledger.units();
-        sweep(&plan, units, &backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-            ledger.add(Partial::from_chunk(&plan, &chunk)?)
-        })
-        .unwrap();
+        Executor::new(&backend)
+            .sweep(&plan, units, Wanted::Verdicts, |chunk| ledger.add(Partial::from_chunk(&plan, &chunk)?))
+            .unwrap();
     });
     plan_file(folder, &study);
 }
@@ -141,7 +140,7 @@ fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run:
 }
 
 /// What a shard that is given the plan pays for it, should it compute all of it.
-fn plan_file(folder: &Path, study: &Study) {
+fn plan_file(folder: &Path, study: &StudyCases) {
     let path = folder.join("plan.json");
     let start = Instant::now();
     let (head, _) = seal("plan", study.head()).unwrap();

@@ -5,10 +5,10 @@
 
 use std::time::Instant;
 
-use lanesweep::engine::CpuBackend;
+use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::presets;
-use lanesweep::run::grid::{GridMap, GridPlan, MapBackend};
+use lanesweep::run::grid::{GridMap, GridPlan};
 use lanesweep::scenario::Category;
 
 const REPETITIONS: u32 = 20;
@@ -28,10 +28,10 @@ fn main() {
     let simulations: u64 = planned.iter().map(GridPlan::lane_count).sum();
     assert_eq!(simulations, 140_793);
     let backend = CpuBackend::lane_arithmetic();
-    let how = MapBackend { backend: &backend, fallback: None, recheck_seed: None };
+    let executor = Executor::new(&backend);
     time("plan", simulations, || plans().len());
     time("sweep", simulations, || {
-        planned.iter().map(|plan| GridMap::sweep(plan, how).unwrap().0.cell_count()).sum::<usize>()
+        planned.iter().map(|plan| GridMap::sweep(plan, &executor).unwrap().0.cell_count()).sum::<usize>()
     });
 }
 

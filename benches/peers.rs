@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
 use lanesweep::engine::{Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome};
-use lanesweep::engine::{SweepOptions, Wanted, sweep};
+use lanesweep::engine::{Executor, Wanted};
 use lanesweep::model::driver::{ModelId, NEVER};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
@@ -108,11 +108,12 @@ fn measure(scenarios: &[Scenario], profile: &Profile, category: Category, model:
 
 fn run(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Vec<Outcome<f64>> {
     let mut outcomes = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(wanted), |chunk| {
-        outcomes.extend(std::hint::black_box(chunk).outcomes);
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(backend)
+        .sweep(plan, 0..plan.unit_count(), wanted, |chunk| {
+            outcomes.extend(std::hint::black_box(chunk).outcomes);
+            Ok(())
+        })
+        .unwrap();
     outcomes
 }
 

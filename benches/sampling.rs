@@ -9,12 +9,12 @@ mod common;
 use std::time::Instant;
 
 use common::peak_memory_bytes;
-use lanesweep::engine::{CpuBackend, Headway};
+use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
+    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
 };
 use lanesweep::scenario::parameterization::ParameterizationId;
 use lanesweep::scenario::{Category, Scenario};
@@ -70,7 +70,7 @@ fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, wor
     let profile = Profile::load("paper").unwrap();
     let plan = plan_samples(density, &density.mixture().unwrap(), &profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
-    let lanes = Lanes { backend: &backend, fallback: None, recheck: None };
+    let executor = Executor::new(&backend);
     let counting = TallyOptions { worst, criterion: Criterion::Collision, map: None };
     let crude = CrudeOptions {
         stop: StopRule::samples(samples),
@@ -80,7 +80,7 @@ fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, wor
         is_sampled_headway: false,
     };
     let start = Instant::now();
-    let run = sample_crude(&plan, 0..samples, &lanes, &counting, &crude, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(())).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let id = density.space.id();
     let name = format!("{} {}", id.category.key(), id.key);

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use common::worker::{WORKER, Worker, cpu_seconds, serve};
 use common::{lane_steps, paper_size_scenarios, peak_memory_bytes};
-use lanesweep::engine::{CpuBackend, Headway, Instructions, LanePlan, LaneRunner, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{CpuBackend, Executor, Headway, Instructions, LanePlan, LaneRunner, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Counting;
@@ -225,7 +225,7 @@ fn plan(scenarios: &[Scenario], categories: Vec<Category>, models: Vec<ModelId>,
 }
 
 fn run(plan: &LanePlan, backend: &CpuBackend<f32>) {
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |_| Ok(())).unwrap();
+    Executor::new(backend).sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap();
 }
 
 fn time<T>(work: impl FnOnce() -> T) -> f64 {

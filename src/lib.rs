@@ -41,26 +41,21 @@
 //! A study: recordings → scenarios → plan → counts → scores.
 //!
 //! ```
-//! use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+//! use lanesweep::engine::{CpuBackend, Executor};
 //! use lanesweep::model::profile::Profile;
-//! use lanesweep::run::score::{ScoreOptions, f1, score};
-//! use lanesweep::engine::{CpuBackend, Partial, SweepOptions, Wanted, sweep};
-//! use lanesweep::run::study::{StudyOptions, plan_study};
+//! use lanesweep::run::score::f1;
+//! use lanesweep::run::study::Study;
+//! use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 //! use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 //!
 //! # fn main() -> lanesweep::Result<()> {
 //! let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
 //! let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
-//! let plan = plan_study(&mined.scenarios, &Profile::load("paper")?, &StudyOptions::default())?.plan;
-//! let options = SweepOptions::plain(Wanted::Verdicts);
-//! let mut parts = Vec::new();
-//! sweep(&plan, 0..plan.unit_count(), &CpuBackend::lane_arithmetic(), &options, |chunk| {
-//!     parts.push(Partial::from_chunk(&plan, &chunk)?);
-//!     Ok(())
-//! })?;
-//! let counts = parts.into_iter().try_fold(Partial::empty(&plan), Partial::merge)?;
-//! let scores = score(&plan, &counts, &ScoreOptions::default())?;
-//! for cell in scores.categories.iter().flat_map(|category| &category.cells) {
+//! let study = Study::builder(&mined, Profile::load("paper")?).plan()?;
+//! let backend = CpuBackend::lane_arithmetic();
+//! let result = study.run(&Executor::new(&backend))?;
+//! assert_eq!(result.summary.lanes, study.plan().lane_count());
+//! for cell in study.score(&result.counts)?.categories.iter().flat_map(|category| &category.cells) {
 //!     // Undefined (0/0) where neither S nor S' fails.
 //!     assert!(f1(&cell.counts).is_none_or(|f1| (0.0..=1.0).contains(&f1)));
 //! }

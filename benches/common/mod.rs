@@ -4,7 +4,7 @@
 
 pub mod worker;
 
-use lanesweep::engine::{Backend, LanePlan, Partial, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{Backend, Executor, LanePlan, Partial, Wanted};
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -30,22 +30,24 @@ pub fn paper_size_scenarios() -> Vec<Scenario> {
 /// Evaluated steps of all lanes.
 pub fn lane_steps(plan: &LanePlan, backend: &dyn Backend) -> u64 {
     let mut steps = 0;
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Outcomes), |chunk| {
-        steps += chunk.outcomes.iter().map(|o| u64::from(o.end_step) + 1).sum::<u64>();
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(backend)
+        .sweep(plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
+            steps += chunk.outcomes.iter().map(|o| u64::from(o.end_step) + 1).sum::<u64>();
+            Ok(())
+        })
+        .unwrap();
     steps
 }
 
 /// The partial of a whole plan, from verdicts alone.
 pub fn swept(plan: &LanePlan, backend: &dyn Backend) -> Partial {
     let mut parts = Vec::new();
-    sweep(plan, 0..plan.unit_count(), backend, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(backend)
+        .sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+            parts.push(Partial::from_chunk(plan, &chunk)?);
+            Ok(())
+        })
+        .unwrap();
     parts.into_iter().try_fold(Partial::empty(plan), Partial::merge).unwrap()
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose, visible_here};
 use crate::engine::verify::self_check;
-use crate::engine::{Backend, CpuBackend};
+use crate::engine::{Backend, CpuBackend, Executor};
 use crate::report::run_record::DeviceRecord;
 use crate::report::sampling::HostRecord;
 use crate::{Error, Place, Result};
@@ -111,6 +111,11 @@ impl Opened {
     /// What stands in for a device.
     pub fn fallback(&self) -> Option<&dyn Backend> {
         self.gpu.as_ref().map(|_| &self.cpu as &dyn Backend)
+    }
+
+    /// Both.
+    pub fn executor(&self) -> Executor<'_> {
+        Executor::new(self.backend()).with_fallback(self.fallback())
     }
 
     /// What computed a run that began at this instant, for its record.

@@ -11,10 +11,10 @@ use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, Part};
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
-use super::study_run::{How, run_plan};
+use super::study_run::run_plan;
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
-use crate::engine::{Forecast, Headway, LanePlan, ONE_IN, Partial, Recheck, SweepSummary, Wanted, forecast};
+use crate::engine::{Forecast, Headway, LanePlan, Partial, SweepSummary, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -22,8 +22,8 @@ use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
 use crate::report::html::PageFigure;
 use crate::run::sampling::{
-    CategoryComparison, ComparedParameterization, Lanes, SampleHeadways, SamplePlanOptions, SampleSource,
-    ScenarioCounts, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
+    CategoryComparison, ComparedParameterization, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts,
+    compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
 };
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
@@ -33,6 +33,7 @@ use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, Results, RunFolder};
+use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
@@ -138,7 +139,7 @@ impl Compare {
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source::counts(&collection.scenarios));
+        tracing::info!("{}", counts_text(&collection.scenarios));
         let facts = fit::facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
@@ -156,7 +157,7 @@ impl Compare {
         if plan.unit_count() == 0 {
             return Err(Error::input(
                 Place::item(facts.data),
-                format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
+                format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
                 "use more recordings, or relax the filters ([mining] in --config)",
             ));
         }
@@ -165,8 +166,8 @@ impl Compare {
         }
         let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
-        let how = How { backend: opened.backend(), fallback: opened.fallback(), recheck: self.seed };
-        let (partial, mut swept) = run_plan(plan, &how, verbosity)?;
+        let executor = opened.executor().with_recheck(self.seed);
+        let (partial, mut swept) = run_plan(plan, &executor, verbosity)?;
 
         let run = Run {
             flags: self,
@@ -360,12 +361,11 @@ impl Run<'_> {
             headways: SampleHeadways::Each(self.headways.clone()),
         };
         let plan = plan_samples(&density, &density.mixture()?, self.profile, &options)?;
-        let recheck = Recheck::new(&plan, self.flags.seed, ONE_IN);
-        let lanes = Lanes { backend: self.opened.backend(), fallback: self.opened.fallback(), recheck: Some(&recheck) };
+        let executor = self.opened.executor().with_recheck(self.flags.seed);
         let kernels = kernel_scenarios(&density, self.scenarios)?;
         let scenarios = self.study.blocks[block].units.len() as usize;
         let exposure = density.exposure.as_ref();
-        let sampled = sample_by_scenario(&plan, &kernels, scenarios, &lanes, exposure, LEVEL, progress)?;
+        let sampled = sample_by_scenario(&plan, &kernels, scenarios, &executor, exposure, LEVEL, progress)?;
         swept.add(&sampled.summary);
         let compared = ComparedParameterization {
             key: id.key,

@@ -79,18 +79,23 @@ pub(super) fn of_run(
     let first = source.keys.first().map_or("", String::as_str);
     match find_run(dir, first)? {
         Run::Study(study) => {
-            let (whole, facts) = (study.plan(), &study.facts);
+            let (whole, facts) = (study.plan(), &study.facts());
             let mined = scenarios.map(|path| scenarios_of(path, extras.implausible)).transpose()?.unwrap_or_default();
             let (mined, incomplete) = mined;
             let keys = match worst {
-                Some((count, variants)) => {
-                    worst_of_study(&study.study, facts.reference, count, criterion, variants, source.models.as_deref())?
-                }
+                Some((count, variants)) => worst_of_study(
+                    study.cases(),
+                    facts.reference,
+                    count,
+                    criterion,
+                    variants,
+                    source.models.as_deref(),
+                )?,
                 None => named(whole, source)?,
             };
             let units = keys.iter().map(|key| whole.blocks[key.block].first_unit + key.unit);
             let span = units.clone().min().unwrap_or(0)..units.max().map_or(0, |last| last + 1);
-            let plan = &study.study.window(span)?;
+            let plan = &study.cases().window(span)?;
             let about = About {
                 data: &facts.data,
                 is_synthetic: facts.synthetic || mined.iter().any(|scenario| scenario.synthetic),

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use super::simulate_lanes::{find, model};
-use super::study_run::WINDOW;
-use crate::engine::{Backend, Chunk, CpuBackend, LaneKey, LanePlan, SweepOptions, Wanted, sweep};
+use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::limit_state;
-use crate::run::study::Study;
+use crate::run::study::{StudyCases, WINDOW};
 use crate::support::input_file;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
@@ -23,7 +22,7 @@ const MAX_LANES: usize = 10_000;
 /// # Errors
 /// [`Error::Usage`] for variants or models that the run does not have, and for too many lanes.
 pub(super) fn worst_of_study(
-    study: &Study,
+    study: &StudyCases,
     is_reference: bool,
     count: usize,
     criterion: Criterion,
@@ -43,7 +42,6 @@ pub(super) fn worst_of_study(
     }
     let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
     let backend: &dyn Backend = if is_reference { &wide } else { &narrow };
-    let options = SweepOptions { wanted: Wanted::Outcomes, fallback: None, recheck: None };
     let mut worst: Vec<Vec<(f64, u64)>> = vec![Vec::new(); plan.models.len()];
     let mut each = |chunk: Chunk| {
         // The unit whose lanes are looked at, and its worst lane so far, per model.
@@ -70,7 +68,7 @@ pub(super) fn worst_of_study(
         Ok(())
     };
     study.in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
-        sweep(plan, units, backend, &options, &mut each).map(drop)
+        Executor::new(backend).sweep(plan, units, Wanted::Outcomes, &mut each).map(drop)
     })?;
     let lanes = models.iter().flat_map(|model| worst[*model].iter());
     Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())

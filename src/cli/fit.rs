@@ -22,7 +22,7 @@ use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, Expo
 use crate::support::files::{check_folder_of, make_folder};
 use crate::support::input_file;
 use crate::support::run_dir::RunFolder;
-use crate::traffic::mining::Collection;
+use crate::traffic::mining::{Collection, counts_text};
 use crate::{Error, Place, Result};
 
 /// Draws for P_valid at most, as in the configuration.
@@ -116,7 +116,7 @@ impl Fit {
         let files = self.files(&ids, configured)?;
         tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source::counts(&collection.scenarios));
+        tracing::info!("{}", counts_text(&collection.scenarios));
         let facts = facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");

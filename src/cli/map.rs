@@ -11,7 +11,7 @@ use super::dry_run::{BUDGET, DryRun, Part};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::engine::{Backend, CpuBackend, Forecast, SweepSummary, Verdicts, Wanted, forecast};
+use crate::engine::{Backend, CpuBackend, Executor, Forecast, SweepSummary, Verdicts, Wanted, forecast};
 use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -19,9 +19,7 @@ use crate::model::profile::Profile;
 use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::presets::{self, Preset};
-use crate::run::grid::{
-    CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MAX_PANELS, MapBackend, PARAMETERS, Parameter,
-};
+use crate::run::grid::{CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MAX_PANELS, PARAMETERS, Parameter};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
@@ -153,7 +151,7 @@ impl Map {
             return forecast_maps(&planned, backend, self.format);
         }
         let folder = RunFolder::open(&self.out, MAP_RECORD)?;
-        let how = MapBackend { backend, fallback: opened.fallback(), recheck_seed: Some(RECHECK_SEED) };
+        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
         let is_jrc = self.preset.is_some()
             && criterion == Criterion::Collision
             && profile == Profile::load(presets::JRC_PROFILE)?;
@@ -163,10 +161,10 @@ impl Map {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let mut grids = Vec::new();
         for (preset, plan, other) in planned {
-            let map = swept(&plan, how, &mut summary)?;
+            let map = swept(&plan, &executor, &mut summary)?;
             let other = match other {
                 Some((name, plan)) => {
-                    let map = swept(&plan, how, &mut summary)?;
+                    let map = swept(&plan, &executor, &mut summary)?;
                     Some((name, plan, map))
                 }
                 None => None,
@@ -411,8 +409,8 @@ fn forecast_maps(planned: &[Planned], backend: &dyn Backend, format: FormatFlag)
     Ok(Exit::Ok)
 }
 
-fn swept(plan: &GridPlan, how: MapBackend, summary: &mut SweepSummary) -> Result<GridMap> {
-    let (map, of_map) = GridMap::sweep(plan, how)?;
+fn swept(plan: &GridPlan, executor: &Executor, summary: &mut SweepSummary) -> Result<GridMap> {
+    let (map, of_map) = GridMap::sweep(plan, executor)?;
     summary.add(&of_map);
     Ok(map)
 }

@@ -1,19 +1,18 @@
 //! `lanesweep merge`: the parts of a run become its result, bit for bit that of the run in one piece.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::Exit;
 use super::format::FormatFlag;
-use super::shard_flags::PLAN_FILE;
-use super::study_plan::{self, PlannedStudy};
+use super::sample_run;
 use super::study_run::{Host, finish_study};
-use super::{sample_crude, sample_plan, sample_weighted, weighted_plan};
-use crate::engine::{Partial, SweepSummary};
 use crate::interop::cluster::quoted_word;
 use crate::report::run_record::Timings;
-use crate::run::parts::{Countable, Part, Shard, collect, kind_of, read_part};
+use crate::run::parts::{PLAN_FILE, Shard, kind_of};
+use crate::run::sampling::Sample;
+use crate::run::study::Study;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::{Error, Place, Result};
@@ -61,80 +60,31 @@ impl Merge {
             return Err(self.no_parts());
         }
         let kind = kind_of(&plan)?;
-        let (record, merge): (_, Merging) = match kind.as_str() {
-            study_plan::KIND => (STUDY_RECORD, merge_study),
-            sample_plan::KIND => (ESTIMATE_RECORD, sample_crude::merge),
-            weighted_plan::KIND => (ESTIMATE_RECORD, sample_weighted::merge),
+        let [plan_word, out] = [&plan, &self.dir].map(|path| quoted_word(&path.display().to_string()));
+        let again = |verb: &'static str| {
+            move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
+        };
+        match kind.as_str() {
+            Study::KIND => merge_study(&RunFolder::open(&self.dir, STUDY_RECORD)?, &again("study"), self.format),
+            kind if Sample::is_kind(kind) => {
+                sample_run::merge(&RunFolder::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
+            }
             other => {
                 let help = "give the folder (--out) of a run in parts";
-                return Err(Error::input(
-                    Place::file(plan),
-                    format!("this is a `{other}`, not the plan of a run"),
-                    help,
-                ));
+                Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
             }
-        };
-        merge(&RunFolder::open(&self.dir, record)?, &plan, self.format)
+        }
     }
 }
 
-/// Makes the result of the parts in a folder.
-type Merging = fn(&RunFolder, &Path, FormatFlag) -> Result<Exit>;
-
-fn merge_study(folder: &RunFolder, plan: &Path, format: FormatFlag) -> Result<Exit> {
-    let dir = folder.dir();
-    // Counts are all that is joined: no scenario is needed.
-    let (study, run_sha256) = PlannedStudy::read_some(plan, |_| 0..0)?;
-    let parts = read_parts::<Partial>(dir, plan, "study", &run_sha256, study.plan().unit_count())?;
-    let mut swept = SweepSummary { lanes: study.plan().lane_count(), ..SweepSummary::default() };
-    let count = parts.len();
-    let mut partial = Partial::empty(study.plan());
-    for part in parts {
-        swept.redone_lanes += part.lanes_redone_and_rechecked[0];
-        swept.rechecked_lanes += part.lanes_redone_and_rechecked[1];
-        partial = part.segments.into_iter().try_fold(partial, Partial::merge)?;
-    }
-    if !partial.is_complete(study.plan()) || !partial.fits(study.plan()) {
-        let problem = "the parts do not hold every unit that their names stand for";
-        return Err(Error::input(Place::file(dir), problem, "make them again"));
-    }
+fn merge_study(folder: &RunFolder, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
+    let (study, result) = Study::merge_or(folder.dir(), again)?;
     let host = Host {
-        backend: format!("{count} parts merged"),
+        backend: format!("{} parts merged", result.parts),
         device: None,
-        swept,
+        swept: result.summary,
         timings: Timings::default(),
         settings: Vec::new(),
     };
-    finish_study(&study, &partial, None, host, folder.results()?, format)
-}
-
-/// All parts of a folder, checked: of this run, whole, together everything exactly once.
-pub(super) fn read_parts<T: Countable>(
-    dir: &Path,
-    plan: &Path,
-    verb: &str,
-    run_sha256: &str,
-    units: u64,
-) -> Result<Vec<Part<T>>> {
-    let [plan, out] = [plan, dir].map(|path| quoted_word(&path.display().to_string()));
-    let command = |shard: Shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
-    let found = collect(dir, units, command)?;
-    let read = |(shard, path): &(Shard, PathBuf)| {
-        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &command(*shard))?;
-        let wrong = |problem: &str| {
-            let help = format!("delete it and make it again: {}", command(*shard));
-            Error::input(Place::file(path), problem, help)
-        };
-        let mut covered: Vec<_> = part.segments.iter().flat_map(Countable::covered).collect();
-        covered.sort_by_key(|range| range.start);
-        let mut at = part.units.start;
-        for range in covered {
-            if range.start != at {
-                return Err(wrong("it does not hold each of its units exactly once"));
-            }
-            at = range.end;
-        }
-        if at == part.units.end { Ok(part) } else { Err(wrong("it does not hold all of its units")) }
-    };
-    found.parts.iter().map(read).collect()
+    finish_study(&study, &result.counts, None, host, folder.results()?, format)
 }

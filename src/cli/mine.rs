@@ -15,6 +15,7 @@ use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::count_of;
+use crate::traffic::mining::counts_text;
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
@@ -55,7 +56,7 @@ impl Mine {
         let _lock = self.output.as_deref().map(lock_of).transpose()?;
         let from = Source::Folder(self.dir.clone());
         let mut collection = from.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", source::counts(&collection.scenarios));
+        tracing::info!("{}", counts_text(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }

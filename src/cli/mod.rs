@@ -20,17 +20,14 @@ mod lists;
 mod map;
 mod merge;
 mod mine;
-#[cfg(test)]
-mod plan_mutations;
 mod rerun;
 mod sample;
-mod sample_adaptive;
 mod sample_checks;
-mod sample_crude;
 mod sample_distribution;
+mod sample_forecast;
 mod sample_lanes;
-mod sample_plan;
-mod sample_weighted;
+mod sample_options;
+mod sample_run;
 pub mod settings;
 mod shard_flags;
 mod shell;
@@ -39,11 +36,9 @@ mod simulate_lanes;
 mod slurm;
 mod source;
 mod study;
-mod study_plan;
 mod study_run;
 mod synth;
 mod verify;
-mod weighted_plan;
 
 pub use exit::Exit;
 

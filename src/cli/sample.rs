@@ -1,25 +1,15 @@
-//! `lanesweep sample`: a density in, probabilities of failure out.
+//! Flags of `lanesweep sample`: a density in, probabilities of failure out.
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
 
 use clap::Args;
 
+use super::ProfileFlags;
 use super::backend_flags::{BackendFlags, Opened};
-use super::configured::Configured;
-use super::console::Verbosity;
 use super::format::FormatFlag;
 use super::lists;
-use super::sample_checks;
-use super::sample_crude;
-use super::sample_distribution;
-use super::sample_lanes;
-use super::sample_plan::{PlannedSample, SampleFacts};
-use super::sample_weighted;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
-use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
-use super::{Exit, ProfileFlags};
 use crate::cli::settings::SampleSettings;
 pub(super) use crate::cli::settings::{
     Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
@@ -29,13 +19,8 @@ use crate::interop::openscenario::Rename;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::report::sampling::{EstimateFile, RunFacts};
-use crate::run::parts::kind_of;
-use crate::run::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, read_proposal};
-use crate::stats::density::{DensityModel, read_density};
-use crate::stats::estimate::{Checkpoints, Pilot, StopRule};
-use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder};
-use crate::support::table::TableFormat;
+use crate::run::sampling::SampleHeadways;
+use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
@@ -62,7 +47,7 @@ use crate::{Error, Place, Result};
 pub struct Sample {
     /// Density file
     #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"])]
-    density: Option<PathBuf>,
+    pub(super) density: Option<PathBuf>,
     /// OpenSCENARIO file with stochastic distributions of parameters, instead of a density; its numberOfTestRuns and
     /// randomSeed are the defaults of --samples and --seed
     #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "bootstrap", "rows", "shard", "plan_only"])]
@@ -156,100 +141,12 @@ pub struct Sample {
     #[command(flatten)]
     pub(super) shards: ShardFlags,
     #[command(flatten)]
-    backend: BackendFlags,
+    pub(super) backend: BackendFlags,
     #[command(flatten)]
     profile: ProfileFlags,
 }
 
-/// Everything that a run was given, read and checked.
-pub(super) struct Run<'a> {
-    pub(super) flags: &'a Sample,
-    pub(super) density: DensityModel,
-    pub(super) profile: Profile,
-    pub(super) models: Vec<ModelId>,
-    pub(super) criterion: Criterion,
-    pub(super) headways: SampleHeadways,
-    pub(super) opened: &'a Opened,
-    pub(super) started: Instant,
-}
-
 impl Sample {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
-        let started = Instant::now();
-        self.check()?;
-        self.shards.start()?;
-        if let Some(path) = &self.shards.plan {
-            configured.refuse_with_plan()?;
-            return self.run_plan(path, started, verbosity);
-        }
-        if let Some(path) = &self.distribution {
-            return sample_distribution::run(self, path, started, verbosity);
-        }
-        let Some(density) = &self.density else {
-            return Err(Error::usage(
-                Place::item("DENSITY"),
-                "there is none",
-                "give a file that `lanesweep fit` wrote",
-            ));
-        };
-        let density = read_density(density)?;
-        let profile = self.profile.load()?;
-        let models = self.models()?;
-        let criterion = self.criterion()?;
-        let headways = self.headways(&density)?;
-        let opened = self.backend.open()?;
-        if let Some(rows) = &self.rows {
-            guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
-        }
-        let run = Run { flags: self, density, profile, models, criterion, headways, opened: &opened, started };
-        tracing::info!("{}", run.density.provenance.data);
-        if self.is_crude() {
-            let stop = run.stop(self.samples.unwrap_or(100_000));
-            return sample_crude::run(self, &run.planned()?, &opened, stop, started, verbosity);
-        }
-        if self.has_pilot() && !self.dry_run && self.until.is_none() && self.time_limit.is_none() {
-            // The pilot is kept in the folder, so it needs the folder's lock too.
-            let folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
-            let planned = run.planned_after_pilot()?;
-            drop(folder);
-            return sample_weighted::run(self, &planned, &opened, started, verbosity);
-        }
-        if self.is_weighted() && self.until.is_none() && self.time_limit.is_none() {
-            return sample_weighted::run(self, &run.planned_weighted()?, &opened, started, verbosity);
-        }
-        if self.dry_run {
-            return run.forecast_adaptive();
-        }
-        let folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
-        let mut results = folder.results()?;
-        let mut file = run.adaptive(&mut results)?;
-        if !self.proposal.is_empty() {
-            // Those that were given may be of this folder.
-            results.keep(|name| name.starts_with("proposal-"));
-        }
-        sample_lanes::write_estimates(results, &run.density, &mut file, Vec::new())?;
-        self.format.print(|| file.text(), || file.json())?;
-        tracing::info!("results written to {}", self.out.display());
-        Ok(Exit::Ok)
-    }
-
-    /// Runs what a plan file says: of crude Monte Carlo or over a given proposal.
-    fn run_plan(&self, path: &PathBuf, started: Instant, verbosity: Verbosity) -> Result<Exit> {
-        if kind_of(path)? == weighted_plan::KIND {
-            if self.rows.is_some() {
-                return Err(sample_checks::only_crude("--rows"));
-            }
-            let (planned, _) = PlannedWeighted::read(path)?;
-            return sample_weighted::run(self, &planned, &self.backend.open()?, started, verbosity);
-        }
-        let (planned, _) = PlannedSample::read(path)?;
-        let stop = StopRule::samples(planned.facts.samples);
-        if let Some(rows) = &self.rows {
-            guard(rows, &self.out, std::iter::once(path))?;
-        }
-        sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity)
-    }
-
     /// The seed of the draws.
     pub(super) fn seed(&self) -> u64 {
         self.seed.unwrap_or(SampleSettings::default().seed)
@@ -290,11 +187,6 @@ impl Sample {
         self.estimator == EstimatorFlag::Is && self.proposal.len() == 1
     }
 
-    /// Importance sampling of what a pilot finds.
-    fn has_pilot(&self) -> bool {
-        self.estimator == EstimatorFlag::Is && self.proposal.is_empty()
-    }
-
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {
         lists::models(&self.models)
     }
@@ -306,7 +198,7 @@ impl Sample {
         })
     }
 
-    fn headways(&self, density: &DensityModel) -> Result<SampleHeadways> {
+    pub(super) fn headways(&self, density: &DensityModel) -> Result<SampleHeadways> {
         match self.thw.as_deref().map(str::trim) {
             Some("sampled") => Ok(SampleHeadways::Sampled),
             None if density.space.has_thw() => Ok(SampleHeadways::Sampled),
@@ -316,142 +208,9 @@ impl Sample {
     }
 }
 
-impl Run<'_> {
-    pub(super) fn stop(&self, samples: u64) -> StopRule {
-        StopRule {
-            samples,
-            relative_half_width: self.flags.until,
-            time_limit: self.flags.time_limit.map(Duration::from_secs_f64),
-            checkpoints: Checkpoints::Doubling,
-        }
-    }
-
-    /// The parts of `estimate.json` that all estimators share.
-    pub(super) fn file(&self, samples: u64, estimates: Vec<EstimateRow>) -> Result<EstimateFile> {
-        let facts = RunFacts {
-            estimator: self.flags.estimator.key(),
-            profile: self.profile.clone(),
-            models: self.models.clone(),
-            headways: match &self.headways {
-                SampleHeadways::Each(list) => list.clone(),
-                SampleHeadways::Sampled => Vec::new(),
-            },
-            points: if self.flags.points == PointsFlag::Sobol { "sobol" } else { "random" },
-            samples,
-            seed: self.flags.seed(),
-            given: self.flags.given.clone(),
-        };
-        EstimateFile::new(&self.density, facts, estimates, self.opened.host(0, self.started))
-    }
-
-    /// Crude Monte Carlo as these flags ask for it.
-    fn planned(self) -> Result<PlannedSample> {
-        let flags = self.flags;
-        let options = SamplePlanOptions {
-            samples: flags.samples.unwrap_or(100_000),
-            seed: flags.seed(),
-            source: match flags.points {
-                PointsFlag::Random => SampleSource::Random,
-                PointsFlag::Sobol => SampleSource::Sobol,
-            },
-            models: self.models.clone(),
-            headways: self.headways.clone(),
-        };
-        let facts = SampleFacts {
-            criterion: self.criterion,
-            worst: flags.worst,
-            map: self.map()?,
-            clopper_pearson: flags.interval == IntervalFlag::ClopperPearson,
-            level: flags.level,
-            ..SampleFacts::new(&options, &self.profile, &flags.given)
-        };
-        PlannedSample::new(self.density, facts)
-    }
-
-    /// Importance sampling of one given proposal, a fixed number of samples.
-    fn planned_weighted(self) -> Result<PlannedWeighted> {
-        let proposal = read_proposal(&self.flags.proposal[0], &self.density)?;
-        let facts = self.weighted_facts(None)?;
-        PlannedWeighted::new(self.density, vec![proposal], facts)
-    }
-
-    /// Importance sampling of what a pilot finds for each driver model, a fixed number of samples.
-    fn planned_after_pilot(self) -> Result<PlannedWeighted> {
-        let flags = self.flags;
-        let pilot = Pilot {
-            worst: flags.worst_share,
-            broad: flags.broad,
-            defence: flags.defence,
-            ..Pilot::guarded(flags.pilot)
-        };
-        let facts = self.weighted_facts(Some(pilot))?;
-        let density = self.density.clone();
-        PlannedWeighted::after_pilot(density, facts, &flags.out, || self.pilots(&pilot))
-    }
-
-    /// What both have in common; the proposals are added to it.
-    fn weighted_facts(&self, pilot: Option<Pilot>) -> Result<WeightedFacts> {
-        let flags = self.flags;
-        let headway = match &self.headways {
-            SampleHeadways::Sampled => None,
-            SampleHeadways::Each(list) => Some(one_headway(list, flags.estimator)?),
-        };
-        Ok(WeightedFacts {
-            density: String::new(),
-            proposals: Vec::new(),
-            pilot,
-            pilots: Vec::new(),
-            defence: flags.defence,
-            profile: self.profile.clone(),
-            models: self.models.clone(),
-            headway,
-            criterion: self.criterion,
-            samples: flags.samples.unwrap_or(100_000),
-            seed: flags.seed(),
-            level: flags.level,
-        })
-    }
-
-    fn map(&self) -> Result<Option<MapAxes>> {
-        let parameters = self.density.space.parameters();
-        match self.flags.map.as_deref() {
-            Some("none") => Ok(None),
-            None if parameters.len() < 2 => Ok(None),
-            None => MapAxes::of(&self.density, &parameters[0].name, &parameters[1].name).map(Some),
-            Some(text) => {
-                let (x, y) = text.split_once(',').ok_or_else(|| {
-                    let problem = format!("`{text}` names no two parameters");
-                    Error::usage(Place::item("--map"), problem, "give two, separated by a comma, or `none`")
-                })?;
-                MapAxes::of(&self.density, x.trim(), y.trim()).map(Some)
-            }
-        }
-    }
-}
-
-/// The estimators that weigh follow one headway.
-pub(super) fn one_headway(list: &[Headway], estimator: EstimatorFlag) -> Result<Headway> {
-    let [one] = list else {
-        return Err(Error::usage(
-            Place::item("--thw"),
-            format!("--estimator {} follows one headway at a time", estimator.key()),
-            "give one, such as --thw 0.6, or a density fitted with --with-thw",
-        ));
-    };
-    Ok(*one)
-}
-
 /// `NAME=VALUE`.
 fn given(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
     let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
     if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
-}
-
-/// The rows must replace neither an input nor another result.
-fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
-    super::source::refuse_overwriting(rows, &others, "--rows")?;
-    TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
 }

@@ -9,19 +9,18 @@ use serde::{Deserialize, Serialize};
 use super::Exit;
 use super::console::{self, Verbosity};
 use super::rerun::record_of;
-use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
+use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
 use super::sample_lanes;
-use crate::engine::{Headway, LanePlan, LaneRunner, ONE_IN, Recheck};
+use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::model::profile::Profile;
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::run::grid::Parameter;
-use crate::run::sampling::{CrudeOptions, CrudeRun, Lanes, TallyOptions, sample_crude};
+use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
-use crate::stats::estimate::{BinomialInterval, Checkpoints, StopRule};
 use crate::support::hex::sha256;
 use crate::support::input_file;
 use crate::support::plausibility::Doubts;
@@ -110,28 +109,19 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let opened = flags.open()?;
     let folder = RunFolder::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
-    let recheck = Recheck::new(&plan, seed, ONE_IN);
-    let lanes = Lanes { backend: opened.backend(), fallback: opened.fallback(), recheck: Some(&recheck) };
+    let executor = opened.executor().with_recheck(seed);
     let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
     let options = CrudeOptions {
-        stop: StopRule {
-            samples: count,
-            relative_half_width: flags.until,
-            time_limit: flags.time_limit.map(std::time::Duration::from_secs_f64),
-            checkpoints: Checkpoints::Doubling,
-        },
-        interval: match flags.interval {
-            IntervalFlag::Wilson => BinomialInterval::Wilson,
-            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
-        },
+        stop: flags.stop(count),
+        interval: flags.interval(),
         level: flags.level,
         // Nobody said how often such scenarios occur.
         exposure: None,
         is_sampled_headway: samples.has_distance(),
     };
-    tracing::info!("{} samples on {}", readable::count(count), lanes.backend.describe());
+    tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
-    let crude = sample_crude(&plan, 0..count, &lanes, &counting, &options, |chunk| {
+    let crude = sample_crude(&plan, 0..count, &executor, &counting, &options, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         Ok(())
     })?;

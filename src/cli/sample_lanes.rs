@@ -1,59 +1,47 @@
-//! The lanes of a sampling run: progress, rows on request, and the files that come of the counts.
+//! The files of a sampling run: rows on request, and what comes of the counts.
 
 use std::path::Path;
 
-use super::console::{self, Verbosity};
-use crate::engine::{LanePlan, LaneRunner, Outcome};
+use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
 use crate::report::html::PageFigure;
 use crate::report::sampled_rows;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
-use crate::run::parts::Ledger;
-use crate::run::sampling::{CrudeOptions, CrudeRun, Lanes, SampleTally, TallyOptions, sample_into};
+use crate::run::sampling::{CrudeRun, TallyOptions};
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
 use crate::support::run_dir::Results;
 use crate::support::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
-/// Samples, with one row per lane where asked for: a table that gets its name with the run's other results.
-pub(super) fn run(
-    plan: &LanePlan,
-    ledger: &mut Ledger<SampleTally>,
-    how: &Lanes,
-    counting: &TallyOptions,
-    options: &CrudeOptions,
-    rows: Option<(&Path, &DensityModel)>,
-    verbosity: Verbosity,
-) -> Result<(CrudeRun, Option<StagedFile>)> {
-    let units = ledger.units();
-    let left: u64 = ledger.missing(units)?.iter().map(|range| range.end - range.start).sum();
-    let bar = console::progress(verbosity, left, "sampling");
-    let Some((path, density)) = rows else {
-        let run = sample_into(plan, ledger, how, counting, options, |chunk| {
-            bar.inc(chunk.units.end - chunk.units.start);
-            Ok(())
-        });
-        bar.finish_and_clear();
-        return Ok((run?, None));
-    };
-    // Rows hold every value, so the lanes must.
-    let counting = TallyOptions { worst: counting.worst.max(1), ..counting.clone() };
-    let facts = TableFacts {
-        table: "samples",
-        profile: Some(plan.profile.name.clone()),
-        plan_sha256: Some(plan.hash().to_owned()),
-        synthetic: density.provenance.synthetic,
-    };
-    let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
-    let mut table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
-    let run = sample_into(plan, ledger, how, &counting, options, |chunk| {
-        bar.inc(chunk.units.end - chunk.units.start);
-        sampled_rows::write_chunk(&mut table, plan, density, chunk)
-    });
-    bar.finish_and_clear();
-    Ok((run?, Some(table.stage()?)))
+/// One row per lane: a table that gets its name with the run's other results.
+pub(super) struct RowTable<'a> {
+    table: TableWriter,
+    plan: &'a LanePlan,
+    density: &'a DensityModel,
+}
+
+impl<'a> RowTable<'a> {
+    pub fn create(path: &Path, plan: &'a LanePlan, density: &'a DensityModel) -> Result<Self> {
+        let facts = TableFacts {
+            table: "samples",
+            profile: Some(plan.profile.name.clone()),
+            plan_sha256: Some(plan.hash().to_owned()),
+            synthetic: density.provenance.synthetic,
+        };
+        let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
+        let table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
+        Ok(RowTable { table, plan, density })
+    }
+
+    pub fn add(&mut self, chunk: &Chunk) -> Result<()> {
+        sampled_rows::write_chunk(&mut self.table, self.plan, self.density, chunk)
+    }
+
+    pub fn stage(self) -> Result<StagedFile> {
+        self.table.stage()
+    }
 }
 
 /// Everything of a run but what [`write_estimates`] writes; returns the figures.

@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::sample_distribution;
-use super::sample_plan::{self, PlannedSample};
-use super::shard_flags::{PLAN_FILE, RUN_PLAN_FILE};
 use super::source::scenarios_of;
-use super::study_plan::{self, PlannedStudy};
 use crate::engine::{Headway, LaneKey, LanePlan, LaneRunner, Outcome, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
-use crate::run::parts::kind_of;
-use crate::run::study::{StudyOptions, plan_study};
+use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
+use crate::run::sampling::crude_plan::{self, CrudePlan};
+use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::support::input_file;
 use crate::support::plausibility::Implausible;
@@ -58,10 +56,10 @@ pub(super) struct Lanes {
 pub(super) fn of_run(dir: &Path, asked: &Asked) -> Result<Lanes> {
     match find_run(dir, asked.key)? {
         Run::Study(study) => {
-            let facts = &study.facts;
+            let facts = &study.facts();
             let key = find(study.plan(), asked.key)?;
             let unit = study.plan().blocks[key.block].first_unit + key.unit;
-            let plan = study.study.window(unit..unit + 1)?;
+            let plan = study.cases().window(unit..unit + 1)?;
             let traced =
                 if facts.reference { traced::<f64>(&plan, asked, false)? } else { traced::<f32>(&plan, asked, true)? };
             let arithmetic = if facts.reference { "f64" } else { "f32" };
@@ -102,7 +100,7 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked, implau
 }
 
 pub(super) enum Run {
-    Study(Box<PlannedStudy>),
+    Study(Box<Study>),
     /// With its density.
     Sample(Box<LanePlan>, Box<DensityModel>),
     /// Of distributions of parameters, with what they are of.
@@ -130,17 +128,17 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
         return Err(Error::input(Place::file(dir), "there is no run here", help));
     }
     match kind_of(&plan)?.as_str() {
-        sample_plan::KIND => {
-            let sample = PlannedSample::read(&plan)?.0;
+        crude_plan::KIND => {
+            let sample = CrudePlan::read(&plan)?.0;
             Ok(Run::Sample(Box::new(sample.plan), Box::new(sample.density)))
         }
         // Its reader refuses every other kind.
-        _ => Ok(Run::Study(Box::new(PlannedStudy::read(&plan)?.0))),
+        _ => Ok(Run::Study(Box::new(Study::read(&plan, None)?))),
     }
 }
 
 /// The study whose record this is: the plan beside it that has the record's hash.
-fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
+fn study_of(dir: &Path, run: &Path) -> Result<Study> {
     #[derive(Deserialize)]
     struct Recorded {
         plan_sha256: String,
@@ -162,8 +160,8 @@ fn study_of(dir: &Path, run: &Path) -> Result<PlannedStudy> {
         [RUN_PLAN_FILE, PLAN_FILE].iter().map(|name| dir.join(name)).filter(|path| path.exists()).collect();
     for path in &plans {
         // Another verb's plan may stand in the same folder.
-        if kind_of(path)? == study_plan::KIND {
-            let study = PlannedStudy::read(path)?.0;
+        if kind_of(path)? == Study::KIND {
+            let study = Study::read(path, None)?;
             if study.plan().hash() == recorded.plan_sha256 {
                 return Ok(study);
             }

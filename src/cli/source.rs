@@ -7,8 +7,7 @@ use clap::Args;
 use super::console::{self, Verbosity};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
-use crate::support::readable;
-use crate::traffic::mining::{Collection, MiningOptions, count, mine_folder, mine_generated};
+use crate::traffic::mining::{Collection, MiningOptions, mine_folder, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::traffic::trajectory::highd::{self, made_up};
 use crate::{Error, Place, Result};
@@ -101,15 +100,6 @@ pub fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec<Scenar
     let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
     complain_of(&problems, &notes);
     Ok((scenarios, !problems.is_empty()))
-}
-
-/// Found and kept, per category, in one line.
-pub fn counts(scenarios: &[Scenario]) -> String {
-    let part = |category: Category| {
-        let count = count(scenarios, category);
-        format!("{} {} found, {} kept", category.label(), readable::count(count.found), readable::count(count.kept))
-    };
-    Category::ALL.map(part).join("; ")
 }
 
 /// The categories of a flag, in the order of every table; all where none is given.

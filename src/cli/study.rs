@@ -1,6 +1,5 @@
 //! `lanesweep study`: trajectories in, F1 out.
 
-use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -8,29 +7,27 @@ use clap::Args;
 
 use super::backend_flags::{BackendFlags, Opened};
 use super::configured::Configured;
-use super::console::Verbosity;
+use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
-use super::shard_flags::{Desk, PLAN_FILE, RUN_PLAN_FILE, ShardFlags, leave_plan, units_of};
+use super::shard_flags::ShardFlags;
 use super::source::{self, PlausibilityFlag, Source};
-use super::study_plan::{CategoryFacts, PlannedStudy, StudyFacts};
-use super::study_run::{Host, How, WINDOW, compare_reference, finish_study, lane_format, run_units, write_lanes};
+use super::study_run::{Host, compare_reference, finish_study, lane_format, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Partial, Wanted, forecast};
+use crate::Result;
+use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
-use crate::report::distributions::parameter_histograms;
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
-use crate::run::study::{StudyOptions, StudyOutline, outline_study};
-use crate::scenario::parameterization::{ParameterizationOptions, Reduction};
-use crate::scenario::{Category, Scenario};
+use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
+use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
+use crate::scenario::Category;
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
-use crate::support::run_dir::{Results, STUDY_RECORD};
-use crate::traffic::mining::{Collection, count};
-use crate::{Error, Place, Result};
+use crate::support::run_dir::Results;
+use crate::traffic::mining::counts_text;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -133,29 +130,23 @@ impl Study {
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
             let opened = self.backend.open()?;
-            let shard = self.shards.shard;
-            let (study, run_sha256) = PlannedStudy::read_some(path, |count| units_of(shard, count))?;
-            if study.facts.reference {
+            let study = study::Study::read(path, self.shards.shard)?;
+            if study.facts().reference {
                 self.backend.none_but("--reference")?;
             }
             if self.dry_run {
                 return self.forecast(&study, &opened, None);
             }
-            if self.shards.is_part() {
-                let (mut file, mut line) = (BufReader::new(input_file::open(path)?), Vec::new());
-                file.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
-                leave_plan(&self.out, &line, file)?;
-            }
-            return self.sweep(&study, &opened, run_sha256, configured, Timings::default(), verbosity);
+            return self.sweep(&study, &opened, configured, Timings::default(), verbosity);
         }
         if self.shards.plan_only {
             if self.reference {
                 self.backend.none_but("--reference")?;
             }
             let (study, _) = self.prepare(configured, verbosity)?;
-            leave_plan(&self.out, &study.seal()?.0, study.study.records()?)?;
+            study.write_plan(&self.out)?;
             self.format.print_plan(study.plan().lane_count(), &self.out.join(PLAN_FILE))?;
-            return Ok(if study.facts.incomplete { Exit::Incomplete } else { Exit::Ok });
+            return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
@@ -163,19 +154,11 @@ impl Study {
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
         }
-        if self.shards.is_part() {
-            let (line, run_sha256) = study.seal()?;
-            leave_plan(&self.out, &line, study.study.records()?)?;
-            return self.sweep(&study, &opened, run_sha256, configured, timings, verbosity);
-        }
-        // Nobody else reads this hash: the plan decides the counts, but for the arithmetic.
-        let run_sha256 =
-            crate::support::hex::sha256(&format!("{} reference {}", study.plan().hash(), study.facts.reference));
-        self.sweep(&study, &opened, run_sha256, configured, timings, verbosity)
+        self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
     /// From data to a plan.
-    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(PlannedStudy, Timings)> {
+    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let mut config = configured.settings.clone();
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let profile = self.profile.load()?;
@@ -195,42 +178,28 @@ impl Study {
         let collection =
             timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
         let data = source.describe(collection.synthetic);
-        tracing::info!("{}", source::counts(&collection.scenarios));
-        let planned = timed(&mut timings.plan_s, || outline_study(&collection.scenarios, &profile, &options))?;
-        for left_out in &planned.left_out {
+        tracing::info!("{}", counts_text(&collection.scenarios));
+        let builder = study::Study::builder(&collection, profile)
+            .options(options)
+            .mining(config.mining)
+            .score(config.score)
+            .data(data)
+            .scenario_file_sha256(self.scenarios.as_deref().map(input_file::sha256).transpose()?)
+            .published(self.published)
+            .reference(self.reference);
+        let study = timed(&mut timings.plan_s, || builder.plan())?;
+        for left_out in study.left_out() {
             tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
         }
-        if planned.study.outline().unit_count() == 0 {
-            return Err(Error::input(
-                Place::item(data),
-                format!("no scenario to simulate ({})", source::counts(&collection.scenarios)),
-                "use more recordings, or relax the filters ([mining] in --config)",
-            ));
-        }
-        let facts = StudyFacts {
-            data,
-            synthetic: collection.synthetic,
-            published: self.published,
-            reference: self.reference,
-            incomplete: !collection.problems.is_empty(),
-            scenario_file_sha256: self.scenarios.as_deref().map(input_file::sha256).transpose()?,
-            categories: category_facts(&collection, &planned, &config.parameterization)?,
-            left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
-            notes: collection.notes,
-            recordings: collection.recordings,
-            mining: config.mining,
-            parameterization: config.parameterization,
-            score: config.score,
-        };
-        Ok((PlannedStudy { study: planned.study, facts }, timings))
+        Ok((study, timings))
     }
 
     /// What the run would be.
-    fn forecast(&self, study: &PlannedStudy, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
+    fn forecast(&self, study: &study::Study, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
         let plan = study.plan();
         let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let some = study.study.thinned(WINDOW)?;
+        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
+        let some = study.cases().thinned(WINDOW)?;
         let mut forecast =
             forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
         forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
@@ -239,9 +208,9 @@ impl Study {
         let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
         let (of_unit, of_draw) = (size_of::<Confusion<u32>>() as u64, size_of::<Confusion>() as u64);
         let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
-        let draws = |block: &Block| study.facts.score.bootstrap_draws as u64 * cells_of(block) * of_draw;
+        let draws = |block: &Block| study.facts().score.bootstrap_draws as u64 * cells_of(block) * of_draw;
         DryRun {
-            data: study.facts.data.clone(),
+            data: study.facts().data.clone(),
             parts: dry_run::parts(plan),
             units: "scenarios",
             is_at_most: false,
@@ -259,48 +228,45 @@ impl Study {
     /// From a plan to a report, or to a part of one.
     fn sweep(
         &self,
-        study: &PlannedStudy,
+        study: &study::Study,
         opened: &Opened,
-        run_sha256: String,
         configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Exit> {
         let plan = study.plan();
         let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts.reference { &reference } else { opened.backend() };
-        let how = How { backend, fallback: opened.fallback(), recheck: study.facts.score.seed };
-        let desk = Desk {
-            out: &self.out,
-            record: STUDY_RECORD,
-            run_sha256: &run_sha256,
-            shard: self.shards.shard,
-            unit_count: plan.unit_count(),
-        };
-        if desk.is_done::<Partial>()? {
-            tracing::info!("this part is there already, and whole");
-            return Ok(Exit::Ok);
+        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
+        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(study.facts().score.seed);
+        if self.shards.is_part() {
+            study.write_plan(&self.out)?;
         }
         // Before the work, so that a folder that cannot be written to is known at once.
-        let mut work = desk.begin::<Partial>(&[], true)?;
-        let lanes = plan.first_lane_of(work.units.end) - plan.first_lane_of(work.units.start);
+        let Some(mut run) = study.open(&self.out, self.shards.shard)? else {
+            tracing::info!("this part is there already, and whole");
+            return Ok(Exit::Ok);
+        };
+        let units = run.units();
+        let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
-        let mut swept = timed(&mut timings.sweep_s, || run_units(&study.study, &mut work, &how, verbosity))?;
+        let bar = console::progress(verbosity, run.missing()?, "sweeping");
+        timed(&mut timings.sweep_s, || run.sweep(&executor, |units| bar.inc(units)))?;
+        bar.finish_and_clear();
         if self.shards.is_part() {
-            desk.finish(work, [swept.redone_lanes, swept.rechecked_lanes])?;
+            run.write_part()?;
             return Ok(Exit::Ok);
         }
-        let partial = work.ledger.take()?.unwrap_or_else(|| Partial::empty(plan));
-        let mut results = work.folder.results()?;
+        let StudyResult { counts, summary: mut swept, .. } = run.take_result()?;
+        let mut results = run.results()?;
         if let Some(path) = &self.lanes {
-            let digits = if study.facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-            let (again, table) = write_lanes(path, &study.study, &how, digits, study.facts.synthetic)?;
+            let digits = if study.facts().reference { Digits::Binary64 } else { Digits::Binary32 };
+            let (again, table) = write_lanes(path, study.cases(), &executor, digits, study.facts().synthetic)?;
             swept.add(&again);
             results.join(table);
         }
-        let comparison = self.compare_reference.then(|| compare_reference(&study.study)).transpose()?;
+        let comparison = self.compare_reference.then(|| compare_reference(study.cases())).transpose()?;
         let host = Host {
-            backend: match (how.fallback, swept.redone_lanes) {
+            backend: match (executor.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },
@@ -310,13 +276,13 @@ impl Study {
             settings: configured.record(),
         };
         self.leave_plan(study, &mut results)?;
-        let exit = finish_study(study, &partial, comparison, host, results, self.format)?;
-        work.forget()?;
+        let exit = finish_study(study, &counts, comparison, host, results, self.format)?;
+        run.close()?;
         Ok(exit)
     }
 
     /// For `simulate --from`.
-    fn leave_plan(&self, study: &PlannedStudy, results: &mut Results) -> Result<()> {
+    fn leave_plan(&self, study: &study::Study, results: &mut Results) -> Result<()> {
         let Some(max_bytes) = self.keep_plan.max_bytes() else { return Ok(()) };
         if !study.keep(results, RUN_PLAN_FILE, max_bytes)? {
             tracing::info!(
@@ -352,22 +318,4 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     let result = work();
     *seconds = start.elapsed().as_secs_f64();
     result
-}
-
-fn category_facts(
-    collection: &Collection,
-    planned: &StudyOutline,
-    options: &ParameterizationOptions,
-) -> Result<Vec<CategoryFacts>> {
-    let facts = |block: &crate::engine::Block| {
-        let of = count(&collection.scenarios, block.category);
-        let reduction = planned.reductions.iter().find(|r| r.category == block.category);
-        let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
-        let modes = reduction.map_or(Vec::new(), Reduction::mode_shapes);
-        let kept: Vec<&Scenario> =
-            collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
-        let parameters = parameter_histograms(block.category, &kept, options)?;
-        Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes })
-    };
-    planned.study.outline().blocks.iter().map(facts).collect()
 }

@@ -1,75 +1,29 @@
 //! The lanes of a study: swept, checked, counted; then the report.
 
-use std::ops::Range;
 use std::path::Path;
 
 use super::Exit;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::shard_flags::Work;
-use super::study_plan::PlannedStudy;
 use crate::Result;
-use crate::engine::{
-    Backend, Chunk, CpuBackend, ENGINE_VERSION, LanePlan, ONE_IN, Partial, Recheck, SweepOptions, SweepSummary, Wanted,
-    chunks, sweep,
-};
+use crate::engine::{Backend, CpuBackend, ENGINE_VERSION, Executor, LanePlan, Partial, SweepSummary, Wanted, chunks};
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
-use crate::run::score::{ScoreTable, f1, judge_claims, score};
-use crate::run::study::Study;
+use crate::run::score::{ScoreTable, f1, judge_claims};
+use crate::run::study::{CategoryFacts, Study, StudyCases, WINDOW};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder;
-use crate::support::interrupt;
 use crate::support::run_dir::Results;
 use crate::support::table::{TableFacts, TableFormat, TableWriter};
 
-/// Scenarios whose cases are held at once, with some 25 kB each.
-pub(super) const WINDOW: u64 = 2048;
-/// The same for a device, which wants many lanes at once.
-const DEVICE_WINDOW: u64 = 16_384;
-
-/// Who computes the lanes, who stands in, who checks.
-pub(super) struct How<'a> {
-    pub backend: &'a dyn Backend,
-    pub fallback: Option<&'a dyn Backend>,
-    /// Seed of the lanes that are checked.
-    pub recheck: u64,
-}
-
-impl How<'_> {
-    fn window(&self) -> u64 {
-        if self.fallback.is_some() { DEVICE_WINDOW } else { WINDOW }
-    }
-
-    /// Sweeps an interval, window by window; chunks come with the plan of their window.
-    fn sweep(
-        &self,
-        study: &Study,
-        units: Range<u64>,
-        wanted: Wanted,
-        mut each: impl FnMut(&LanePlan, Chunk) -> Result<()>,
-    ) -> Result<SweepSummary> {
-        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        study.in_windows(units, self.window(), |plan, units| {
-            let recheck = Recheck::new(plan, self.recheck, ONE_IN);
-            let options = SweepOptions { wanted, fallback: self.fallback, recheck: Some(&recheck) };
-            summary.add(&sweep(plan, units, self.backend, &options, |chunk| each(plan, chunk))?);
-            Ok(())
-        })?;
-        Ok(summary)
-    }
-}
-
 /// Every lane of a plan, counted.
-pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
+pub(super) fn run_plan(plan: &LanePlan, executor: &Executor, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
     let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
     let mut parts = Vec::new();
-    let recheck = Recheck::new(plan, how.recheck, ONE_IN);
-    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: Some(&recheck) };
-    let summary = sweep(plan, 0..plan.unit_count(), how.backend, &options, |chunk| {
+    let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         parts.push(Partial::from_chunk(plan, &chunk)?);
         Ok(())
@@ -78,31 +32,8 @@ pub(super) fn run_plan(plan: &LanePlan, how: &How, verbosity: Verbosity) -> Resu
     Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
 }
 
-/// The lanes of an interval of units that are not counted yet.
-pub(super) fn run_units(
-    study: &Study,
-    work: &mut Work<Partial>,
-    how: &How,
-    verbosity: Verbosity,
-) -> Result<SweepSummary> {
-    let _resumable = interrupt::resumable();
-    let missing = work.ledger.missing(work.units.clone())?;
-    let left: u64 = missing.iter().map(|range| range.end - range.start).sum();
-    let bar = console::progress(verbosity, left, "sweeping");
-    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-    for range in missing {
-        let part = how.sweep(study, range, Wanted::Verdicts, |plan, chunk| {
-            bar.inc(chunk.units.end - chunk.units.start);
-            work.ledger.add(Partial::from_chunk(plan, &chunk)?)
-        })?;
-        summary.add(&part);
-    }
-    bar.finish_and_clear();
-    Ok(summary)
-}
-
 /// Every lane in f32 and in f64, chunk by chunk.
-pub(super) fn compare_reference(study: &Study) -> Result<ReferenceComparison> {
+pub(super) fn compare_reference(study: &StudyCases) -> Result<ReferenceComparison> {
     let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
     let mut comparison = ReferenceComparison::default();
     study.in_windows(0..study.outline().unit_count(), WINDOW, |plan, window| {
@@ -120,8 +51,8 @@ pub(super) fn compare_reference(study: &Study) -> Result<ReferenceComparison> {
 /// study's other results.
 pub(super) fn write_lanes(
     path: &Path,
-    study: &Study,
-    how: &How,
+    study: &StudyCases,
+    executor: &Executor,
     digits: Digits,
     synthetic: bool,
 ) -> Result<(SweepSummary, StagedFile)> {
@@ -136,7 +67,7 @@ pub(super) fn write_lanes(
         synthetic,
     };
     let mut table = TableWriter::create(path, lane_format(path)?, lanes::columns(digits), &facts)?;
-    let swept = how.sweep(study, 0..plan.unit_count(), Wanted::Outcomes, |plan, chunk| {
+    let swept = study.sweep(0..plan.unit_count(), Wanted::Outcomes, executor, |plan, chunk| {
         lanes::write_chunk(&mut table, plan, &chunk)
     })?;
     Ok((swept, table.stage()?))
@@ -159,16 +90,16 @@ pub(super) struct Host {
 
 /// Scores, tables, figures and the record, from the counts of all lanes.
 pub(super) fn finish_study(
-    study: &PlannedStudy,
+    study: &Study,
     partial: &Partial,
     comparison: Option<ReferenceComparison>,
     mut host: Host,
     results: Results,
     format: FormatFlag,
 ) -> Result<Exit> {
-    let (plan, facts) = (study.plan(), study.facts.clone());
+    let (plan, facts) = (study.plan(), study.facts().clone());
     let started = std::time::Instant::now();
-    let scores = score(plan, partial, &facts.score)?;
+    let scores = study.score(partial)?;
     host.timings.score_s = started.elapsed().as_secs_f64();
     let run = RunRecord {
         program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
@@ -199,7 +130,7 @@ pub(super) fn finish_study(
         timings: host.timings,
     };
     let claims = judge_claims(&scores);
-    let picture = |(block, of): (usize, &super::study_plan::CategoryFacts)| {
+    let picture = |(block, of): (usize, &CategoryFacts)| {
         Ok(CategoryPictures {
             headways: HeadwayFailures::of(plan, partial, block)?,
             parameters: of.parameters.clone(),
@@ -207,7 +138,7 @@ pub(super) fn finish_study(
             svd_explained: of.svd_explained.clone(),
         })
     };
-    let pictures = study.facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
+    let pictures = study.facts().categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
     let out = results.dir().to_path_buf();
     let mut report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
     report.write(results)?;
@@ -216,9 +147,9 @@ pub(super) fn finish_study(
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
 }
 
-fn category_records(study: &PlannedStudy, scores: &ScoreTable) -> Vec<CategoryRecord> {
+fn category_records(study: &Study, scores: &ScoreTable) -> Vec<CategoryRecord> {
     let plan = study.plan();
-    let record = |(block, of): (&crate::engine::Block, &super::study_plan::CategoryFacts)| {
+    let record = |(block, of): (&crate::engine::Block, &CategoryFacts)| {
         let scored = scores.categories.iter().find(|c| c.category == block.category);
         let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
         CategoryRecord {
@@ -233,5 +164,5 @@ fn category_records(study: &PlannedStudy, scores: &ScoreTable) -> Vec<CategoryRe
             svd_explained: of.svd_explained.clone(),
         }
     };
-    plan.blocks.iter().zip(&study.facts.categories).map(record).collect()
+    plan.blocks.iter().zip(&study.facts().categories).map(record).collect()
 }

@@ -8,7 +8,7 @@ use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::{PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
@@ -18,6 +18,7 @@ use crate::report::{records, verification};
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Category;
 use crate::support::readable::count;
+use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
 /// Check that a device computes every lane as the CPU does
@@ -158,7 +159,7 @@ impl Verify {
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
         if plan.unit_count() == 0 {
-            let problem = format!("no scenario to simulate ({})", source::counts(&collection.scenarios));
+            let problem = format!("no scenario to simulate ({})", counts_text(&collection.scenarios));
             let help = "use more recordings or scenarios that pass the paper's filters";
             return Err(Error::input(Place::item(source.describe(collection.synthetic)), problem, help));
         }

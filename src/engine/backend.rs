@@ -130,7 +130,7 @@ impl Chunk {
     }
 }
 
-/// How one lane in so many of a backend is [computed again](super::Recheck).
+/// How one lane in so many of a backend is [computed again](super::RecheckOptions).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecheckBy {
     /// Not at all: its lanes are single lanes of the CPU or make every step in its batches.
@@ -143,7 +143,7 @@ pub enum RecheckBy {
 
 /// A place where lanes are computed.
 pub trait Backend: Send + Sync {
-    /// How a sample of its lanes is checked where a sweep is given a [`Recheck`](super::Recheck).
+    /// How a sample of its lanes is checked where an [executor](super::Executor) is to check.
     fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
         RecheckBy::Lanes
     }

@@ -24,11 +24,27 @@ const TASK: usize = 1024;
 
 /// A seeded sample of a plan's lanes: one of each `one_in` consecutive ones. Which depends on the seed and the
 /// lane alone, not on chunks.
-pub struct Recheck<'p> {
+pub(super) struct Recheck<'p> {
     plan: &'p LanePlan,
     again: Box<dyn Again + 'p>,
     seed: u64,
     one_in: u64,
+}
+
+/// Which lanes are computed again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecheckOptions {
+    /// Chooses the lanes.
+    pub seed: u64,
+    /// One lane in so many, at least 1.
+    pub one_in: u64,
+}
+
+impl RecheckOptions {
+    /// One lane in [`ONE_IN`].
+    pub fn of_seed(seed: u64) -> Self {
+        RecheckOptions { seed, one_in: ONE_IN }
+    }
 }
 
 /// Makes every step of a lane again.
@@ -50,8 +66,7 @@ impl Again for LaneRunner<'_, f32> {
 }
 
 impl<'p> Recheck<'p> {
-    /// Checks one lane in `one_in` (at least 1).
-    pub fn new(plan: &'p LanePlan, seed: u64, one_in: u64) -> Self {
+    pub fn new(plan: &'p LanePlan, RecheckOptions { seed, one_in }: RecheckOptions) -> Self {
         Recheck { plan, again: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
     }
 
@@ -199,7 +214,7 @@ mod tests {
     use crate::engine::lane::{Silent, run_lane};
     use crate::engine::scene::{Scene, may_cross};
     use crate::engine::verify::{RandomOptions, random_plan};
-    use crate::engine::{Backend, CpuBackend, LaneCase, Session, SweepOptions, SweepSummary, Wanted, sweep};
+    use crate::engine::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
     use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
     use crate::model::flag::Flag;
     use crate::model::profile::Profile;
@@ -361,8 +376,9 @@ mod tests {
         let left_out = Instead { plan: &plan, id, model, every_step: false };
         let recheck = Recheck { plan: &plan, again: Box::new(left_out), seed: 157, one_in: 20 };
         let run = |every_step| {
-            let how = SweepOptions { wanted: Wanted::Verdicts, fallback: None, recheck: Some(&recheck) };
-            sweep(&plan, 0..plan.unit_count(), &Instead { every_step, ..left_out }, &how, |_| Ok(()))
+            let backend = Instead { every_step, ..left_out };
+            let (executor, units) = (Executor::new(&backend), 0..plan.unit_count());
+            executor.sweep_checked(&plan, units, Wanted::Verdicts, Some(&recheck), |_| Ok(()))
         };
         (run(false).expect_err(&format!("{category:?} {}", id.name())), run(true).unwrap())
     }
@@ -394,7 +410,8 @@ mod tests {
     fn seed_and_lane_alone_choose_what_is_checked() {
         let options = RandomOptions { lanes_per_model_and_category: 3000, ..Default::default() };
         let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
-        let recheck = Recheck::new(&plan, 7, 100);
+        let options = RecheckOptions { seed: 7, one_in: 100 };
+        let recheck = Recheck::new(&plan, options);
         let all: Vec<u64> = recheck.chosen(0..plan.lane_count(), 100).collect();
         for cut in [1, 99, 100, 12_345] {
             let ends = (0..).map(|k| k * cut).take_while(|from| *from < plan.lane_count());
@@ -404,8 +421,8 @@ mod tests {
         assert_eq!(all.len() as u64, plan.lane_count().div_ceil(100));
         let cpu = CpuBackend::lane_arithmetic();
         for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
-            let how = SweepOptions { wanted, fallback: None, recheck: Some(&recheck) };
-            let summary = sweep(&plan, 0..plan.unit_count(), &cpu, &how, |_| Ok(())).unwrap();
+            let executor = Executor { recheck: Some(options), ..Executor::new(&cpu) };
+            let summary = executor.sweep(&plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap();
             let is_checked = cpu.rechecked_by(wanted) != RecheckBy::Nothing;
             assert_eq!(summary.rechecked_lanes, if is_checked { all.len() as u64 } else { 0 }, "{wanted:?}");
         }

@@ -194,7 +194,7 @@ mod tests {
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
     use crate::run::sampling::{SampleSource, generator_of};
-    use crate::run::study::plan::Records;
+    use crate::run::study::Records;
     use crate::run::study::plan_file::{BlockHead, StudyHead};
     use crate::run::study::unit_record;
     use crate::scenario::parameterization::{

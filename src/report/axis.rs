@@ -2,6 +2,7 @@
 
 use super::drawing::{GREY, GRID, TICK, line, text};
 use super::svg::{Canvas, TextAnchor};
+use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -221,37 +222,6 @@ fn power_text(mantissa: f64, exponent: i32, decimals: i32) -> String {
     trimmed(format!("{value:.*}", (decimals - exponent).max(0) as usize))
 }
 
-/// 1, 2 or 5 times a power of ten, as digit and exponent.
-type OneTwoFive = (u8, i32);
-
-/// The largest 1, 2 or 5 times a power of ten that is not above `value` (positive, finite).
-fn one_two_five(value: f64) -> OneTwoFive {
-    // The shortest decimal text splits a float without rounding.
-    let written = format!("{value:e}");
-    let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
-    let mantissa: f64 = mantissa.parse().unwrap_or(1.0);
-    let digit = if mantissa >= 5.0 {
-        5
-    } else if mantissa >= 2.0 {
-        2
-    } else {
-        1
-    };
-    (digit, exponent.parse().unwrap_or(0))
-}
-
-/// The neighbour above (`way` = 1) or below (-1).
-fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
-    match (digit, way > 0) {
-        (1, true) => (2, exponent),
-        (2, true) => (5, exponent),
-        (_, true) => (1, exponent + 1),
-        (1, false) => (5, exponent - 1),
-        (2, false) => (1, exponent),
-        (_, false) => (2, exponent),
-    }
-}
-
 /// The common logarithm of digit · 10^exponent.
 fn place((digit, exponent): OneTwoFive) -> f64 {
     f64::from(exponent) + libm::log10(f64::from(digit))
@@ -261,15 +231,6 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
 pub(super) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
-}
-
-/// The smallest 1, 2 or 5 times a power of ten that is not below `step` (positive).
-pub(super) fn plain_step(step: f64) -> f64 {
-    let step = step.max(f64::MIN_POSITIVE);
-    let (digit, exponent) = one_two_five(step);
-    let value = |(digit, exponent): OneTwoFive| format!("{digit}e{exponent}").parse().unwrap_or(step);
-    let below: f64 = value((digit, exponent));
-    if below >= step { below } else { value(next((digit, exponent), 1)) }
 }
 
 #[cfg(test)]

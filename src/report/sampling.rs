@@ -10,10 +10,10 @@ use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::sampling::{BootstrapRecord, EstimateRow, RiskRate, SampleTally};
+use crate::run::sampling::{BootstrapRecord, EstimateRow, Kind, Levels, RiskRate, Sample, SampleHeadways, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
-use crate::stats::estimate::{CrossEntropyStep, IntervalKind, StopReason, SubsetLevel};
+use crate::stats::estimate::{IntervalKind, StopReason};
 use crate::support::readable::{count, count_of, significant, value};
 use crate::{Error, Result};
 
@@ -86,16 +86,6 @@ impl DrawRecord {
     }
 }
 
-/// How an adaptive estimator went.
-#[derive(Debug, Clone, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Levels {
-    /// Cross-entropy.
-    CrossEntropy(Vec<CrossEntropyStep>),
-    /// Subset simulation.
-    Subset(Vec<SubsetLevel>),
-}
-
 /// What belongs to the machine and not to the result.
 #[derive(Debug, Clone, Serialize)]
 pub struct HostRecord {
@@ -138,6 +128,44 @@ pub struct RunFacts {
     pub seed: u64,
     /// Parameters that were given, with their values.
     pub given: Vec<(String, f64)>,
+}
+
+impl RunFacts {
+    /// Of a run.
+    pub fn of(sample: &Sample) -> RunFacts {
+        let random = |estimator, profile: &Profile, models: &[ModelId], headways| RunFacts {
+            estimator,
+            profile: profile.clone(),
+            models: models.to_vec(),
+            headways,
+            points: "random",
+            samples: sample.samples(),
+            seed: sample.seed(),
+            given: Vec::new(),
+        };
+        match &sample.0 {
+            Kind::Crude(plan, _) => {
+                let facts = &plan.facts;
+                let headways = facts.headways.clone().unwrap_or_default();
+                RunFacts {
+                    points: if facts.sobol { "sobol" } else { "random" },
+                    given: facts.given.clone(),
+                    ..random("mc", &facts.profile, &facts.models, headways)
+                }
+            }
+            Kind::Weighted(plan) | Kind::Pilot(plan, _) => {
+                let facts = &plan.facts;
+                random("is", &facts.profile, &facts.models, facts.headway.into_iter().collect())
+            }
+            Kind::Sequential(run) => {
+                let headways = match &run.options.headways {
+                    SampleHeadways::Each(list) => list.clone(),
+                    SampleHeadways::Sampled => Vec::new(),
+                };
+                random(run.options.estimator.key(), &run.profile, &run.options.models, headways)
+            }
+        }
+    }
 }
 
 /// `estimate.json`.

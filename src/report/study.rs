@@ -1,6 +1,6 @@
 //! A study as text for the terminal and as files in the output folder.
 
-use super::distributions::{ParameterHistogram, distributions};
+use super::distributions::distributions;
 use super::panels::PanelFigure;
 use super::radar::{RadarChart, RadarSeries, radar_svg};
 use super::reference::ReferenceComparison;
@@ -10,6 +10,7 @@ use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1};
+use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::ModeShape;
 use crate::support::run_dir::Results;

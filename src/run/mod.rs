@@ -5,6 +5,8 @@
 
 pub mod grid;
 pub mod parts;
+#[cfg(test)]
+mod plan_mutations;
 pub mod sampling;
 pub mod score;
 pub mod study;

@@ -14,6 +14,7 @@ pub(crate) mod near_name;
 pub(crate) mod plain_text;
 pub mod plausibility;
 pub(crate) mod readable;
+pub(crate) mod round_step;
 pub mod run_dir;
 pub mod table;
 pub(crate) mod toml_file;

@@ -5,8 +5,7 @@ use crate::common::device::software_device;
 use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{
-    Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Recheck, SweepOptions, Wanted, same_words,
-    sweep,
+    Backend, Block, CaseSource, CpuBackend, Executor, Headway, LaneCase, LanePlan, RecheckOptions, Wanted, same_words,
 };
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -181,10 +180,10 @@ fn a_device_that_fails_while_counts_are_checked_leaves_complete_counts() {
     for at_job in [2, 3, 10] {
         let fault = Some(Fault { at_job, kind: FaultKind::Lost });
         let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
-        let recheck = Recheck::new(&plan, 1, 1);
-        let options = SweepOptions { wanted: Wanted::Counts, fallback: Some(&cpu), recheck: Some(&recheck) };
+        let recheck = Some(RecheckOptions { seed: 1, one_in: 1 });
+        let executor = Executor { recheck, ..Executor::new(&gpu).with_fallback(Some(&cpu)) };
         let mut chunks = Vec::new();
-        let summary = sweep(&plan, 0..plan.unit_count(), &gpu, &options, |chunk| {
+        let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Counts, |chunk| {
             chunks.push(chunk);
             Ok(())
         });

@@ -8,7 +8,7 @@ use lanesweep::Error;
 use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{
-    Backend, CpuBackend, LanePlan, Partial, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
+    Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted,
 };
 use lanesweep::model::profile::Profile;
 
@@ -25,10 +25,10 @@ fn plan() -> LanePlan {
 /// All verdicts and how the sweep went, with the CPU standing in.
 fn swept(plan: &LanePlan, gpu: &GpuBackend) -> (Vec<Verdicts>, SweepSummary) {
     let cpu = CpuBackend::lane_arithmetic();
-    let recheck = Recheck::new(plan, 157, 100);
-    let options = SweepOptions { wanted: Wanted::Verdicts, fallback: Some(&cpu), recheck: Some(&recheck) };
+    let recheck = Some(RecheckOptions { seed: 157, one_in: 100 });
+    let executor = Executor { recheck, ..Executor::new(gpu).with_fallback(Some(&cpu)) };
     let mut verdicts = Vec::new();
-    let summary = sweep(plan, 0..plan.unit_count(), gpu, &options, |chunk| {
+    let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
         Partial::from_chunk(plan, &chunk)?;
         verdicts.extend(chunk.verdicts);
         Ok(())
@@ -118,8 +118,7 @@ fn without_a_stand_in_the_failure_is_the_users_to_know() {
     let plan = plan();
     let fault = Some(Fault { at_job: 0, kind: FaultKind::Lost });
     let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
-    let error =
-        sweep(&plan, 0..plan.unit_count(), &gpu, &SweepOptions::plain(Wanted::Verdicts), |_| Ok(())).unwrap_err();
+    let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
     assert!(matches!(&error, Error::Device { .. }), "{error}");
     assert!(error.help().unwrap().contains("--backend cpu"));
 }
@@ -132,10 +131,9 @@ fn a_wrong_lane_stops_the_run_and_is_named() {
         Some(("select(0u, 2u, record.ttc.failed)".to_owned(), "select(2u, 0u, record.ttc.failed)".to_owned()));
     let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     let cpu = CpuBackend::lane_arithmetic();
-    let recheck = Recheck::new(&plan, 1, 1000);
+    let executor = Executor::new(&gpu).with_fallback(Some(&cpu)).with_recheck(1);
     for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
-        let options = SweepOptions { wanted, fallback: Some(&cpu), recheck: Some(&recheck) };
-        let error = sweep(&plan, 0..plan.unit_count(), &gpu, &options, |_| Ok(())).unwrap_err();
+        let error = executor.sweep(&plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap_err();
         assert!(matches!(&error, Error::Verification(_)), "{error}");
         assert!(error.to_string().contains("lane random-"), "{error}");
     }

@@ -3,7 +3,7 @@
 
 use crate::common::device::software_device;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
-use lanesweep::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::engine::{Block, CaseSource, Executor, Headway, LaneCase, LanePlan, Verdicts, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -73,9 +73,8 @@ fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
     let gpu = GpuBackend::open(&adapters, index, GpuOptions { first_lanes, ..Default::default() }).unwrap();
     let mut lane = 0;
     let mut collisions = 0;
-    let options = SweepOptions::plain(Wanted::Verdicts);
     let all = 0..plan.unit_count();
-    let summary = sweep(plan, all.clone(), &gpu, &options, |chunk| {
+    let summary = Executor::new(&gpu).sweep(plan, all.clone(), Wanted::Verdicts, |chunk| {
         assert_eq!(chunk.first_lane, lane);
         for verdicts in chunk.verdicts {
             assert_eq!(verdicts, expected(plan, lane), "lane {lane}");
@@ -86,12 +85,13 @@ fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
     });
     assert_eq!((lane, summary.unwrap().lanes), (plan.lane_count(), plan.lane_count()));
     let (mut lanes, mut counted) = (0, 0);
-    sweep(plan, all, &gpu, &SweepOptions::plain(Wanted::Counts), |chunk| {
-        lanes += chunk.counts.iter().map(|c| c.lanes).sum::<u64>();
-        counted += chunk.counts.iter().map(|c| c.failed[Criterion::Collision.index()]).sum::<u64>();
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(&gpu)
+        .sweep(plan, all, Wanted::Counts, |chunk| {
+            lanes += chunk.counts.iter().map(|c| c.lanes).sum::<u64>();
+            counted += chunk.counts.iter().map(|c| c.failed[Criterion::Collision.index()]).sum::<u64>();
+            Ok(())
+        })
+        .unwrap();
     assert_eq!((lanes, counted), (plan.lane_count(), collisions));
 }
 

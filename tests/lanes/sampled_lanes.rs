@@ -6,8 +6,7 @@ use std::sync::OnceLock;
 
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::{
-    Backend, CpuBackend, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, SweepOptions, Wanted, sweep,
-    words,
+    Backend, CpuBackend, Executor, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, Wanted, words,
 };
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
@@ -248,11 +247,12 @@ fn verdicts_of_samples_come_without_their_values_too() {
         plan_samples(&density, &density.mixture().unwrap(), &profile, &options(2000, SampleSource::Random)).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let mut verdicts = Vec::new();
-    sweep(&plan, 0..2000, &cpu, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        verdicts.extend(chunk.verdicts);
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(&cpu)
+        .sweep(&plan, 0..2000, Wanted::Verdicts, |chunk| {
+            verdicts.extend(chunk.verdicts);
+            Ok(())
+        })
+        .unwrap();
     let mut session: Box<dyn Session> = cpu.prepare(&plan).unwrap();
     let valued: Vec<Outcome<f64>> = session.run(0..2000, Wanted::Outcomes).unwrap().outcomes;
     assert!(verdicts.iter().zip(&valued).all(|(v, o)| *v == o.verdicts));

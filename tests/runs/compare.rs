@@ -5,13 +5,13 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
-use lanesweep::engine::{CpuBackend, Headway, LanePlan, Partial, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{CpuBackend, Executor, Headway, LanePlan, Partial, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    Lanes, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts, kernel_scenarios, plan_points,
-    plan_samples, sample_by_scenario,
+    SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts, kernel_scenarios, plan_points, plan_samples,
+    sample_by_scenario,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
@@ -130,17 +130,18 @@ fn failures(plan: &LanePlan) -> Vec<Vec<u64>> {
     let (models, per_unit) = (plan.models.len(), plan.headways.len() * plan.models.len());
     let mut counted = vec![Vec::new(); models * Criterion::ALL.len()];
     let cpu = CpuBackend::lane_arithmetic();
-    sweep(plan, 0..plan.unit_count(), &cpu, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        for lanes in chunk.verdicts.chunks_exact(per_unit) {
-            for (cell, list) in counted.iter_mut().enumerate() {
-                let (model, criterion) = (cell / Criterion::ALL.len(), Criterion::ALL[cell % Criterion::ALL.len()]);
-                let failed = |at: &usize| at % models == model && lanes[*at].failed(criterion);
-                list.push((0..per_unit).filter(failed).count() as u64);
+    Executor::new(&cpu)
+        .sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+            for lanes in chunk.verdicts.chunks_exact(per_unit) {
+                for (cell, list) in counted.iter_mut().enumerate() {
+                    let (model, criterion) = (cell / Criterion::ALL.len(), Criterion::ALL[cell % Criterion::ALL.len()]);
+                    let failed = |at: &usize| at % models == model && lanes[*at].failed(criterion);
+                    list.push((0..per_unit).filter(failed).count() as u64);
+                }
             }
-        }
-        Ok(())
-    })
-    .unwrap();
+            Ok(())
+        })
+        .unwrap();
     counted
 }
 
@@ -154,12 +155,13 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
     let study = plan_study(&scenarios, &profile, &options).unwrap().plan;
     let cpu = CpuBackend::lane_arithmetic();
     let mut partial = Partial::empty(&study);
-    sweep(&study, 0..study.unit_count(), &cpu, &SweepOptions::plain(Wanted::Verdicts), |chunk| {
-        let before = std::mem::replace(&mut partial, Partial::empty(&study));
-        partial = before.merge(Partial::from_chunk(&study, &chunk)?)?;
-        Ok(())
-    })
-    .unwrap();
+    Executor::new(&cpu)
+        .sweep(&study, 0..study.unit_count(), Wanted::Verdicts, |chunk| {
+            let before = std::mem::replace(&mut partial, Partial::empty(&study));
+            partial = before.merge(Partial::from_chunk(&study, &chunk)?)?;
+            Ok(())
+        })
+        .unwrap();
     for (category, key) in [(Category::CutIn, "2"), (Category::CutIn, "6"), (Category::Lvd, "i")] {
         let id = ParameterizationId::find(category, key).unwrap();
         let facts =
@@ -199,9 +201,9 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
                 headways: each.clone(),
             };
             let plan = plan_samples(&narrow, &narrow.mixture().unwrap(), &profile, &options).unwrap();
-            let lanes = Lanes { backend: &cpu, fallback: None, recheck: None };
+            let executor = Executor::new(&cpu);
             let units = replayed.lanes.len();
-            let sampled = sample_by_scenario(&plan, &kernels, units, &lanes, None, 0.95, |_| ()).unwrap();
+            let sampled = sample_by_scenario(&plan, &kernels, units, &executor, None, 0.95, |_| ()).unwrap();
             // Samples by scenario add up to the estimate.
             for (cell, row) in sampled.rows.iter().enumerate() {
                 assert_eq!(sampled.counts.cell(cell).rate(), row.estimate.probability);

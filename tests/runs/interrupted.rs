@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lanesweep::engine::verify::{RandomOptions, random_plan};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Session, SweepOptions, Verdicts, Wanted, sweep};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Session, Verdicts, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::interrupt;
 
@@ -237,8 +237,8 @@ fn the_work_between_two_looks_is_bounded_whatever_the_time_step() {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let mut units = 0;
                 let run = || {
-                    let how = SweepOptions::plain(Wanted::Verdicts);
-                    sweep(&plan, 0..plan.unit_count(), &Asked(backend()), &how, |chunk| {
+                    let backend = Asked(backend());
+                    Executor::new(&backend).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
                         let work = chunk.lanes() * steps;
                         let in_chunk = chunk.units.end - chunk.units.start;
                         assert!(work <= bound * threads as u64 || in_chunk == 1, "{dt_s} s: {work} lane-steps");

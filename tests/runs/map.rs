@@ -6,14 +6,13 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
-use lanesweep::engine::{Constants, CpuBackend, Headway, LaneCase, Silent, Start, Verdicts};
+use lanesweep::engine::{Constants, CpuBackend, Executor, Headway, LaneCase, Silent, Start, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::presets;
 use lanesweep::run::grid::{
-    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapBackend, Parameter, Quantity, boundary,
-    count,
+    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, Parameter, Quantity, boundary, count,
 };
 use lanesweep::scenario::{Category, Tables};
 use proptest::prelude::*;
@@ -47,7 +46,7 @@ fn profile(name: &str) -> Profile {
 
 fn swept(plan: &GridPlan) -> GridMap {
     let backend = CpuBackend::lane_arithmetic();
-    GridMap::sweep(plan, MapBackend { backend: &backend, fallback: None, recheck_seed: None }).unwrap().0
+    GridMap::sweep(plan, &Executor::new(&backend)).unwrap().0
 }
 
 fn percent(map: &GridMap, model: usize) -> f64 {
@@ -271,8 +270,8 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
         let moved: Vec<GridMap> = if preset.grid.has_native_gap() {
             // A distance that depends on the speed is no axis: another arithmetic decides ties in another way.
             let backend = CpuBackend::reference();
-            let how = MapBackend { backend: &backend, fallback: None, recheck_seed: None };
-            vec![GridMap::sweep(&plan(preset.grid.clone()), how).unwrap().0]
+            let executor = Executor::new(&backend);
+            vec![GridMap::sweep(&plan(preset.grid.clone()), &executor).unwrap().0]
         } else {
             moves.iter().map(|&(gap, lateral)| map(moved(&preset.grid, gap, lateral))).collect()
         };
@@ -338,7 +337,7 @@ fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check
     let sweep = |grid: Grid, profile: &Profile| {
         let plan = GridPlan::new(grid, profile, &[ModelId::Fsm]).unwrap();
         let backend = CpuBackend::lane_arithmetic();
-        GridMap::sweep(&plan, MapBackend { backend: &backend, fallback: None, recheck_seed: None })
+        GridMap::sweep(&plan, &Executor::new(&backend))
     };
     let error = sweep(beside(), &profile("jrc-2021")).unwrap_err();
     let says = format!("{error} {}", error.help().unwrap());

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, Wanted};
 use lanesweep::interop::openscenario::{
     DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations,
 };
@@ -68,12 +68,12 @@ fn a_sample_is_a_function_of_seed_and_index_and_parts_count_what_the_whole_count
     let counting = TallyOptions { worst: 5, criterion: Criterion::Collision, map: None };
     let tally = |units: std::ops::Range<u64>, backend: &dyn Backend| {
         let mut tally = SampleTally::empty(&plan, &counting);
-        let options = SweepOptions { wanted: Wanted::Outcomes, fallback: None, recheck: None };
-        sweep(&plan, units, backend, &options, |chunk| {
-            tally = tally.clone().merge(SampleTally::of_chunk(&plan, &chunk, &counting)?)?;
-            Ok(())
-        })
-        .unwrap();
+        Executor::new(backend)
+            .sweep(&plan, units, Wanted::Outcomes, |chunk| {
+                tally = tally.clone().merge(SampleTally::of_chunk(&plan, &chunk, &counting)?)?;
+                Ok(())
+            })
+            .unwrap();
         tally
     };
     let (batches, scalar) = (CpuBackend::lane_arithmetic(), CpuBackend::scalar());

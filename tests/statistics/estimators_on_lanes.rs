@@ -7,12 +7,12 @@ use crate::common;
 
 use std::path::PathBuf;
 
-use lanesweep::engine::{CpuBackend, Headway};
+use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, LaneLimitState, Lanes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
+    CrudeOptions, LaneLimitState, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
     sample_crude, truncated,
 };
 use lanesweep::scenario::parameterization::ParameterizationId;
@@ -44,7 +44,7 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
     };
     let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
-    let lanes = Lanes { backend: &backend, fallback: None, recheck: None };
+    let executor = Executor::new(&backend);
     let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
     let crude = CrudeOptions {
         stop: StopRule::samples(samples),
@@ -53,7 +53,7 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
         exposure: None,
         is_sampled_headway: false,
     };
-    let run = sample_crude(&plan, 0..samples, &lanes, &counting, &crude, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(())).unwrap();
     run.rows.into_iter().find(|r| r.criterion == Criterion::Collision).unwrap().estimate
 }
 
@@ -66,8 +66,7 @@ fn estimates(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f
         model,
         criterion: Criterion::Collision,
         headway: SampleHeadways::Each(vec![Headway::ThwS(thw_s)]),
-        backend: &backend,
-        fallback: None,
+        executor: Executor::new(&backend),
     };
     let nominal = truncated(density).unwrap();
     let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();

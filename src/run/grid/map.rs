@@ -1,25 +1,12 @@
 //! A swept grid: the verdicts of every cell and model, shares, and the difference of two maps.
 
-use crate::engine::{
-    Backend, LanePlan, LaneRunner, ONE_IN, Recheck, SweepOptions, SweepSummary, Verdicts, Wanted, sweep,
-};
+use crate::engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::{Error, Place, Result};
 
 use super::grid::Grid;
 use super::plan::GridPlan;
-
-/// What computes the lanes of a map, and who stands in and checks.
-#[derive(Clone, Copy)]
-pub struct MapBackend<'a> {
-    /// The backend.
-    pub backend: &'a dyn Backend,
-    /// Computes what the backend cannot.
-    pub fallback: Option<&'a dyn Backend>,
-    /// Seed of the choice of lanes that the CPU computes again; `None` checks none.
-    pub recheck_seed: Option<u64>,
-}
 
 /// The verdicts of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,19 +62,17 @@ impl GridMap {
     /// # Errors
     /// Of the backend; [`Error::Verification`] where a checked lane differs; [`Error::Usage`] where every lane ends at
     /// the time cap, so that the map says nothing.
-    pub fn sweep(plan: &GridPlan, how: MapBackend) -> Result<(GridMap, SweepSummary)> {
+    pub fn sweep(plan: &GridPlan, executor: &Executor) -> Result<(GridMap, SweepSummary)> {
         let cells = plan.grid.cell_count();
         let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         for part in &plan.parts {
             let lanes = &part.plan;
-            let recheck = how.recheck_seed.map(|seed| Recheck::new(lanes, seed, ONE_IN));
-            let options = SweepOptions { wanted: Wanted::Verdicts, fallback: how.fallback, recheck: recheck.as_ref() };
             // Where the part's models stand among all.
             let of_part: Vec<Option<usize>> =
                 lanes.models.iter().map(|model| plan.models.iter().position(|m| m == model)).collect();
             let per_unit = lanes.headways.len() * lanes.models.len();
-            let swept = sweep(lanes, 0..lanes.unit_count(), how.backend, &options, |chunk| {
+            let swept = executor.sweep(lanes, 0..lanes.unit_count(), Wanted::Verdicts, |chunk| {
                 for (units, of_unit) in (chunk.units.start..).zip(chunk.verdicts.chunks(per_unit.max(1))) {
                     for (at, verdict) in of_unit.iter().enumerate() {
                         let cell = part.cell(&plan.grid, units, at / lanes.models.len());

@@ -16,7 +16,7 @@ pub mod presets;
 pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
 pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
-pub use map::{Agreement, GridMap, MapBackend, boundary, count, runs};
+pub use map::{Agreement, GridMap, boundary, count, runs};
 pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
 pub use plan::{GridPart, GridPlan};
 

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::ledger::Countable;
+use super::part::{Part, read_part};
 use super::shard::Shard;
 use crate::{Error, Place, Result};
 
@@ -48,6 +50,37 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
     parts.sort_by_key(|(shard, _)| (shard.units(units).start, shard.units(units).end, shard.of));
     check_cover(dir, units, &parts, again)?;
     Ok(Found { parts })
+}
+
+/// All parts of a folder, checked: of this run, whole, together everything exactly once.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged, and with `again` how it is made.
+pub fn read_parts<T: Countable>(
+    dir: &Path,
+    run_sha256: &str,
+    units: u64,
+    again: &dyn Fn(Shard) -> String,
+) -> Result<Vec<Part<T>>> {
+    let found = collect(dir, units, again)?;
+    let read = |(shard, path): &(Shard, PathBuf)| {
+        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &again(*shard))?;
+        let wrong = |problem: &str| {
+            let help = format!("delete it and make it again: {}", again(*shard));
+            Error::input(Place::file(path), problem, help)
+        };
+        let mut covered: Vec<_> = part.segments.iter().flat_map(Countable::covered).collect();
+        covered.sort_by_key(|range| range.start);
+        let mut at = part.units.start;
+        for range in covered {
+            if range.start != at {
+                return Err(wrong("it does not hold each of its units exactly once"));
+            }
+            at = range.end;
+        }
+        if at == part.units.end { Ok(part) } else { Err(wrong("it does not hold all of its units")) }
+    };
+    found.parts.iter().map(read).collect()
 }
 
 fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl Fn(Shard) -> String) -> Result<()> {

@@ -6,11 +6,11 @@
 
 use serde::Serialize;
 
-use super::crude::{CrudeOptions, Lanes, sample_crude};
+use super::crude::{CrudeOptions, sample_crude};
 use super::generator::SampleSource;
 use super::plan::{SamplePlanOptions, plan_samples};
 use super::tally::TallyOptions;
-use crate::engine::{ONE_IN, Recheck};
+use crate::engine::{Executor, RecheckOptions};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -58,7 +58,7 @@ pub fn bootstrap(
     density: &DensityModel,
     profile: &Profile,
     options: &SamplePlanOptions,
-    lanes: &Lanes,
+    executor: &Executor,
     replicates: u32,
     samples: u64,
     mut progress: impl FnMut(),
@@ -80,9 +80,8 @@ pub fn bootstrap(
         let seed = options.seed.wrapping_add(1 + u64::from(replicate));
         let options = SamplePlanOptions { samples, seed, source: SampleSource::Random, ..options.clone() };
         let plan = plan_samples(&resampled, &resampled.mixture()?, profile, &options)?;
-        let recheck = Recheck::new(&plan, seed, ONE_IN);
-        let lanes = Lanes { recheck: lanes.recheck.map(|_| &recheck), ..*lanes };
-        let run = sample_crude(&plan, 0..samples, &lanes, &counting, &crude, |_| Ok(()))?;
+        let executor = Executor { recheck: executor.recheck.map(|of| RecheckOptions { seed, ..of }), ..*executor };
+        let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(()))?;
         let overall = run.convergence.last().map(|c| c.rows.clone()).unwrap_or_default();
         if overall.len() != cells {
             return Err(Error::Internal("a replicate has other rows than the run".to_owned()));

@@ -11,11 +11,11 @@
 
 use serde::Serialize;
 
-use super::crude::{CrudeOptions, Lanes, sample_crude};
+use super::crude::{CrudeOptions, sample_crude};
 use super::risk::Risk;
 use super::rows::EstimateRow;
 use super::tally::{SampleTally, TallyOptions};
-use crate::engine::{Chunk, Confusion, LanePlan, Partial, SweepSummary};
+use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::{Category, Scenario};
@@ -145,7 +145,7 @@ pub fn sample_by_scenario(
     plan: &LanePlan,
     kernels: &[usize],
     scenarios: usize,
-    lanes: &Lanes,
+    executor: &Executor,
     exposure: Option<&Exposure>,
     level: f64,
     mut progress: impl FnMut(u64),
@@ -159,7 +159,7 @@ pub fn sample_by_scenario(
         is_sampled_headway: false,
     };
     let mut counts = ScenarioCounts::empty(scenarios, plan.models.len() * Criterion::ALL.len());
-    let run = sample_crude(plan, 0..plan.unit_count(), lanes, &counting, &options, |chunk| {
+    let run = sample_crude(plan, 0..plan.unit_count(), executor, &counting, &options, |chunk| {
         progress(chunk.units.end - chunk.units.start);
         counts.add(plan, chunk, kernels)
     })?;

@@ -7,24 +7,13 @@ use serde::Serialize;
 
 use super::rows::{EstimateRow, crude_rows};
 use super::tally::{SampleTally, TallyOptions};
-use crate::engine::{Backend, Chunk, LanePlan, Recheck, SweepOptions, SweepSummary, Wanted, sweep};
+use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
 use crate::stats::density::Exposure;
 use crate::stats::estimate::{BinomialInterval, Checkpoints, StopReason, StopRule};
 use crate::{Error, Place, Result};
-
-/// How sampled lanes are computed.
-#[derive(Clone, Copy)]
-pub struct Lanes<'a> {
-    /// What computes.
-    pub backend: &'a dyn Backend,
-    /// What stands in for a device that fails.
-    pub fallback: Option<&'a dyn Backend>,
-    /// Checks a sample of a device's lanes.
-    pub recheck: Option<&'a Recheck<'a>>,
-}
 
 /// How estimates are made of counts.
 #[derive(Debug, Clone, Copy)]
@@ -87,13 +76,13 @@ pub struct CrudeRun {
 pub fn sample_crude(
     plan: &LanePlan,
     range: Range<u64>,
-    lanes: &Lanes,
+    executor: &Executor,
     counting: &TallyOptions,
     options: &CrudeOptions,
     each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
     let mut ledger = Ledger::new(range, &checkpoints(plan.unit_count()));
-    sample_into(plan, &mut ledger, lanes, counting, options, each)
+    sample_into(plan, &mut ledger, executor, counting, options, each)
 }
 
 /// The sample sizes at which a run of so many samples is looked at.
@@ -109,7 +98,7 @@ pub fn checkpoints(samples: u64) -> Vec<u64> {
 pub fn sample_into(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
-    lanes: &Lanes,
+    executor: &Executor,
     counting: &TallyOptions,
     options: &CrudeOptions,
     mut each: impl FnMut(&Chunk) -> Result<()>,
@@ -130,7 +119,6 @@ pub fn sample_into(
         return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
     }
     let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
-    let how = SweepOptions { wanted, fallback: lanes.fallback, recheck: lanes.recheck };
     let mut tally = SampleTally::empty(plan, counting);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let mut convergence = Vec::new();
@@ -140,7 +128,7 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
-            let part = sweep(plan, missing, lanes.backend, &how, |chunk| {
+            let part = executor.sweep(plan, missing, wanted, |chunk| {
                 each(&chunk)?;
                 ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
             })?;

@@ -2,7 +2,7 @@
 
 use super::limit_state::limit_state;
 use super::plan::{SampleHeadways, plan_points};
-use crate::engine::{Backend, SweepOptions, Wanted, sweep};
+use crate::engine::{Executor, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -22,10 +22,8 @@ pub struct LaneLimitState<'a> {
     pub criterion: Criterion,
     /// A single headway, or the density's own.
     pub headway: SampleHeadways,
-    /// What computes.
-    pub backend: &'a dyn Backend,
-    /// What stands in for a device that fails.
-    pub fallback: Option<&'a dyn Backend>,
+    /// What computes; no lane is computed again.
+    pub executor: Executor<'a>,
 }
 
 impl LimitState for LaneLimitState<'_> {
@@ -34,9 +32,9 @@ impl LimitState for LaneLimitState<'_> {
         if plan.headways.len() != 1 {
             return Err(Error::Internal("a limit state has one headway".to_owned()));
         }
-        let options = SweepOptions { wanted: Wanted::Outcomes, fallback: self.fallback, recheck: None };
+        let executor = Executor { recheck: None, ..self.executor };
         let mut values = Vec::with_capacity(points.len());
-        sweep(&plan, 0..plan.unit_count(), self.backend, &options, |chunk| {
+        executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
             values.extend(chunk.outcomes.iter().map(|o| limit_state(self.profile, self.criterion, o)));
             Ok(())
         })?;

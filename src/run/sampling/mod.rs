@@ -1,12 +1,13 @@
-//! Sampling: a density becomes lanes.
+//! Sampling: a density becomes lanes, and their outcomes become probabilities of failure.
 //!
-//! Here live the way from a density file to a case generator and the plan of a sampling run. Here lives nothing
-//! about estimators. Densities come from [`crate::stats::density`], lanes run in [`crate::engine`].
+//! [`Sample`] is the way in: it plans a run of any estimator, runs it whole or in shards, resumes and merges it. Densities
+//! and estimators come from [`crate::stats`], lanes run in [`crate::engine`].
 
 mod bootstrap;
 mod compare;
 mod conditional;
 mod crude;
+pub(crate) mod crude_plan;
 mod generator;
 mod kernels;
 mod lanes;
@@ -16,7 +17,14 @@ mod plan;
 mod proposal_file;
 mod risk;
 mod rows;
+mod sample;
+mod sample_options;
+mod sample_result;
+mod sample_run;
+mod sequential;
 mod tally;
+mod weighted;
+pub(crate) mod weighted_plan;
 mod weighted_tally;
 
 pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
@@ -26,7 +34,7 @@ pub use compare::{
 };
 pub use conditional::{Conditional, conditional, mixture_of};
 pub use crude::{
-    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, Lanes, checkpoints, crude_of_segments, sample_crude, sample_into,
+    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, sample_crude, sample_into,
 };
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
@@ -37,5 +45,10 @@ pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal, write_proposal};
 pub use risk::{Risk, RiskRate};
 pub use rows::{EstimateRow, crude_rows, headway_name};
+pub(crate) use sample::Kind;
+pub use sample::Sample;
+pub use sample_options::{Estimator, SampleOptions};
+pub use sample_result::{Levels, SampleResult};
+pub use sample_run::{EachChunk, SampleRun};
 pub use tally::{SampleTally, TallyOptions, WorstSample};
 pub use weighted_tally::WeightedTally;

@@ -1,8 +1,22 @@
-//! Studies: scenarios and parameterizations become a plan of lanes, a window of scenarios at a time, and a plan file.
+//! Studies: scenarios and parameterizations become a plan of lanes; the plan is run whole or in shards, resumed, merged and
+//! scored. [`Study`] is the way in.
 
-pub(crate) mod plan;
+mod cases;
+mod facts;
+mod histogram;
+mod plan;
 pub(crate) mod plan_file;
+mod planned;
+mod run;
 pub(crate) mod unit_record;
 
-pub use plan::{Study, StudyOptions, StudyOutline, StudyPlan, outline_study, plan_study};
+#[cfg(test)]
+pub(crate) use cases::Records;
+pub use cases::StudyCases;
+pub(crate) use cases::WINDOW;
+pub use facts::{CategoryFacts, StudyFacts};
+pub use histogram::{ParameterHistogram, parameter_histograms};
+pub use plan::{StudyOptions, StudyOutline, StudyPlan, outline_study, plan_study};
 pub use plan_file::StudyHead;
+pub use planned::{Study, StudyBuilder};
+pub use run::{StudyResult, StudyRun};

@@ -13,7 +13,7 @@ use crate::engine::units::Units;
 use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::study::plan::{Records, Study, parameterizations};
+use crate::run::study::cases::{Records, StudyCases, parameterizations};
 use crate::run::study::unit_record;
 use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, Tables, problem_of};
@@ -121,7 +121,7 @@ impl StudyHead {
     }
 
     /// The study with these of its scenarios.
-    pub(crate) fn with_records(self, held: Records) -> Result<Study> {
+    pub(crate) fn with_records(self, held: Records) -> Result<StudyCases> {
         let mut records = unit_ids(&held).into_iter();
         let (mut first, mut blocks, mut reductions) = (0, Vec::new(), Vec::new());
         for block in &self.blocks {
@@ -144,7 +144,7 @@ impl StudyHead {
         let (profile, models, headways) = (self.profile.clone(), self.models.clone(), self.headways.clone());
         let hash = self.plan_sha256.clone();
         let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Box::new(NoCases))?;
-        Ok(Study { head: self, outline, reductions, held })
+        Ok(StudyCases { head: self, outline, reductions, held })
     }
 
     /// The study with some of its scenarios, whose records begin where the file stands. `wanted` says which, of so many.
@@ -157,7 +157,7 @@ impl StudyHead {
         file: &mut (impl Read + Seek),
         place: &Place,
         wanted: impl FnOnce(u64) -> Range<u64>,
-    ) -> Result<Study> {
+    ) -> Result<StudyCases> {
         let wrong = |problem: String| Error::input(place.clone(), problem, "make the plan again with --plan-only");
         let io = |e| Error::io(place.file.clone().unwrap_or_default(), "read", e);
         self.check(place)?;
@@ -258,7 +258,7 @@ impl StudyHead {
     }
 }
 
-impl Study {
+impl StudyCases {
     /// What stands before the records in a file.
     pub fn head(&self) -> &StudyHead {
         &self.head

@@ -10,6 +10,7 @@ use super::miner::{CategoryCount, Mined, mine};
 use super::options::MiningOptions;
 use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Implausible;
+use crate::support::readable;
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::traffic::trajectory::highd::{self, FileChecksum};
 use crate::traffic::trajectory::{EgoView, Recording};
@@ -67,6 +68,15 @@ pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
         found: sum.found + 1,
         kept: sum.kept + u64::from(s.kept),
     })
+}
+
+/// Found and kept, per category, in one line.
+pub fn counts_text(scenarios: &[Scenario]) -> String {
+    let part = |category: Category| {
+        let count = count(scenarios, category);
+        format!("{} {} found, {} kept", category.label(), readable::count(count.found), readable::count(count.kept))
+    };
+    Category::ALL.map(part).join("; ")
 }
 
 struct Part {

@@ -30,7 +30,7 @@ pub mod search;
 pub mod tags;
 mod window;
 
-pub use collection::{Collection, RecordingSummary, count, mine_folder, mine_generated};
+pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated};
 pub use miner::{CategoryCount, Mined, mine};
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,

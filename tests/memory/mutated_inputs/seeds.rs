@@ -229,7 +229,7 @@ impl Seeds {
             proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
             parts: parts.into(),
             plans: vec![{
-                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().study;
+                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().cases;
                 [&seal("plan", outlined.head()).unwrap().0, outlined.records().unwrap()].concat()
             }],
             journals: journals.into(),

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use lanesweep::engine::verify::{RandomOptions, random_plan};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Partial, Session, SweepOptions, Wanted, sweep};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Partial, Session, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Journal, Ledger};
 use lanesweep::{Error, Result};
@@ -72,8 +72,8 @@ fn journalled(plan: &LanePlan, backend: &dyn Backend, path: &Path) -> Result<(u6
     let (journal, found) = Journal::open(path, RUN, units.clone())?;
     let before = ledger.resume(journal, found)?;
     for range in ledger.missing(units.clone())? {
-        let options = SweepOptions::plain(Wanted::Verdicts);
-        sweep(plan, range, backend, &options, |chunk| ledger.add(Partial::from_chunk(plan, &chunk)?))?;
+        Executor::new(backend)
+            .sweep(plan, range, Wanted::Verdicts, |chunk| ledger.add(Partial::from_chunk(plan, &chunk)?))?;
     }
     let counts = ledger.counts(units)?;
     Ok((before, counts.ok_or_else(|| Error::Internal("nothing is counted".to_owned()))?))
@@ -109,9 +109,9 @@ fn a_device_that_is_lost_in_mid_run_is_stood_in_for_and_the_counts_are_the_same(
     let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let counted = |backend: &dyn Backend| {
-        let options = SweepOptions { fallback: Some(&cpu), ..SweepOptions::plain(Wanted::Verdicts) };
+        let executor = Executor::new(backend).with_fallback(Some(&cpu));
         let mut partial = Partial::empty(&plan);
-        let summary = sweep(&plan, 0..plan.unit_count(), backend, &options, |chunk| {
+        let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
             partial = partial.clone().merge(Partial::from_chunk(&plan, &chunk)?)?;
             Ok(())
         });

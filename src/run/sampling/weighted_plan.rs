@@ -5,22 +5,22 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::plan::{SampleHeadways, plan_points};
+use super::proposal_file::{proposal_from_text, proposal_text};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::report::sampling::RunFacts;
 use crate::run::parts::{read_sealed, seal};
-use crate::run::sampling::{SampleHeadways, plan_points, proposal_from_text, proposal_text};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{Pilot, PilotCheck};
 use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
 /// What a run with a pilot of its own keeps until it ends.
-pub(super) const PILOT_FILE: &str = "pilot.json";
+pub(crate) const PILOT_FILE: &str = "pilot.json";
 /// Kind of the sealed file.
-pub(super) const KIND: &str = "weighted sampling plan";
+pub(crate) const KIND: &str = "weighted sampling plan";
 /// Largest plan that is read: a density and a mixture.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposal FILE --plan-only --out DIR` of this \
@@ -29,7 +29,7 @@ const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposa
 /// Importance sampling of one given proposal, or of one per driver model that a pilot found; a fixed number of samples.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct WeightedFacts {
+pub(crate) struct WeightedFacts {
     /// The density file's text.
     pub density: String,
     /// The proposal file's text: one for all driver models, or one for each.
@@ -51,23 +51,24 @@ pub(super) struct WeightedFacts {
 }
 
 /// A run ready to be sampled.
-pub(super) struct PlannedWeighted {
+#[derive(Clone)]
+pub(crate) struct WeightedPlan {
     pub facts: WeightedFacts,
     pub density: DensityModel,
     /// One for all driver models, or one for each.
     pub proposals: Vec<Mixture>,
 }
 
-impl PlannedWeighted {
+impl WeightedPlan {
     /// Plans; the texts in `facts` are set here.
     ///
     /// # Errors
     /// [`Error::Usage`] where density, headway and models give no lanes.
-    pub fn new(density: DensityModel, proposals: Vec<Mixture>, mut facts: WeightedFacts) -> Result<PlannedWeighted> {
+    pub fn new(density: DensityModel, proposals: Vec<Mixture>, mut facts: WeightedFacts) -> Result<WeightedPlan> {
         let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
         facts.density = String::from_utf8(density.to_json()?).map_err(unreadable)?;
         facts.proposals = proposals.iter().map(|proposal| proposal_text(&density, proposal)).collect::<Result<_>>()?;
-        let planned = PlannedWeighted { facts, density, proposals };
+        let planned = WeightedPlan { facts, density, proposals };
         planned.check_lanes()?;
         Ok(planned)
     }
@@ -84,7 +85,7 @@ impl PlannedWeighted {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
-    pub fn read(path: &Path) -> Result<(PlannedWeighted, String)> {
+    pub fn read(path: &Path) -> Result<(WeightedPlan, String)> {
         let (facts, run_sha256): (WeightedFacts, _) = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
@@ -105,7 +106,7 @@ impl PlannedWeighted {
         if proposals.len() != if pilots > 0 { models } else { 1 } || (pilots > 0 && pilots != models) {
             return Err(wrong("its proposals are not one for all driver models or one for each"));
         }
-        let planned = PlannedWeighted { facts, density, proposals };
+        let planned = WeightedPlan { facts, density, proposals };
         planned.check_lanes()?;
         Ok((planned, run_sha256))
     }
@@ -114,27 +115,27 @@ impl PlannedWeighted {
     /// are left there. Both have the same bits; a pilot takes its time.
     ///
     /// # Errors
-    /// Of `search` and [`PlannedWeighted::new`]; [`Error::Io`].
+    /// Of `search` and [`WeightedPlan::new`]; [`Error::Io`].
     pub fn after_pilot(
-        density: DensityModel,
-        facts: WeightedFacts,
-        out: &Path,
-        search: impl FnOnce() -> Result<(Vec<Mixture>, Vec<PilotCheck>)>,
-    ) -> Result<PlannedWeighted> {
-        let path = out.join(PILOT_FILE);
-        let mut planned = PlannedWeighted::new(density, Vec::new(), facts)?;
-        if let Ok((kept, _)) = PlannedWeighted::read(&path) {
+        mut self,
+        out: Option<&Path>,
+        search: impl FnOnce(&WeightedPlan) -> Result<(Vec<Mixture>, Vec<PilotCheck>)>,
+    ) -> Result<WeightedPlan> {
+        let path = out.map(|out| out.join(PILOT_FILE));
+        if let Some(Ok((kept, _))) = path.as_deref().map(WeightedPlan::read) {
             let asked = WeightedFacts { proposals: Vec::new(), pilots: Vec::new(), ..kept.facts.clone() };
-            if seal(KIND, &asked)?.1 == planned.seal()?.1 {
+            if seal(KIND, &asked)?.1 == self.seal()?.1 {
                 tracing::info!("the pilot is done already");
                 return Ok(kept);
             }
         }
-        let (proposals, pilots) = search()?;
-        planned.facts.pilots = pilots;
-        let planned = PlannedWeighted::new(planned.density, proposals, planned.facts)?;
-        make_folder(out)?;
-        write_atomically(&path, &planned.seal()?.0)?;
+        let (proposals, pilots) = search(&self)?;
+        self.facts.pilots = pilots;
+        let planned = WeightedPlan::new(self.density, proposals, self.facts)?;
+        if let (Some(out), Some(path)) = (out, path) {
+            make_folder(out)?;
+            write_atomically(&path, &planned.seal()?.0)?;
+        }
         Ok(planned)
     }
 
@@ -146,21 +147,6 @@ impl PlannedWeighted {
     /// The headway's name in tables.
     pub fn headway_name(&self) -> String {
         self.facts.headway.map_or_else(|| "sampled".to_owned(), |headway| headway.to_string())
-    }
-
-    /// For `estimate.json`.
-    pub fn run_facts(&self) -> RunFacts {
-        let facts = &self.facts;
-        RunFacts {
-            estimator: "is",
-            profile: facts.profile.clone(),
-            models: facts.models.clone(),
-            headways: facts.headway.into_iter().collect(),
-            points: "random",
-            samples: facts.samples,
-            seed: facts.seed,
-            given: Vec::new(),
-        }
     }
 
     /// One point as lanes: complains before any work about what every point would.

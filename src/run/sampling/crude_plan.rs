@@ -5,21 +5,23 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::conditional::mixture_of;
+use super::crude::CrudeOptions;
+use super::generator::SampleSource;
+use super::map::MapAxes;
+use super::plan::{SampleHeadways, SamplePlanOptions, plan_samples};
+use super::tally::TallyOptions;
 use crate::engine::{Headway, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::report::sampling::RunFacts;
 use crate::run::parts::{read_sealed, seal};
-use crate::run::sampling::{
-    CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, mixture_of, plan_samples,
-};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{BinomialInterval, StopRule};
 use crate::{Error, Place, Result};
 
 /// Kind of the sealed file.
-pub(super) const KIND: &str = "sampling plan";
+pub(crate) const KIND: &str = "sampling plan";
 /// Largest plan that is read: a density, mostly.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
 const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` of this version";
@@ -27,7 +29,7 @@ const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` o
 /// A run of crude Monte Carlo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SampleFacts {
+pub(crate) struct CrudeFacts {
     /// The density file's text.
     pub density: String,
     pub profile: Profile,
@@ -47,23 +49,23 @@ pub(super) struct SampleFacts {
 }
 
 /// A run ready to be sampled.
-pub(super) struct PlannedSample {
-    pub facts: SampleFacts,
+pub(crate) struct CrudePlan {
+    pub facts: CrudeFacts,
     pub density: DensityModel,
     pub plan: LanePlan,
 }
 
-impl PlannedSample {
+impl CrudePlan {
     /// Plans; the hash and the density's text in `facts` are set here.
     ///
     /// # Errors
     /// As [`plan_samples`].
-    pub fn new(density: DensityModel, mut facts: SampleFacts) -> Result<PlannedSample> {
+    pub fn new(density: DensityModel, mut facts: CrudeFacts) -> Result<CrudePlan> {
         let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
         facts.density = String::from_utf8(density.to_json()?).map_err(unreadable)?;
         let plan = facts.plan(&density)?;
         facts.plan_sha256 = plan.hash().to_owned();
-        Ok(PlannedSample { facts, density, plan })
+        Ok(CrudePlan { facts, density, plan })
     }
 
     /// As the text of a plan file, with the hash of the run.
@@ -78,8 +80,8 @@ impl PlannedSample {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
-    pub fn read(path: &Path) -> Result<(PlannedSample, String)> {
-        let (facts, run_sha256): (SampleFacts, _) = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?;
+    pub fn read(path: &Path) -> Result<(CrudePlan, String)> {
+        let (facts, run_sha256): (CrudeFacts, _) = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
         facts.profile.check(&place)?;
@@ -95,7 +97,7 @@ impl PlannedSample {
         if plan.hash() != facts.plan_sha256 {
             return Err(wrong("its content is not that of its hash: another version of lanesweep made it"));
         }
-        Ok((PlannedSample { facts, density, plan }, run_sha256))
+        Ok((CrudePlan { facts, density, plan }, run_sha256))
     }
 
     /// What is counted.
@@ -118,27 +120,12 @@ impl PlannedSample {
             is_sampled_headway: self.density.space.has_thw(),
         }
     }
-
-    /// For `estimate.json`.
-    pub fn run_facts(&self) -> RunFacts {
-        let facts = &self.facts;
-        RunFacts {
-            estimator: "mc",
-            profile: facts.profile.clone(),
-            models: facts.models.clone(),
-            headways: facts.headways.clone().unwrap_or_default(),
-            points: if facts.sobol { "sobol" } else { "random" },
-            samples: facts.samples,
-            seed: facts.seed,
-            given: facts.given.clone(),
-        }
-    }
 }
 
-impl SampleFacts {
-    /// What a plan is made of; the rest is set by [`PlannedSample::new`].
-    pub fn new(options: &SamplePlanOptions, profile: &Profile, given: &[(String, f64)]) -> SampleFacts {
-        SampleFacts {
+impl CrudeFacts {
+    /// What a plan is made of; the rest is set by [`CrudePlan::new`].
+    pub fn new(options: &SamplePlanOptions, profile: &Profile, given: &[(String, f64)]) -> CrudeFacts {
+        CrudeFacts {
             density: String::new(),
             profile: profile.clone(),
             models: options.models.clone(),

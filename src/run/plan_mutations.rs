@@ -5,21 +5,19 @@ use std::path::Path;
 
 use serde_json::value::RawValue;
 
-use super::sample_plan::{self, PlannedSample, SampleFacts};
-use super::study_plan::{self, PlannedStudy};
-use super::weighted_plan::{self, PlannedWeighted, WeightedFacts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::seal;
+use crate::run::sampling::crude_plan::{self, CrudeFacts, CrudePlan};
+use crate::run::sampling::weighted_plan::{self, WeightedFacts, WeightedPlan};
 use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
-use crate::run::score::ScoreOptions;
-use crate::run::study::{StudyOptions, outline_study};
+use crate::run::study::Study;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
+use crate::scenario::parameterization::ParameterizationId;
 use crate::stats::density::{DataFacts, DensityModel, FitOptions};
-use crate::traffic::mining::{MiningOptions, mine_generated};
+use crate::traffic::mining::{Collection, MiningOptions, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::{Error, Result};
 
@@ -47,8 +45,8 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
         headways: SampleHeadways::Each(vec![headway]),
     };
     let map = MapAxes::of(&density, "v_ego_mps", "v_target_mps").unwrap();
-    let crude = SampleFacts { map: Some(map), worst: 3, ..SampleFacts::new(&plan_options, &profile, &[]) };
-    let crude = PlannedSample::new(density.clone(), crude).unwrap().facts;
+    let crude = CrudeFacts { map: Some(map), worst: 3, ..CrudeFacts::new(&plan_options, &profile, &[]) };
+    let crude = CrudePlan::new(density.clone(), crude).unwrap().facts;
     let proposal = density.mixture().unwrap();
     let weighted = WeightedFacts {
         density: String::new(),
@@ -64,34 +62,18 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
         seed: 1,
         level: 0.95,
     };
-    let weighted = PlannedWeighted::new(density, vec![proposal], weighted).unwrap().facts;
+    let weighted = WeightedPlan::new(density, vec![proposal], weighted).unwrap().facts;
     let few: Vec<_> = scenarios.into_iter().filter(|s| s.category == Category::Lvd && s.kept).take(2).collect();
-    let study = PlannedStudy {
-        study: outline_study(&few, &profile, &StudyOptions::default()).unwrap().study,
-        facts: study_plan::StudyFacts {
-            data: "synthetic".into(),
-            synthetic: true,
-            published: false,
-            reference: false,
-            incomplete: false,
-            scenario_file_sha256: None,
-            recordings: Vec::new(),
-            left_out: Vec::new(),
-            notes: Vec::new(),
-            categories: Vec::new(),
-            mining: MiningOptions::default(),
-            parameterization: ParameterizationOptions::default(),
-            score: ScoreOptions::default(),
-        },
-    };
+    let few = Collection { scenarios: few, ..Collection::default() };
+    let study = Study::builder(&few, profile).plan().unwrap();
     let text = |facts: serde_json::Result<String>| facts.unwrap();
     let crude = text(serde_json::to_string(&crude));
-    try_all(sample_plan::KIND, &crude, &[], &|path| PlannedSample::read(path).map(drop));
+    try_all(crude_plan::KIND, &crude, &[], &|path| CrudePlan::read(path).map(drop));
     let weighted = text(serde_json::to_string(&weighted));
-    try_all(weighted_plan::KIND, &weighted, &[], &|path| PlannedWeighted::read(path).map(drop));
-    let records = study.study.records().unwrap().to_vec();
+    try_all(weighted_plan::KIND, &weighted, &[], &|path| WeightedPlan::read(path).map(drop));
+    let records = study.cases().records().unwrap().to_vec();
     let study: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
-    try_all(study_plan::KIND, &study["content"].to_string(), &records, &|path| PlannedStudy::read(path).map(drop));
+    try_all(Study::KIND, &study["content"].to_string(), &records, &|path| Study::read(path, None).map(drop));
 }
 
 /// Content as it is and changed, each with a checksum that fits and followed by the same bytes.

@@ -1,0 +1,101 @@
+//! What the flags of `lanesweep sample` ask for, as options of the library.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
+use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
+use crate::stats::density::DensityModel;
+use crate::stats::estimate::{BinomialInterval, Checkpoints, Pilot, StopRule};
+use crate::{Error, Place, Result};
+
+impl Sample {
+    /// When to end.
+    pub(super) fn stop(&self, samples: u64) -> StopRule {
+        StopRule {
+            samples,
+            relative_half_width: self.until,
+            time_limit: self.time_limit.map(Duration::from_secs_f64),
+            checkpoints: Checkpoints::Doubling,
+        }
+    }
+
+    /// Everything that a run over a density is asked for.
+    pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
+        let samples = self.samples.unwrap_or(match self.estimator {
+            EstimatorFlag::Subset => 2000,
+            _ => 100_000,
+        });
+        let headways = self.headways(density)?;
+        if let SampleHeadways::Each(list) = &headways
+            && list.len() != 1
+            && !self.is_crude()
+        {
+            return Err(Error::usage(
+                Place::item("--thw"),
+                format!("--estimator {} follows one headway at a time", self.estimator.key()),
+                "give one, such as --thw 0.6, or a density fitted with --with-thw",
+            ));
+        }
+        Ok(SampleOptions {
+            models: self.models()?,
+            criterion: self.criterion()?,
+            seed: self.seed(),
+            level: self.level,
+            stop: self.stop(samples),
+            given: self.given.clone(),
+            worst: self.worst(),
+            map: if self.is_crude() { self.map_axes(density)? } else { None },
+            ..SampleOptions::new(self.estimator(density)?, samples, headways)
+        })
+    }
+
+    fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
+        Ok(match self.estimator {
+            EstimatorFlag::Mc => Estimator::Crude {
+                points: match self.points {
+                    PointsFlag::Random => SampleSource::Random,
+                    PointsFlag::Sobol => SampleSource::Sobol,
+                },
+                interval: self.interval(),
+            },
+            EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
+                worst: self.worst_share,
+                broad: self.broad,
+                defence: self.defence,
+                ..Pilot::guarded(self.pilot)
+            }),
+            EstimatorFlag::Is => {
+                let read = |path: &PathBuf| read_proposal(path, density);
+                let proposals = self.proposal.iter().map(read).collect::<Result<_>>()?;
+                Estimator::Given { proposals, defence: self.defence }
+            }
+            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: self.defence },
+            EstimatorFlag::Subset => Estimator::Subset,
+        })
+    }
+
+    /// Kind of interval of crude Monte Carlo.
+    pub(super) fn interval(&self) -> BinomialInterval {
+        match self.interval {
+            IntervalFlag::Wilson => BinomialInterval::Wilson,
+            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
+        }
+    }
+
+    fn map_axes(&self, density: &DensityModel) -> Result<Option<MapAxes>> {
+        let parameters = density.space.parameters();
+        match self.map.as_deref() {
+            Some("none") => Ok(None),
+            None if parameters.len() < 2 => Ok(None),
+            None => MapAxes::of(density, &parameters[0].name, &parameters[1].name).map(Some),
+            Some(text) => {
+                let (x, y) = text.split_once(',').ok_or_else(|| {
+                    let problem = format!("`{text}` names no two parameters");
+                    Error::usage(Place::item("--map"), problem, "give two, separated by a comma, or `none`")
+                })?;
+                MapAxes::of(density, x.trim(), y.trim()).map(Some)
+            }
+        }
+    }
+}

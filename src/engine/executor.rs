@@ -1,0 +1,194 @@
+//! The executor: the one loop above the backends. It runs chunks of units, checks a sample of a device's lanes on the
+//! CPU, and gives a failed chunk to another backend.
+
+use std::ops::Range;
+
+use super::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
+use super::plan::LanePlan;
+use super::recheck::{Recheck, RecheckOptions};
+use crate::{Error, Result};
+
+/// What computes the lanes of a run, what stands in where it fails, and which lanes are computed again.
+#[derive(Clone, Copy)]
+pub struct Executor<'a> {
+    /// Computes the lanes.
+    pub backend: &'a dyn Backend,
+    /// Computes what the backend cannot.
+    pub fallback: Option<&'a dyn Backend>,
+    /// The lanes that the CPU computes again, as [`Backend::rechecked_by`] says; `None` checks none.
+    pub recheck: Option<RecheckOptions>,
+    /// Maximum lanes of a chunk; `None` leaves it to the backend. A run is journalled and interrupted between chunks.
+    pub chunk_lanes: Option<u64>,
+}
+
+/// How a sweep went.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SweepSummary {
+    /// Lanes computed.
+    pub lanes: u64,
+    /// Chunks of the fallback, of what the first backend could not compute.
+    pub redone_chunks: u64,
+    /// Their lanes.
+    pub redone_lanes: u64,
+    /// Lanes that were computed again on the CPU with every step made, all equal.
+    pub rechecked_lanes: u64,
+    /// Time that the device itself computed, s, where it can tell.
+    pub device_s: Option<f64>,
+}
+
+impl SweepSummary {
+    /// Two sweeps of the same run.
+    pub fn add(&mut self, other: &SweepSummary) {
+        self.lanes += other.lanes;
+        self.redone_chunks += other.redone_chunks;
+        self.redone_lanes += other.redone_lanes;
+        self.rechecked_lanes += other.rechecked_lanes;
+        self.device_s = self.device_s.zip(other.device_s).map(|(a, b)| a + b);
+    }
+}
+
+impl<'a> Executor<'a> {
+    /// A backend without fallback or check.
+    pub fn new(backend: &'a dyn Backend) -> Self {
+        Executor { backend, fallback: None, recheck: None, chunk_lanes: None }
+    }
+
+    /// The same with a fallback, where there is one.
+    pub fn with_fallback(self, fallback: Option<&'a dyn Backend>) -> Self {
+        Executor { fallback, ..self }
+    }
+
+    /// The same with one lane in [`ONE_IN`](super::ONE_IN) computed again; the seed chooses which.
+    pub fn with_recheck(self, seed: u64) -> Self {
+        Executor { recheck: Some(RecheckOptions::of_seed(seed)), ..self }
+    }
+
+    /// Computes an interval of units and gives every chunk, in order, to `each`. A chunk that the backend cannot
+    /// compute is computed by the fallback, where there is one.
+    ///
+    /// # Errors
+    /// Of the backend where there is no fallback, of the fallback, of `each`; [`Error::Verification`] where a
+    /// checked lane differs.
+    pub fn sweep(
+        &self,
+        plan: &LanePlan,
+        units: Range<u64>,
+        wanted: Wanted,
+        each: impl FnMut(Chunk) -> Result<()>,
+    ) -> Result<SweepSummary> {
+        let recheck = self.recheck.map(|options| Recheck::new(plan, options));
+        self.sweep_checked(plan, units, wanted, recheck.as_ref(), each)
+    }
+
+    /// The same with a check of the caller's.
+    pub(super) fn sweep_checked(
+        &self,
+        plan: &LanePlan,
+        units: Range<u64>,
+        wanted: Wanted,
+        recheck: Option<&Recheck>,
+        mut each: impl FnMut(Chunk) -> Result<()>,
+    ) -> Result<SweepSummary> {
+        let &Executor { backend, fallback, chunk_lanes, .. } = self;
+        let most = chunk_lanes.unwrap_or(u64::MAX);
+        let mut summary = SweepSummary::default();
+        let mut redo: Option<Box<dyn Session + '_>> = None;
+        let mut session = match (backend.prepare(plan), fallback) {
+            (Ok(session), _) => Some(session),
+            (Err(error), Some(fallback)) => {
+                tracing::warn!("{error}; {} computes instead", fallback.describe());
+                None
+            }
+            (Err(error), None) => return Err(error),
+        };
+        let mut from = units.start;
+        // The backend is not asked for units before this one.
+        let mut redo_until = if session.is_some() { units.start } else { units.end };
+        while from < units.end {
+            if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
+                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
+                let by = backend.rechecked_by(wanted);
+                match (chunk_and_samples(plan, session.as_mut(), range.clone(), wanted, recheck, by), fallback) {
+                    (Ok((chunk, samples)), _) => {
+                        if let Some(recheck) = recheck {
+                            let name = backend.describe();
+                            summary.rechecked_lanes += recheck.check(&chunk, &name, by)?;
+                            for sample in &samples {
+                                summary.rechecked_lanes += recheck.check_all(sample, &name, by)?;
+                            }
+                        }
+                        summary.lanes += chunk.lanes();
+                        each(chunk)?;
+                        from = range.end;
+                        continue;
+                    }
+                    (Err(error), Some(fallback)) => {
+                        if redo.is_none() {
+                            let name = fallback.describe();
+                            tracing::warn!("{error}; {name} computes this part, and what else the device cannot");
+                        }
+                        redo_until = range.end;
+                    }
+                    (Err(error), None) => return Err(error),
+                }
+            }
+            let Some(fallback) = fallback else {
+                return Err(Error::Internal("the sweep has no backend".to_owned()));
+            };
+            let session = match &mut redo {
+                Some(session) => session,
+                none => none.insert(fallback.prepare(plan)?),
+            };
+            let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(most));
+            let chunk = session.run(range.clone(), wanted)?;
+            chunk.check_asked(plan, &range, wanted)?;
+            if let Some(recheck) = recheck {
+                let by = fallback.rechecked_by(wanted);
+                summary.rechecked_lanes += recheck.check(&chunk, &fallback.describe(), by)?;
+            }
+            summary.redone_chunks += 1;
+            summary.redone_lanes += chunk.lanes();
+            summary.lanes += chunk.lanes();
+            each(chunk)?;
+            from = range.end;
+        }
+        summary.device_s = session.as_ref().and_then(|s| s.device_seconds());
+        Ok(summary)
+    }
+}
+
+/// A chunk, and lanes to check where it holds none: counts hold no lanes, so some units are asked for again, lane
+/// by lane.
+fn chunk_and_samples(
+    plan: &LanePlan,
+    session: &mut dyn Session,
+    units: Range<u64>,
+    wanted: Wanted,
+    recheck: Option<&Recheck>,
+    by: RecheckBy,
+) -> Result<(Chunk, Vec<Chunk>)> {
+    let chunk = session.run(units.clone(), wanted)?;
+    chunk.check_asked(plan, &units, wanted)?;
+    let has_no_lane = wanted == Wanted::Counts && by != RecheckBy::Nothing;
+    let Some(recheck) = recheck.filter(|_| has_no_lane) else { return Ok((chunk, Vec::new())) };
+    let samples = recheck.units(units).map(|unit| session.run(unit..unit + 1, Wanted::Verdicts));
+    Ok((chunk, samples.collect::<Result<_>>()?))
+}
+
+/// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.
+pub fn chunks(plan: &LanePlan, units: Range<u64>) -> Vec<Range<u64>> {
+    let mut ranges = Vec::new();
+    let mut from = units.start;
+    while from < units.end {
+        let to = next_cut(plan, from, units.end, 1 << 17);
+        ranges.push(from..to);
+        from = to;
+    }
+    ranges
+}
+
+/// End of a chunk that begins at a unit and holds about so many lanes, at least one unit.
+fn next_cut(plan: &LanePlan, from: u64, end: u64, lanes: u64) -> u64 {
+    let most = plan.blocks.iter().map(|b| plan.lanes_per_unit(b)).max().unwrap_or(1).max(1);
+    end.min(from + (lanes / most).max(1))
+}

@@ -1,0 +1,279 @@
+//! A sampling run at work: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the shards.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::bootstrap::{BootstrapRecord, bootstrap};
+use super::crude::{CrudeRun, checkpoints, crude_of_segments, sample_into};
+use super::sample::{Kind, Sample};
+use super::sample_result::SampleResult;
+use super::tally::{SampleTally, TallyOptions};
+use super::weighted_plan::PILOT_FILE;
+use super::weighted_tally::WeightedTally;
+use crate::engine::{Chunk, Executor, SweepSummary};
+use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts};
+use crate::stats::estimate::StopRule;
+use crate::support::interrupt;
+use crate::support::run_dir::{ESTIMATE_RECORD, Results};
+use crate::{Error, Place, Result};
+
+/// Takes the chunks of crude Monte Carlo.
+pub type EachChunk<'c> = dyn FnMut(&Chunk) -> Result<()> + 'c;
+
+/// A sampling run, or one of its shards, in a folder. It continues what an earlier process left in the journal.
+pub struct SampleRun<'s> {
+    sample: &'s Sample,
+    run_dir: RunDir,
+    state: State,
+    crude: Option<CrudeRun>,
+    is_journalled: bool,
+}
+
+enum State {
+    Crude(RunState<SampleTally>),
+    Weighted(RunState<WeightedTally>),
+}
+
+impl Sample {
+    /// Runs it in one piece, in memory.
+    ///
+    /// # Errors
+    /// Of the lanes.
+    pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
+        match &self.0 {
+            Kind::Crude(plan, stop) => {
+                let units = plan.plan.unit_count();
+                let (mut ledger, counting) = (Ledger::new(0..units, &checkpoints(units)), plan.counting());
+                let options = plan.options(*stop);
+                let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, |_| Ok(()))?;
+                Ok(SampleResult::of_crude(run))
+            }
+            Kind::Weighted(plan) => {
+                let mut ledger = Ledger::new(0..plan.facts.samples, &[]);
+                plan.sample(&mut ledger, executor, |_| ())?;
+                SampleResult::of_weighted(plan, ledger.take()?, Place::item("samples"))
+            }
+            Kind::Pilot(plan, pilot) => {
+                let found = plan.as_ref().clone().after_pilot(None, |plan| plan.pilots(pilot, executor))?;
+                Sample(Kind::Weighted(Box::new(found))).run(executor)
+            }
+            Kind::Sequential(run) => run.run(executor),
+        }
+    }
+
+    /// Opens a run in a folder; `None` where the shard's part is there already, and whole. Without a journal nothing
+    /// outlives the process.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
+    /// [`Error::Io`]; [`Error::Usage`] for a run that cannot be split.
+    pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
+        let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
+        let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
+        let state = if matches!(self.0, Kind::Crude(..)) {
+            if run_dir.is_done::<SampleTally>()? {
+                return Ok(None);
+            }
+            State::Crude(run_dir.begin(&checkpoints(unit_count), is_journalled)?)
+        } else {
+            if run_dir.is_done::<WeightedTally>()? {
+                return Ok(None);
+            }
+            State::Weighted(run_dir.begin(&[], is_journalled)?)
+        };
+        Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
+    }
+
+    /// Runs a shard in a folder and leaves plan and part there. An interrupted one continues at the next call.
+    ///
+    /// # Errors
+    /// As [`Sample::open`] and [`Sample::run`]; [`Error::Interrupted`].
+    pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
+        self.write_plan(out)?;
+        let Some(mut run) = self.open(out, Some(shard), true)? else { return Ok(()) };
+        run.sample(executor, &mut |_| (), None)?;
+        run.write_part()
+    }
+
+    /// The run of a folder of parts with its estimates: bit for bit those of the run in one piece.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged.
+    pub fn merge(out: &Path) -> Result<(Sample, SampleResult)> {
+        Sample::merge_or(out, &|shard| format!("run shard {shard}"))
+    }
+
+    /// The same; `again` says how a shard is made.
+    pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
+        let sample = Sample::read(&out.join(PLAN_FILE))?;
+        let run_sha256 = sample.seal()?.1;
+        let result = match &sample.0 {
+            Kind::Crude(planned, _) => {
+                let (plan, counting) = (&planned.plan, planned.counting());
+                let parts = read_parts::<SampleTally>(out, &run_sha256, plan.unit_count(), again)?;
+                let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
+                let count = parts.len();
+                let segments = parts.into_iter().flat_map(|part| part.segments).collect();
+                let options = planned.options(StopRule::samples(planned.facts.samples));
+                let crude = crude_of_segments(plan, segments, &counting, &options)?;
+                if crude.tally.samples() != plan.unit_count() {
+                    let problem = "the parts do not hold every sample that their names stand for";
+                    return Err(Error::input(Place::file(out), problem, "make them again"));
+                }
+                SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
+            }
+            Kind::Weighted(planned) => {
+                let parts = read_parts::<WeightedTally>(out, &run_sha256, planned.facts.samples, again)?;
+                let count = parts.len();
+                let mut segments = parts.into_iter().flat_map(|part| part.segments);
+                let first = segments.next();
+                let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
+                SampleResult { parts: count, ..SampleResult::of_weighted(planned, tally, Place::file(out))? }
+            }
+            Kind::Pilot(..) | Kind::Sequential(_) => {
+                return Err(Error::Internal("a plan file of a run that cannot be split".to_owned()));
+            }
+        };
+        Ok((sample, result))
+    }
+
+    /// Replicates of crude Monte Carlo over resampled scenarios: the data's share of the uncertainty.
+    ///
+    /// # Errors
+    /// As [`bootstrap`]; [`Error::Usage`] for another estimator.
+    pub fn bootstrap(
+        &self,
+        executor: &Executor,
+        replicates: u32,
+        samples: u64,
+        progress: impl FnMut(),
+    ) -> Result<BootstrapRecord> {
+        let Kind::Crude(plan, _) = &self.0 else {
+            let help = "use crude Monte Carlo, or leave it out";
+            return Err(Error::usage(Place::item("bootstrap"), "this belongs to crude Monte Carlo", help));
+        };
+        let options = plan.facts.plan_options();
+        bootstrap(&plan.density, &plan.facts.profile, &options, executor, replicates, samples, progress)
+    }
+}
+
+impl SampleRun<'_> {
+    /// The samples: of the shard, or all.
+    pub fn units(&self) -> Range<u64> {
+        match &self.state {
+            State::Crude(state) => state.units.clone(),
+            State::Weighted(state) => state.units.clone(),
+        }
+    }
+
+    /// Samples that no earlier process has counted.
+    ///
+    /// # Errors
+    /// Of the journal's counts.
+    pub fn missing(&mut self) -> Result<u64> {
+        let units = self.units();
+        let missing = match &mut self.state {
+            State::Crude(state) => state.ledger.missing(units)?,
+            State::Weighted(state) => state.ledger.missing(units)?,
+        };
+        Ok(missing.iter().map(|range| range.end - range.start).sum())
+    }
+
+    /// Samples what is missing. `progress` is told the samples of every chunk; `chunks` takes the chunks of crude Monte
+    /// Carlo, with every value.
+    ///
+    /// # Errors
+    /// Of the lanes and of `chunks`; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
+    pub fn sample(
+        &mut self,
+        executor: &Executor,
+        progress: &mut dyn FnMut(u64),
+        mut chunks: Option<&mut EachChunk>,
+    ) -> Result<()> {
+        let _resumable = self.is_journalled.then(interrupt::resumable);
+        match (&mut self.state, &self.sample.0) {
+            (State::Crude(state), Kind::Crude(planned, stop)) => {
+                if state.units.is_empty() {
+                    return Ok(());
+                }
+                let mut counting = planned.counting();
+                if chunks.is_some() {
+                    counting = TallyOptions { worst: counting.worst.max(1), ..counting };
+                }
+                let options = planned.options(*stop);
+                let each = |chunk: &Chunk| {
+                    progress(chunk.units.end - chunk.units.start);
+                    chunks.as_mut().map_or(Ok(()), |each| each(chunk))
+                };
+                self.crude = Some(sample_into(&planned.plan, &mut state.ledger, executor, &counting, &options, each)?);
+                Ok(())
+            }
+            (State::Weighted(state), Kind::Weighted(planned)) => {
+                planned.sample(&mut state.ledger, executor, |samples| progress(samples))
+            }
+            _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
+        }
+    }
+
+    /// Writes the part of a shard and removes its journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Internal`] where samples are missing or the run is no shard.
+    pub fn write_part(self) -> Result<()> {
+        let summary = self.crude.map_or(SweepSummary::default(), |crude| crude.summary);
+        let lanes = [summary.redone_lanes, summary.rechecked_lanes];
+        match self.state {
+            State::Crude(state) => self.run_dir.finish(state, lanes),
+            State::Weighted(state) => self.run_dir.finish(state, lanes),
+        }
+    }
+
+    /// Takes the estimates of a whole run.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] before anything was sampled.
+    pub fn take_result(&mut self) -> Result<SampleResult> {
+        match (&mut self.state, &self.sample.0) {
+            (State::Weighted(state), Kind::Weighted(planned)) => {
+                let tally = state.ledger.counts(0..planned.facts.samples)?;
+                SampleResult::of_weighted(planned, tally, Place::file(&self.run_dir.out))
+            }
+            _ => {
+                let nothing = || Error::Internal("nothing was sampled".to_owned());
+                Ok(SampleResult::of_crude(self.crude.take().ok_or_else(nothing)?))
+            }
+        }
+    }
+
+    /// The files that a whole run leaves in its folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn results(&self) -> Result<Results<'_>> {
+        match &self.state {
+            State::Crude(state) => state.folder.results(),
+            State::Weighted(state) => state.folder.results(),
+        }
+    }
+
+    /// Removes the journal of a whole run whose results are written, and what a pilot left.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn close(self) -> Result<()> {
+        if let Kind::Weighted(planned) = &self.sample.0
+            && planned.facts.pilot.is_some()
+        {
+            // The journal that needs it goes next; without it the next run's pilot has the same bits.
+            let path = self.run_dir.out.join(PILOT_FILE);
+            match std::fs::remove_file(&path) {
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
+                _ => {}
+            }
+        }
+        match self.state {
+            State::Crude(state) => state.forget(),
+            State::Weighted(state) => state.forget(),
+        }
+    }
+}

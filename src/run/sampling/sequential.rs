@@ -1,0 +1,126 @@
+//! Estimators that decide on the way what to sample next: they run in one piece.
+
+use super::lanes::{LaneLimitState, scenario_shares, truncated};
+use super::plan::plan_points;
+use super::rows::EstimateRow;
+use super::sample_options::{Estimator, SampleOptions, one_headway};
+use super::sample_result::{Levels, SampleResult};
+use super::weighted::fitted;
+use crate::Result;
+use crate::engine::Executor;
+use crate::model::profile::Profile;
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::estimate::{
+    CrossEntropy, Defended, Density, Estimate, Importance, Pilot, Subset, Technique, balance_heuristic, cross_entropy,
+    defended, from_pilot_with_proposal, importance, subset,
+};
+
+/// Draws that the valid share of each of several proposals is counted on.
+const VALIDITY_DRAWS: u64 = 1_000_000;
+
+/// A run of such an estimator, at one headway.
+pub(crate) struct Sequential {
+    pub density: DensityModel,
+    pub profile: Profile,
+    pub options: SampleOptions,
+    headway: String,
+}
+
+impl Sequential {
+    pub fn new(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sequential> {
+        let headway = one_headway(options)?.map_or_else(|| "sampled".to_owned(), |headway| headway.to_string());
+        let (profile, options) = (profile.clone(), options.clone());
+        // The same complaint for every model: make it before any work.
+        let first = density.kde.points()[0].clone();
+        plan_points(&density, &[first], &profile, &options.models, &options.headways)?;
+        Ok(Sequential { density, profile, options, headway })
+    }
+
+    /// One model after the other.
+    pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
+        let (options, exposure) = (&self.options, self.density.exposure.as_ref());
+        let defence = match &options.estimator {
+            Estimator::Crude { .. } | Estimator::Subset => 0.0,
+            Estimator::Pilot(Pilot { defence, .. })
+            | Estimator::Given { defence, .. }
+            | Estimator::CrossEntropy { defence } => *defence,
+        };
+        let nominal = truncated(&self.density)?;
+        let mut result = SampleResult::default();
+        for &model in &options.models {
+            tracing::info!("{} on {}", model.name(), executor.backend.describe());
+            let lanes = LaneLimitState {
+                density: &self.density,
+                profile: &self.profile,
+                model,
+                criterion: options.criterion,
+                headway: options.headways.clone(),
+                executor: *executor,
+            };
+            let (estimate, level, proposal) = self.estimate(&nominal, &lanes)?;
+            let of = |proposal| scenario_shares(&lanes, proposal, defence, options.seed);
+            let shares = proposal.as_ref().map(of).transpose()?.flatten();
+            let row = EstimateRow::of_draws(model, options.criterion, self.headway.clone(), estimate, exposure);
+            result.rows.push(row.with_data(shares.as_ref(), exposure));
+            result.levels.extend(level);
+            let found = proposal.filter(|_| !matches!(options.estimator, Estimator::Given { .. }));
+            result.proposals.extend(found.map(|proposal| (model, proposal)));
+        }
+        Ok(result)
+    }
+
+    /// The estimate of one model, its levels, and the proposal that was sampled.
+    fn estimate(
+        &self,
+        nominal: &dyn Density,
+        lanes: &LaneLimitState,
+    ) -> Result<(Estimate, Option<Levels>, Option<Mixture>)> {
+        let SampleOptions { seed, level, stop, .. } = self.options;
+        let samples = stop.samples;
+        let importance_options = Importance { level, stop, ..Importance::new(seed, samples) };
+        match &self.options.estimator {
+            Estimator::Subset => {
+                let run = subset(nominal, lanes, &Subset { level, ..Subset::new(seed, samples) })?;
+                Ok((run.estimate, Some(Levels::Subset(run.levels)), None))
+            }
+            Estimator::CrossEntropy { defence } => {
+                let options = CrossEntropy {
+                    level,
+                    defence: *defence,
+                    stop,
+                    ..CrossEntropy::new(seed, (samples / 10).max(2000), samples)
+                };
+                let run = cross_entropy(nominal, lanes, &options)?;
+                Ok((run.estimate, Some(Levels::CrossEntropy(run.steps)), Some(run.proposal)))
+            }
+            Estimator::Pilot(pilot) => {
+                let fit = |points: &[Vec<f64>]| fitted(&self.density, points);
+                let (estimate, proposal) = from_pilot_with_proposal(nominal, lanes, &fit, pilot, &importance_options)?;
+                Ok((estimate, None, Some(proposal)))
+            }
+            Estimator::Given { proposals, defence } => {
+                let share = 1.0 / proposals.len() as f64;
+                let equal: Vec<(f64, &Mixture)> = proposals.iter().map(|m| (share, m)).collect();
+                let all = Mixture::join(&equal)?;
+                let prepared = |mixture: &Mixture| {
+                    let proposal = defended(mixture.clone(), nominal, *defence)?;
+                    // One proposal's valid share comes out of its own draws.
+                    let is_one = proposals.len() == 1;
+                    Ok(if is_one { proposal } else { proposal.with_counted_validity(seed, VALIDITY_DRAWS) })
+                };
+                let proposals: Vec<Defended> = proposals.iter().map(prepared).collect::<Result<_>>()?;
+                let estimate = match &proposals[..] {
+                    [one] => importance(nominal, one, lanes, &importance_options)?,
+                    several => {
+                        let draws = samples / several.len() as u64;
+                        let techniques: Vec<Technique> =
+                            several.iter().map(|proposal| Technique { proposal, draws }).collect();
+                        balance_heuristic(nominal, &techniques, lanes, seed, level)?
+                    }
+                };
+                Ok((estimate, None, Some(all)))
+            }
+            Estimator::Crude { .. } => Err(crate::Error::Internal("crude Monte Carlo has no sequence".to_owned())),
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! The cases of a study: scenarios and decompositions, from which the host makes every S and S', all at once or window
+//! by window.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::engine::lane_case::LaneCase;
+use crate::engine::plan::check_cases;
+use crate::engine::plan::{Block, CaseSource, LanePlan};
+use crate::engine::units::Units;
+use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
+use crate::run::study::plan_file::StudyHead;
+use crate::run::study::unit_record;
+use crate::scenario::parameterization::{
+    Kind, ParameterizationId, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
+};
+use crate::scenario::{Case, Category, Scenario, Tables};
+use crate::{Error, Place, Result};
+
+/// The cases of a study, or of an interval of its scenarios, as what they follow from, in 1 to 2 kB per scenario. Cases, ten times as
+/// large, are made for a window of scenarios at a time.
+pub struct StudyCases {
+    pub(crate) head: StudyHead,
+    pub(crate) outline: LanePlan,
+    /// One per block.
+    pub(crate) reductions: Vec<Option<Reduction>>,
+    pub(crate) held: Records,
+}
+
+/// Records of consecutive units.
+#[derive(Default)]
+pub(crate) struct Records {
+    /// Unit of the first one.
+    pub first: u64,
+    pub bytes: Vec<u8>,
+    /// Where each one ends.
+    pub ends: Vec<usize>,
+}
+
+impl Records {
+    /// Appends the record of the next unit.
+    pub fn push(&mut self, record: &[u8]) {
+        self.bytes.extend_from_slice(record);
+        self.ends.push(self.bytes.len());
+    }
+
+    pub fn get(&self, unit: u64) -> Option<&[u8]> {
+        let at = usize::try_from(unit.checked_sub(self.first)?).ok()?;
+        let end = *self.ends.get(at)?;
+        Some(&self.bytes[at.checked_sub(1).map_or(0, |before| self.ends[before])..end])
+    }
+
+    /// The units.
+    pub fn units(&self) -> Range<u64> {
+        self.first..self.first + self.ends.len() as u64
+    }
+}
+
+/// Cases of a window of units.
+struct CaseTable {
+    tables: Tables<f64>,
+    /// Per block: unit-major, variant-minor.
+    cases: Vec<Vec<LaneCase<f64>>>,
+    /// Per block: the unit of the first case.
+    first: Vec<u64>,
+    variants: Vec<usize>,
+}
+
+impl CaseSource for CaseTable {
+    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
+        self.cases[block][(unit - self.first[block]) as usize * self.variants[block] + variant]
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.tables
+    }
+}
+
+/// Scenarios whose cases are held at once, with some 25 kB each.
+pub(crate) const WINDOW: u64 = 2048;
+/// The same for a device, which wants many lanes at once.
+const DEVICE_WINDOW: u64 = 16_384;
+
+/// Scenarios whose cases are held before they are encoded.
+const ENCODED_AT_ONCE: u64 = 256;
+
+impl StudyCases {
+    /// The plan without cases: counts, keys, hash.
+    pub fn outline(&self) -> &LanePlan {
+        &self.outline
+    }
+
+    /// The plan with the cases of these units, which must be held.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case, or too short
+    /// for so many.
+    pub fn window(&self, units: Range<u64>) -> Result<LanePlan> {
+        let (plan, profile) = (&self.outline, &self.outline.profile);
+        let entries = self.entries(units.clone());
+        if entries > MAX_ENTRIES_AT_ONCE {
+            let problem = format!("{} s: the series of these scenarios have {entries:.1e} values", profile.frame.dt_s);
+            let help = "use a longer time step, or fewer or shorter scenarios at once (2.7e8 values, 2 GiB)";
+            return Err(Error::usage(Place::item("`frame.dt_s`"), problem, help));
+        }
+        let none = |block: &Block| Units::Held(block.units.len(), 0, Arc::new([]));
+        let mut held: Vec<Units> = plan.blocks.iter().map(none).collect();
+        let mut table = CaseTable {
+            tables: Tables::default(),
+            cases: vec![Vec::new(); held.len()],
+            first: vec![0; held.len()],
+            variants: plan.blocks.iter().map(|block| block.variants.len()).collect(),
+        };
+        for (at, inside) in plan.segments(units.clone()) {
+            let block = &plan.blocks[at];
+            let names: Vec<String> = inside.clone().map(|unit| block.units.name(unit).into_owned()).collect();
+            held[at] = Units::Held(block.units.len(), inside.start, names.into());
+            table.first[at] = inside.start;
+            table.cases[at].reserve_exact((inside.end - inside.start) as usize * block.variants.len());
+            let mut from = inside.start;
+            while from < inside.end {
+                let to = inside.end.min(from + ENCODED_AT_ONCE);
+                // Cases in parallel, records in order: the tables must not depend on the number of threads.
+                let cases: Vec<Vec<Case>> =
+                    (from..to).into_par_iter().map(|unit| self.cases(at, unit)).collect::<Result<_>>()?;
+                let records = cases.iter().flatten().map(|case| LaneCase::encode(case, profile, &mut table.tables));
+                table.cases[at].extend(records);
+                from = to;
+            }
+        }
+        check_cases(profile, &plan.blocks, &table, plan.segments(units))?;
+        Ok(plan.holding(held, Box::new(table)))
+    }
+
+    /// Gives plans of consecutive windows of an interval, each with at most so many units' cases.
+    ///
+    /// # Errors
+    /// Of `each`, and as [`StudyCases::window`].
+    pub fn in_windows(
+        &self,
+        units: Range<u64>,
+        most: u64,
+        mut each: impl FnMut(&LanePlan, Range<u64>) -> Result<()>,
+    ) -> Result<()> {
+        let mut from = units.start;
+        while from < units.end {
+            let mut to = units.end.min(from.saturating_add(most.max(1)));
+            while to - from > 1 && self.entries(from..to) > MAX_ENTRIES_AT_ONCE {
+                to = from + (to - from) / 2;
+            }
+            each(&self.window(from..to)?, from..to)?;
+            from = to;
+        }
+        Ok(())
+    }
+
+    /// Sweeps an interval, window by window; chunks come with the plan of their window.
+    ///
+    /// # Errors
+    /// As [`StudyCases::window`] and [`Executor::sweep`].
+    pub fn sweep(
+        &self,
+        units: Range<u64>,
+        wanted: Wanted,
+        executor: &Executor,
+        mut each: impl FnMut(&LanePlan, Chunk) -> Result<()>,
+    ) -> Result<SweepSummary> {
+        let window = if executor.fallback.is_some() { DEVICE_WINDOW } else { WINDOW };
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        self.in_windows(units, window, |plan, units| {
+            summary.add(&executor.sweep(plan, units, wanted, |chunk| each(plan, chunk))?);
+            Ok(())
+        })?;
+        Ok(summary)
+    }
+
+    /// How many values the series of these units' cases have together, at most.
+    fn entries(&self, units: Range<u64>) -> f64 {
+        let grid = TimeGrid::of(&self.outline.profile);
+        let of_segment = |(at, inside): (usize, Range<u64>)| {
+            let block = &self.outline.blocks[at];
+            let ids = parameterizations(block.category, self.reductions[at].is_some());
+            let records = inside.filter_map(|unit| self.held.get(block.first_unit + unit));
+            let durations = records.filter_map(|record| unit_record::read(record, block.category));
+            let steps: f64 = durations.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
+            steps * entries_per_step(block.category, ids)
+        };
+        self.outline.segments(units).into_iter().map(of_segment).sum()
+    }
+
+    /// S, then every S', of a unit of a block.
+    fn cases(&self, at: usize, unit: u64) -> Result<Vec<Case>> {
+        let block = &self.outline.blocks[at];
+        let record = self.held.get(block.first_unit + unit);
+        let scenario = record.and_then(|record| unit_record::read(record, block.category));
+        let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
+        let reduction = self.reductions[at].as_ref();
+        let ids: Vec<ParameterizationId> = parameterizations(block.category, reduction.is_some()).collect();
+        let grid = TimeGrid::of(&self.outline.profile);
+        cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)
+    }
+}
+
+/// Those of a category, with or without a decomposition.
+pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = ParameterizationId> {
+    ParameterizationId::of(category).filter(move |id| id.kind == Kind::Kinematic || has_reduction)
+}
+
+/// Entries of the cases that are in memory at once, at any time step: 2 GiB.
+const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
+
+/// Values in the series of a scenario per step, with its parameterizations: speed, lateral position and lateral speed of
+/// each that is sampled; in a cut-out the speed of the vehicle ahead; an LVD is centred.
+pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = ParameterizationId>) -> f64 {
+    let sampled = ids.filter(|id| id.kind != Kind::Kinematic || id.key == "ii").count() + 1;
+    let series = match category {
+        Category::CutIn => 3,
+        Category::CutOut => 4,
+        Category::Lvd => 1,
+    };
+    (sampled * series) as f64
+}
+
+/// S, then every S', of one scenario.
+fn cases_of(
+    scenario: &Scenario,
+    ids: &[ParameterizationId],
+    reduction: Option<&Reduction>,
+    grid: TimeGrid,
+    options: &ParameterizationOptions,
+) -> Result<Vec<Case>> {
+    let mut cases = vec![recorded_case(scenario, grid)?];
+    for id in ids {
+        cases.push(match (id.kind, reduction) {
+            (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, grid)?,
+            _ => id.kinematic_case(scenario, grid, options)?,
+        });
+    }
+    Ok(cases)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Read, Seek, SeekFrom};
+
+    use super::*;
+    use crate::model::profile::Profile;
+    use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    fn scenarios() -> Vec<Scenario> {
+        let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
+    }
+
+    fn outlined(scenarios: &[Scenario]) -> StudyOutline {
+        outline_study(scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_window_has_the_cases_of_its_scenarios_and_the_hash_of_the_whole() {
+        let scenarios = scenarios();
+        let StudyOutline { cases: study, reductions, .. } = outlined(&scenarios);
+        let (plan, options) = (study.outline(), ParameterizationOptions::default());
+        for (at, block) in plan.blocks.iter().enumerate() {
+            let reduction = &reductions[at];
+            let ids: Vec<ParameterizationId> = parameterizations(block.category, true).collect();
+            let kept = scenarios.iter().filter(|s| s.kept && s.category == block.category);
+            for (unit, scenario) in kept.enumerate().step_by(3) {
+                let window = study.window(block.first_unit + unit as u64..block.first_unit + unit as u64 + 1).unwrap();
+                assert_eq!(window.hash(), plan.hash());
+                assert_eq!(window.blocks[at].units.name(unit as u64), scenario.id);
+                let mut tables = Tables::default();
+                let cases = cases_of(scenario, &ids, Some(reduction), TimeGrid::of(&plan.profile), &options).unwrap();
+                for (variant, case) in cases.iter().enumerate() {
+                    let expected = LaneCase::encode(case, &plan.profile, &mut tables);
+                    assert_eq!(window.case(at, unit as u64, variant), expected, "{}", scenario.id);
+                }
+                assert_eq!(*window.tables(), tables, "{}", scenario.id);
+            }
+        }
+    }
+
+    /// Counts what is read.
+    struct Counted(Cursor<Vec<u8>>, usize);
+
+    impl Read for Counted {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            let count = self.0.read(buffer)?;
+            self.1 += count;
+            Ok(count)
+        }
+    }
+
+    impl Seek for Counted {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.0.seek(to)
+        }
+    }
+
+    #[test]
+    fn an_interval_is_read_alone_and_damage_in_it_is_found() {
+        // Enough for several pages.
+        let mut many = Vec::new();
+        for copy in 0..4 {
+            let renamed = scenarios().into_iter().map(|s| Scenario { id: format!("{}~{copy}", s.id), ..s });
+            many.extend(renamed);
+        }
+        let StudyOutline { cases: study, .. } = outlined(&many);
+        let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
+        assert!(units > 400, "{units}");
+        let read = |records: Vec<u8>, wanted: Range<u64>| {
+            let mut file = Counted(Cursor::new(records), 0);
+            let study = study.head().clone().read(&mut file, &Place::item("plan"), |_| wanted);
+            (study, file.1)
+        };
+        let (part, bytes) = read(records.clone(), 150..170);
+        let part = part.unwrap();
+        assert!(bytes < records.len() / 4, "{bytes} of {} bytes were read", records.len());
+        let ours = study.window(150..170).unwrap();
+        let theirs = part.window(150..170).unwrap();
+        assert_eq!((ours.hash(), ours.tables()), (theirs.hash(), theirs.tables()));
+        assert_eq!(
+            ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
+            theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
+        );
+        assert!(part.window(149..151).is_err() && part.records().is_err());
+        let told = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
+            Ok(_) => "read".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        for at in [0, records.len() / 2, records.len() - 1] {
+            let mut damaged = records.clone();
+            damaged[at] ^= 1;
+            assert!(told(damaged.clone(), 0..units).contains("are damaged"), "byte {at}");
+            let elsewhere = if at == 0 { units - 1..units } else { 0..1 };
+            assert_eq!(told(damaged, elsewhere), "read", "byte {at}");
+        }
+        assert!(told(records[1..].to_vec(), 0..1).contains("cut off"));
+        assert!(told([&records[..], b"x"].concat(), 0..1).contains("added to"));
+    }
+}

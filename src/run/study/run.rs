@@ -1,0 +1,173 @@
+//! A study's run: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the shards.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::planned::Study;
+use crate::engine::{Executor, Partial, SweepSummary, Wanted};
+use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
+use crate::support::interrupt;
+use crate::support::run_dir::{Results, STUDY_RECORD};
+use crate::{Error, Place, Result};
+
+/// What the lanes of a whole study gave.
+#[derive(Debug, Clone)]
+pub struct StudyResult {
+    /// The counts of every unit; [`Study::score`] makes the score table of them.
+    pub counts: Partial,
+    /// How the sweep went.
+    pub summary: SweepSummary,
+    /// Parts that were merged; 0 of a run in one piece.
+    pub parts: usize,
+}
+
+/// A run of a study, or of one of its shards, in a folder. It continues what an earlier process left in the journal.
+pub struct StudyRun<'s> {
+    study: &'s Study,
+    run_dir: RunDir,
+    state: RunState<Partial>,
+    summary: SweepSummary,
+}
+
+impl Study {
+    /// Runs every lane, in memory.
+    ///
+    /// # Errors
+    /// As [`Executor::sweep`]; [`Error::Usage`] for a time step that is too long for a case.
+    pub fn run(&self, executor: &Executor) -> Result<StudyResult> {
+        let mut counts = Vec::new();
+        let units = 0..self.plan().unit_count();
+        let summary = self.cases.sweep(units, Wanted::Verdicts, executor, |plan, chunk| {
+            counts.push(Partial::from_chunk(plan, &chunk)?);
+            Ok(())
+        })?;
+        let counts = counts.into_iter().try_fold(Partial::empty(self.plan()), Partial::merge)?;
+        Ok(StudyResult { counts, summary, parts: 0 })
+    }
+
+    /// Opens a run in a folder; `None` where the shard's part is there already, and whole.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
+    /// [`Error::Io`].
+    pub fn open(&self, out: &Path, shard: Option<Shard>) -> Result<Option<StudyRun<'_>>> {
+        let run_dir = RunDir {
+            out: out.to_path_buf(),
+            record: STUDY_RECORD,
+            run_sha256: self.run_sha256(shard.is_some())?,
+            shard,
+            unit_count: self.plan().unit_count(),
+        };
+        if run_dir.is_done::<Partial>()? {
+            return Ok(None);
+        }
+        let state = run_dir.begin(&[], true)?;
+        let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        Ok(Some(StudyRun { study: self, run_dir, state, summary }))
+    }
+
+    /// Runs a shard in a folder and leaves plan and part there. An interrupted one continues at the next call.
+    ///
+    /// # Errors
+    /// As [`Study::open`] and [`Study::run`]; [`Error::Interrupted`].
+    pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
+        self.write_plan(out)?;
+        let Some(mut run) = self.open(out, Some(shard))? else { return Ok(()) };
+        run.sweep(executor, |_| ())?;
+        run.write_part()
+    }
+
+    /// The study of a folder of parts with its counts: bit for bit those of the run in one piece.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged.
+    pub fn merge(out: &Path) -> Result<(Study, StudyResult)> {
+        Study::merge_or(out, &|shard| format!("run shard {shard}"))
+    }
+
+    /// The same; `again` says how a shard is made.
+    pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
+        // Only counts are joined: no scenario is needed.
+        let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
+        let plan = study.plan();
+        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again)?;
+        let mut summary = SweepSummary { lanes: plan.lane_count(), ..SweepSummary::default() };
+        let parts = found.len();
+        let mut counts = Partial::empty(plan);
+        for part in found {
+            summary.redone_lanes += part.lanes_redone_and_rechecked[0];
+            summary.rechecked_lanes += part.lanes_redone_and_rechecked[1];
+            counts = part.segments.into_iter().try_fold(counts, Partial::merge)?;
+        }
+        if !counts.is_complete(plan) || !counts.fits(plan) {
+            let problem = "the parts do not hold every unit that their names stand for";
+            return Err(Error::input(Place::file(out), problem, "make them again"));
+        }
+        Ok((study, StudyResult { counts, summary, parts }))
+    }
+}
+
+impl StudyRun<'_> {
+    /// The units: of the shard, or all.
+    pub fn units(&self) -> Range<u64> {
+        self.state.units.clone()
+    }
+
+    /// Units that no earlier process has counted.
+    ///
+    /// # Errors
+    /// Of the journal's counts.
+    pub fn missing(&mut self) -> Result<u64> {
+        Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
+    }
+
+    /// Runs the lanes that are missing; `progress` is told the units of every chunk.
+    ///
+    /// # Errors
+    /// As [`Study::run`]; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
+    pub fn sweep(&mut self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<SweepSummary> {
+        let _resumable = interrupt::resumable();
+        let ledger = &mut self.state.ledger;
+        for range in ledger.missing(self.state.units.clone())? {
+            let part = self.study.cases.sweep(range, Wanted::Verdicts, executor, |plan, chunk| {
+                progress(chunk.units.end - chunk.units.start);
+                ledger.add(Partial::from_chunk(plan, &chunk)?)
+            })?;
+            self.summary.add(&part);
+        }
+        Ok(self.summary)
+    }
+
+    /// Writes the part of a shard and removes its journal.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Internal`] where lanes are missing or the run is no shard.
+    pub fn write_part(self) -> Result<()> {
+        self.run_dir.finish(self.state, [self.summary.redone_lanes, self.summary.rechecked_lanes])
+    }
+
+    /// Takes the counts of a whole run.
+    ///
+    /// # Errors
+    /// None for what this program counts.
+    pub fn take_result(&mut self) -> Result<StudyResult> {
+        let counts = self.state.ledger.take()?.unwrap_or_else(|| Partial::empty(self.study.plan()));
+        Ok(StudyResult { counts, summary: self.summary, parts: 0 })
+    }
+
+    /// The files that a whole run leaves in its folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn results(&self) -> Result<Results<'_>> {
+        self.state.folder.results()
+    }
+
+    /// Removes the journal of a whole run whose results are written.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn close(self) -> Result<()> {
+        self.state.forget()
+    }
+}
