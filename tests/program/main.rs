@@ -12,6 +12,7 @@ mod messages;
 mod report_figures;
 mod report_page;
 mod report_width;
+mod rooms;
 mod shell;
 mod slurm_script;
 mod supply_chain;
