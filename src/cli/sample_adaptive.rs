@@ -41,8 +41,9 @@ impl Run<'_> {
         for &model in &self.models {
             tracing::info!("{} on {}", model.name(), self.opened.backend().describe());
             let (estimate, level, proposal) = self.estimate(&nominal, model, samples, results)?;
-            let of =
-                |proposal| scenario_shares(&self.limit_state(model), proposal, self.flags.defence, self.flags.seed());
+            let of = |proposal| {
+                scenario_shares(&self.limit_state(model), proposal, self.flags.defensive_weight, self.flags.seed())
+            };
             let shares = proposal.as_ref().map(of).transpose()?.flatten();
             let exposure = self.density.exposure.as_ref();
             let row = EstimateRow::of_draws(model, self.criterion, headway.clone(), estimate, exposure);
@@ -149,7 +150,7 @@ impl Run<'_> {
             EstimatorFlag::Ce => {
                 let options = CrossEntropy {
                     level: flags.level,
-                    defence: flags.defence,
+                    defence: flags.defensive_weight,
                     stop: self.stop(samples),
                     ..CrossEntropy::new(flags.seed(), (samples / 10).max(2000), samples)
                 };
@@ -163,9 +164,9 @@ impl Run<'_> {
                     &lanes,
                     &|points: &[Vec<f64>]| self.fitted(points),
                     &Pilot {
-                        worst: flags.worst_share,
-                        broad: flags.broad,
-                        defence: flags.defence,
+                        worst: flags.elite_fraction,
+                        broad: flags.broad_weight,
+                        defence: flags.defensive_weight,
                         ..Pilot::guarded(flags.pilot)
                     },
                     &importance_options,
@@ -180,7 +181,7 @@ impl Run<'_> {
                 let equal: Vec<(f64, &Mixture)> = mixtures.iter().map(|m| (1.0 / mixtures.len() as f64, m)).collect();
                 let all = Mixture::join(&equal)?;
                 let prepared = |mixture| {
-                    let proposal = defended(mixture, nominal, flags.defence)?;
+                    let proposal = defended(mixture, nominal, flags.defensive_weight)?;
                     // One proposal's valid share comes out of its own draws.
                     Ok(if is_one { proposal } else { proposal.with_counted_validity(flags.seed(), VALIDITY_DRAWS) })
                 };

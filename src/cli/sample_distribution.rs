@@ -116,7 +116,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let options = CrudeOptions {
         stop: StopRule {
             samples: count,
-            relative_half_width: flags.until,
+            relative_half_width: flags.half_width,
             time_limit: flags.time_limit.map(std::time::Duration::from_secs_f64),
             checkpoints: Checkpoints::Doubling,
         },
