@@ -4,7 +4,7 @@
 # How often does each driver model fail in the recorded scenarios (S) and in their parameterized counterparts (S'), at
 # which headway do the two part, and which scenarios change their verdict?
 #
-#     lanesweep study --lanes lanes.parquet
+#     lanesweep study --rows lanes.parquet
 #     pip install -r docs/examples/requirements.txt
 #     python docs/examples/from_parquet_to_figure.py lanes.parquet figure.png --category cut_in --param 2
 #

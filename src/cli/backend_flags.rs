@@ -14,10 +14,12 @@ use crate::{Error, Place, Result};
 /// Flags of every verb that sweeps.
 #[derive(Debug, Clone, Args)]
 pub struct BackendFlags {
-    /// What computes the lanes: auto (a GPU where there is one), cpu, gpu
+    /// What computes; auto: a GPU where there is one
     #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto")]
     backend: BackendChoice,
-    /// Device: a part of its name, its PCI bus id or its index in `lanesweep devices`
+    /// Device, by a part of its name, its PCI bus id or its index
+    ///
+    /// `lanesweep verify devices` lists the devices.
     #[arg(long, value_name = "NAME|pci:BUS|INDEX")]
     device: Option<DeviceName>,
 }

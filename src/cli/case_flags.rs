@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least, needed};
+use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::support::table::{TableFormat, TableReader};
 use crate::support::toml_file;
@@ -21,43 +21,44 @@ pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME")]
     category: Option<String>,
-    #[arg(long, value_name = "LIST", help = format!("Driver models, separated by commas: {}, or all", ModelId::names()))]
-    model: Option<String>,
-    /// Initial speed of the ego, m/s
-    #[arg(long, value_name = "MPS")]
+    #[arg(long, alias = "model", value_name = "LIST", help = super::lists::models_help())]
+    #[serde(alias = "model")]
+    models: Option<String>,
+    /// Initial speed of the ego
+    #[arg(long, value_name = "m/s")]
     ego_speed: Option<f64>,
-    /// Initial speed of the other vehicle, m/s [default: the ego's]
-    #[arg(long, value_name = "MPS")]
+    /// Initial speed of the other vehicle [default: the ego's]
+    #[arg(long, value_name = "m/s")]
     speed: Option<f64>,
-    /// Initial gap, m, bumper to bumper
-    #[arg(long, value_name = "M", conflicts_with = "thw")]
+    /// Initial gap, bumper to bumper
+    #[arg(long, value_name = "m", conflicts_with = "thw")]
     gap: Option<f64>,
-    /// Initial time headway, s, instead of the gap
-    #[arg(long, value_name = "SECONDS")]
+    /// Initial time headway instead of the gap
+    #[arg(long, value_name = "s")]
     thw: Option<f64>,
-    /// Cut-in, cut-out: lateral speed, m/s
-    #[arg(long, value_name = "MPS")]
+    /// Cut-in, cut-out: lateral speed
+    #[arg(long, value_name = "m/s")]
     lateral_speed: Option<f64>,
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "m")]
     lateral_distance: Option<f64>,
-    /// Acceleration of the other vehicle, m/s² [default: 0]
-    #[arg(long, value_name = "MPS2")]
+    /// Acceleration of the other vehicle [default: 0]
+    #[arg(long, value_name = "m/s²")]
     acceleration: Option<f64>,
-    /// Speed at which the acceleration ends, m/s [default: standstill, or never]
-    #[arg(long, value_name = "MPS")]
+    /// Speed at which the acceleration ends [default: standstill, or never]
+    #[arg(long, value_name = "m/s")]
     end_speed: Option<f64>,
-    /// Cut-out: speed of the vehicle ahead of the cutting-out one, m/s [default: 0]
-    #[arg(long, value_name = "MPS")]
+    /// Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
+    #[arg(long, value_name = "m/s")]
     ahead_speed: Option<f64>,
-    /// Cut-out: gap between the two, m, bumper to bumper
-    #[arg(long, value_name = "M")]
+    /// Cut-out: gap between the two, bumper to bumper
+    #[arg(long, value_name = "m")]
     ahead_gap: Option<f64>,
-    /// Length of every vehicle, m [default: the profile's]
-    #[arg(long, value_name = "M")]
+    /// Length of every vehicle [default: the profile's]
+    #[arg(long, value_name = "m")]
     length: Option<f64>,
-    /// Width of every vehicle, m [default: the profile's]
-    #[arg(long, value_name = "M")]
+    /// Width of every vehicle [default: the profile's]
+    #[arg(long, value_name = "m")]
     width: Option<f64>,
 }
 
@@ -71,7 +72,7 @@ impl CaseFlags {
         };
         CaseFlags {
             category: self.category.clone().or(other.category),
-            model: self.model.clone().or(other.model),
+            models: self.models.clone().or(other.models),
             ego_speed: self.ego_speed.or(other.ego_speed),
             speed: self.speed.or(other.speed),
             gap,
@@ -93,25 +94,24 @@ impl CaseFlags {
 
     /// Does it say anything of the case itself?
     pub(super) fn says_a_case(&self) -> bool {
-        CaseFlags { model: None, ..self.clone() } != CaseFlags::default()
+        CaseFlags { models: None, ..self.clone() } != CaseFlags::default()
     }
 
     /// The models that are named; `None` where none is.
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
-        self.model.as_ref().map(|_| self.models()).transpose()
+        self.models.as_ref().map(|_| self.models()).transpose()
     }
 
-    /// At least one model, each once, in the order given.
+    /// The models, each once, in the order given; all where none is named.
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {
-        let text = needed(self.model.as_ref(), "model", &format!("one of {}, or all", ModelId::names()))?;
-        if text.trim() == "all" {
+        let Some(text) = self.models.as_ref().filter(|text| text.trim() != "all") else {
             return Ok(ModelId::ALL.to_vec());
-        }
+        };
         let mut models = Vec::new();
         for name in text.split(',').map(str::trim) {
             let model = ModelId::parse(name).ok_or_else(|| {
                 let problem = format!("there is no driver model `{name}`");
-                Error::usage(Place::item("model"), problem, format!("use one of {}, or all", ModelId::names()))
+                Error::usage(Place::item("models"), problem, format!("use one of {}, or all", ModelId::names()))
             })?;
             if !models.contains(&model) {
                 models.push(model);

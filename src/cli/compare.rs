@@ -28,7 +28,7 @@ use crate::run::sampling::{
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::ParameterizationId;
-use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, Exposure, FitOptions};
+use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
@@ -51,7 +51,7 @@ const LEVEL: f64 = 0.95;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep compare\n  lanesweep compare recordings --categories cut-in --samples \
-                        1000000\n  lanesweep compare --scenarios scenarios.jsonl --parameterization i,iii --models \
+                        1000000\n  lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models \
                         FSM,RSS --thw 0.6,1.0")]
 pub struct Compare {
     /// Folder of highD-format recordings [default: synthetic recordings]
@@ -63,33 +63,26 @@ pub struct Compare {
     /// Folder for compare.csv, compare.json and compare.txt
     #[arg(long, value_name = "DIR", default_value = "lanesweep-compare")]
     out: PathBuf,
-    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    categories: Vec<String>,
-    /// Parameterizations, separated by commas: 1…7, a…g, i…v, or all [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    parameterization: Vec<String>,
-    /// Driver models, separated by commas [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    models: Vec<String>,
-    /// Time headways in seconds, separated by commas, or `paper` (2.0, 1.8, … 0.2)
-    #[arg(long, value_name = "LIST|paper", default_value = "paper")]
+    #[command(flatten)]
+    categories: lists::CategoriesFlag,
+    #[command(flatten)]
+    parameterizations: lists::ParameterizationsFlag,
+    #[command(flatten)]
+    models: lists::ModelsFlag,
+    /// Time headways; paper is 2.0, 1.8, … 0.2
+    #[arg(long, value_name = "s,s,…|paper", default_value = "paper")]
     thw: String,
-    /// Samples of each density; every sample runs from every headway
+    /// Samples of each density; each runs from every headway
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     samples: u64,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 157)]
     seed: u64,
-    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    /// Print lanes, memory and estimated time; write nothing
     #[arg(long)]
     dry_run: bool,
-    /// Hours driven for the scenarios, of all egos together [default: from the recordings]
-    #[arg(long, value_name = "H")]
-    hours: Option<f64>,
-    /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
-    #[arg(long, value_name = "KM")]
-    km: Option<f64>,
+    #[command(flatten)]
+    exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -121,13 +114,12 @@ impl Compare {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         let config = &configured.settings;
-        let categories = source::categories(&self.categories, "--categories")?;
-        let ids = lists::parameterizations(&categories, &self.parameterization)?;
-        let models = lists::models(&self.models)?;
+        let categories = self.categories.list()?;
+        let ids = self.parameterizations.list(&categories)?;
+        let models = self.models.list()?;
         let headways = lists::paper_or_headways(&self.thw)?;
         self.check_samples()?;
-        let typed = Driven { hours: self.hours, kilometres: self.km };
-        typed.validate()?;
+        let typed = self.exposure.driven()?;
         let profile = self.profile.load()?;
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::backend_flags::BackendFlags;
 use super::configured::Configured;
+use super::shell::{Completions, Man};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, console};
 use crate::cli::settings::{
@@ -16,7 +17,7 @@ use crate::interop::cluster::quoted_word;
 use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
-/// Write, check and explain configurations
+/// Configurations, completions for your shell, manual pages
 ///
 /// Every option has a default; a file (--config FILE), the environment (LANESWEEP_RUN_BACKEND, …), --config KEY=VALUE and
 /// a flag of its own (--backend) set it, the later winning. No file is read that is not named.
@@ -36,6 +37,8 @@ enum ConfigVerb {
     Show(Box<Show>),
     Check(Check),
     Schema(Schema),
+    Completions(Completions),
+    Man(Man),
 }
 
 /// Write the commented default configuration: every key with its default, unit, range and source
@@ -113,6 +116,8 @@ impl Config {
             ConfigVerb::Show(verb) => verb.run(configured),
             ConfigVerb::Check(verb) => verb.run(),
             ConfigVerb::Schema(verb) => verb.run(),
+            ConfigVerb::Completions(verb) => verb.run(),
+            ConfigVerb::Man(verb) => verb.run(),
         }
     }
 }

@@ -41,13 +41,13 @@ pub(super) const FLAGS: [(&str, &str, &str); 30] = [
     ("sample", "points", "sample.points"),
     ("sample", "interval", "sample.interval"),
     ("sample", "level", "sample.level"),
-    ("sample", "until", "sample.until"),
+    ("sample", "half_width", "sample.half_width"),
     ("sample", "time_limit", "sample.time_limit_s"),
     ("sample", "worst", "sample.worst"),
     ("sample", "pilot", "sample.pilot"),
-    ("sample", "worst_share", "sample.worst_share"),
-    ("sample", "broad", "sample.broad"),
-    ("sample", "defence", "sample.defence"),
+    ("sample", "elite_fraction", "sample.elite_fraction"),
+    ("sample", "broad_weight", "sample.broad_weight"),
+    ("sample", "defensive_weight", "sample.defensive_weight"),
     ("sample", "bootstrap", "sample.bootstrap"),
     ("sample", "bootstrap_samples", "sample.bootstrap_samples"),
     ("sample", "seed", "sample.seed"),
@@ -61,7 +61,7 @@ const OF_THE_PLAN: [&str; 7] =
 
 /// The command line, with `--config` for every verb.
 pub(super) fn command() -> Command {
-    with_config(Cli::command())
+    super::help::laid_out(with_config(Cli::command()))
 }
 
 /// A flag of each level's own: of a global one, what stands before the verb is lost where it stands after it too.
@@ -70,9 +70,10 @@ fn with_config(mut command: Command) -> Command {
     for name in names {
         command = command.mut_subcommand(name, with_config);
     }
-    let help = "Configuration file (`lanesweep config init` writes one), or one key of it; repeatable [default: \
-                LANESWEEP_CONFIG]";
-    command.arg(Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append).help(help))
+    let help = "Configuration file, or one key of it; repeatable";
+    let more = "`lanesweep config init` writes such a file. Without --config, LANESWEEP_CONFIG names it.";
+    let arg = Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append);
+    command.arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
 }
 
 impl Configured {
@@ -82,8 +83,8 @@ impl Configured {
     /// As [`Layers::read`]; [`Error::Usage`] for a value that the verb's flag does not take.
     pub fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
         let (path, typed, last) = verb_of(matches);
-        if path == ["slurm"] && !typed.is_empty() {
-            let help = "give it to the run: lanesweep slurm … -- study --config FILE";
+        if path.last() == Some(&"slurm") && !typed.is_empty() {
+            let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
             return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
         }
         if !reads_configuration(&path) {
@@ -206,7 +207,12 @@ impl Configured {
 
 /// Verbs that neither take settings nor need the environment to be in order.
 fn reads_configuration(path: &[&str]) -> bool {
-    !matches!(path, ["completions" | "man" | "slurm", ..] | ["config", "init" | "schema" | "check"])
+    !matches!(
+        path,
+        ["completions" | "man" | "slurm", ..]
+            | ["cluster", "slurm"]
+            | ["config", "init" | "schema" | "check" | "completions" | "man"]
+    )
 }
 
 /// The verb, and the verb below it, with what `--config` was given before and after them, and the last one's matches.

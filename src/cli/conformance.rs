@@ -1,4 +1,4 @@
-//! `lanesweep conformance`: other simulators' tables against our lanes.
+//! `lanesweep verify conformance`: other simulators' tables against our lanes.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -20,31 +20,31 @@ use crate::{Error, Place, Result};
 /// Compare golden tables of simulated cases with our own lanes
 ///
 /// JRC case tables and function tables are run under the profile jrc-2021 in f64; lanes of the paper
-/// profile (--scenarios with --lanes) in f64 and in f32. Ends with code 5 if a collision label differs,
+/// profile (--scenarios with --golden-lanes) in f64 and in f32. Ends with code 5 if a collision label differs,
 /// or on a robust row a type, a verdict or a value (by more than 1e-6).
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep conformance cutin.csv lvd.csv cutout.csv functions.csv")]
+#[command(after_help = "Example:\n  lanesweep verify conformance cutin.csv lvd.csv cutout.csv functions.csv")]
 pub struct Conformance {
     /// JRC case tables or function tables (CSV)
     #[arg(value_name = "FILE")]
     tables: Vec<PathBuf>,
     /// Scenarios that the lanes were run on (JSON Lines)
-    #[arg(long, value_name = "FILE", requires = "lanes")]
+    #[arg(long, value_name = "FILE", requires = "golden_lanes")]
     scenarios: Option<PathBuf>,
-    /// Lanes of the paper profile (CSV)
-    #[arg(long, value_name = "FILE", requires = "scenarios")]
-    lanes: Option<PathBuf>,
+    /// Golden lanes of the paper profile (CSV)
+    #[arg(long, alias = "lanes", value_name = "FILE", requires = "scenarios")]
+    golden_lanes: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,
 }
 
 impl Conformance {
     pub fn run(&self) -> Result<Exit> {
-        if self.tables.is_empty() && self.lanes.is_none() {
+        if self.tables.is_empty() && self.golden_lanes.is_none() {
             return Err(Error::usage(
                 Place::item("conformance"),
                 "there is nothing to compare",
-                "give JRC tables, or --scenarios and --lanes",
+                "give JRC tables, or --scenarios and --golden-lanes",
             ));
         }
         let mut tallies = Vec::new();
@@ -58,7 +58,7 @@ impl Conformance {
         }
         let mut text = String::new();
         let mut compared = None;
-        if let (Some(scenarios), Some(lanes)) = (&self.scenarios, &self.lanes) {
+        if let (Some(scenarios), Some(lanes)) = (&self.scenarios, &self.golden_lanes) {
             let mut seen = compare_lanes(&read_scenarios(scenarios)?, &Table::read(lanes)?, &Profile::load("paper")?)?;
             let _ = writeln!(
                 text,

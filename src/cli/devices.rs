@@ -1,4 +1,4 @@
-//! `lanesweep devices`: what this machine can compute on.
+//! `lanesweep verify devices`: what this machine can compute on.
 
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ use crate::{Error, Result};
 /// Every device of every driver, with its limits, and the one that `--backend auto` takes. CUDA_VISIBLE_DEVICES
 /// and Slurm's GPU list are honoured.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep devices --format json")]
+#[command(after_help = "Example:\n  lanesweep verify devices --format json")]
 pub struct Devices {
     #[command(flatten)]
     format: FormatFlag,

@@ -10,7 +10,6 @@ use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, ProfileFlags};
 use crate::interop::openscenario::{EgoMotion, export_folder};
-use crate::model::criterion::Criterion;
 use crate::report::records::document;
 use crate::scenario::Side;
 use crate::support::files::check_folder;
@@ -20,7 +19,7 @@ use crate::{Error, Place, Result};
 /// Write scenarios for other simulators
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  lanesweep export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 \
+    after_help = "Example:\n  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \
                   --lateral-speed 1.0 --out played"
 )]
 pub struct Export {
@@ -49,9 +48,9 @@ impl Export {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(
-    after_help = "Examples:\n  lanesweep export xosc --from lanesweep-out --worst 5 --model FSM --ego external --out \
+    after_help = "Examples:\n  lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out \
                   worst\n  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS \
-                  --out played\n  lanesweep export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw \
+                  --out played\n  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw \
                   1.2 --lateral-speed 1.0 --out played"
 )]
 pub struct Xosc {
@@ -62,36 +61,39 @@ pub struct Xosc {
     /// TOML file with the case
     #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"])]
     case_file: Option<PathBuf>,
-    /// Folder (--out) of a `lanesweep study` or `lanesweep sample`, for --lane or --worst
+    /// Folder (--out) of a study or sample, for --lane or --worst
     #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"])]
     from: Option<PathBuf>,
-    /// Scenario file (JSON Lines) for --lane; with --from a study: its scenarios, for sizes, side and lane width
+    /// Scenario file for --lane
+    ///
+    /// With --from a study: the study's scenarios, for sizes, side and lane width.
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
-    /// Lane key: scenario/variant/headway/model, as errors and tables print it; repeatable
+    /// Lane key: scenario/variant/headway/model; repeatable
     #[arg(long, value_name = "KEY")]
     lane: Vec<String>,
-    /// So many of the run's worst lanes per model: of a sampling run those of worst.csv, of a study the scenarios with
-    /// the smallest margin, each with its worst lane
+    /// The N worst lanes of the run per model
+    ///
+    /// Of a sampling run: those of worst.csv. Of a study: the scenarios with the smallest margin of --criterion, each with
+    /// its worst lane.
     #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
     worst: Option<usize>,
-    /// Criterion of --worst of a study
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
-    criterion: String,
-    /// Variants of --worst of a study, separated by commas: S (recorded), keys of parameterizations [default: all]
+    #[command(flatten)]
+    criterion: super::lists::CriterionFlag,
+    /// Variants of --worst: S, keys of parameterizations [default: all]
     #[arg(long, value_name = "LIST", requires = "worst", value_delimiter = ',')]
     variant: Vec<String>,
     /// Who drives the ego
     #[arg(long, value_enum, default_value_t)]
     ego: EgoFlag,
-    /// End of a scenario with --ego external, s [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "SECONDS")]
+    /// End with --ego external [default: 10 s after the lane's last event and end]
+    #[arg(long, value_name = "s")]
     duration: Option<f64>,
-    /// Side that the other vehicle comes from or leaves to [default: the scenario's where it is known, else left]
+    /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
     #[arg(long, value_enum)]
     side: Option<SideFlag>,
-    /// Width of the road's lanes, m [default: the scenario's where it is known, else 3.5]
-    #[arg(long, value_name = "M")]
+    /// Width of the road's lanes [default: the scenario's, else 3.5]
+    #[arg(long, value_name = "m")]
     lane_width: Option<f64>,
     /// Folder of the files
     #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc")]
@@ -149,7 +151,7 @@ impl Xosc {
                     return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
                 }
                 let worst = self.worst.map(|count| (count, &self.variant[..]));
-                of_run(dir, &source, worst, self.criterion()?, scenarios.as_deref(), extras)
+                of_run(dir, &source, worst, self.criterion.get()?, scenarios.as_deref(), extras)
             }
             (None, Some(path)) if self.lane.is_empty() => {
                 let problem = format!("{} has many lanes", path.display());
@@ -193,12 +195,5 @@ impl Xosc {
         });
         let implausible = self.plausibility.policy();
         Ok(Extras { ego, duration_s: self.duration, side, lane_width_m: self.lane_width, implausible })
-    }
-
-    fn criterion(&self) -> Result<Criterion> {
-        Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
-            let problem = format!("there is no criterion `{}`", self.criterion);
-            Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
-        })
     }
 }

@@ -37,7 +37,7 @@ const MAX_VALID_DRAWS: u64 = 1_000_000_000;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
-                        scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterization 2 \
+                        scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterizations 2 \
                         --with-thw --out cut-in-2.json")]
 pub struct Fit {
     /// Folder of highD-format recordings [default: synthetic recordings]
@@ -46,36 +46,30 @@ pub struct Fit {
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
-    /// Folder for density files, or one file (.json) where one density is fitted
+    /// Folder of density files, or one file.json for one density
     #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities")]
     out: PathBuf,
-    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    category: Vec<String>,
-    /// Parameterizations, separated by commas: 1…7, a…g, i…v, or all [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    parameterization: Vec<String>,
+    #[command(flatten)]
+    categories: lists::CategoriesFlag,
+    #[command(flatten)]
+    parameterizations: lists::ParameterizationsFlag,
     /// Make the observed time headway one more parameter (thw_s)
     #[arg(long)]
     with_thw: bool,
     /// Interval that the bandwidth is searched in
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true, default_value_t)]
     bandwidth_rule: BandwidthInterval,
     /// Seed of P_valid and of the splits for M
     #[arg(long, value_name = "N", default_value_t = FitOptions::default().seed)]
     seed: u64,
     /// Draws that P_valid is counted on
-    #[arg(long, value_name = "N", default_value_t = FitOptions::default().valid_draws)]
+    #[arg(long, hide = true, value_name = "N", default_value_t = FitOptions::default().valid_draws)]
     valid_draws: u64,
     /// Do not compare drawn with unseen scenarios
     #[arg(long)]
     no_comparison: bool,
-    /// Hours driven for the scenarios, of all egos together [default: from the recordings]
-    #[arg(long, value_name = "H")]
-    hours: Option<f64>,
-    /// Kilometres driven for the scenarios, of all egos together [default: from the recordings]
-    #[arg(long, value_name = "KM")]
-    km: Option<f64>,
+    #[command(flatten)]
+    exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -88,8 +82,7 @@ impl Fit {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let config = &configured.settings;
         let ids = self.ids()?;
-        let typed = Driven { hours: self.hours, kilometres: self.km };
-        typed.validate()?;
+        let typed = self.exposure.driven()?;
         let options = FitOptions {
             parameterization: config.parameterization.clone(),
             with_thw: self.with_thw,
@@ -159,7 +152,7 @@ impl Fit {
 
     /// What is fitted, in the registry's order.
     fn ids(&self) -> Result<Vec<ParameterizationId>> {
-        lists::parameterizations(&source::categories(&self.category, "--category")?, &self.parameterization)
+        self.parameterizations.list(&self.categories.list()?)
     }
 
     /// One file per density, none of them an input.
@@ -169,7 +162,7 @@ impl Fit {
             return Err(Error::usage(
                 Place::item("--out"),
                 format!("{} is one file, but {} densities are fitted", self.out.display(), ids.len()),
-                "give a folder, or choose one with --parameterization",
+                "give a folder, or choose one with --parameterizations",
             ));
         }
         let name = |id: &ParameterizationId| match single {

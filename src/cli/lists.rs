@@ -1,17 +1,137 @@
-//! Lists of models, headways and parameterizations as several verbs take them.
+//! Flags that several verbs take, each with one definition: lists of categories, models, headways and
+//! parameterizations, the criterion, the exposure. A plural takes a list and is everything where it is left out.
 
+use clap::Args;
+
+use super::source;
 use crate::engine::Headway;
+use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::scenario::parameterization::ParameterizationId;
+use crate::stats::density::Driven;
 use crate::{Error, Place, Result};
+
+/// `--categories`.
+#[derive(Debug, Clone, Args)]
+pub struct CategoriesFlag {
+    /// Kinds of scenario: cut-in, cut-out, lvd [default: all]
+    #[arg(long, alias = "category", value_name = "LIST", value_delimiter = ',')]
+    categories: Vec<String>,
+}
+
+impl CategoriesFlag {
+    /// In the order of every table.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a category that there is not.
+    pub fn list(&self) -> Result<Vec<Category>> {
+        source::categories(&self.categories, "--categories")
+    }
+}
+
+/// `--parameterizations`.
+#[derive(Debug, Clone, Args)]
+pub struct ParameterizationsFlag {
+    /// Parameterizations: 1…7, a…g, i…v [default: all]
+    ///
+    /// 1…7 are of cut-ins, a…g of cut-outs, i…v of leader decelerations.
+    #[arg(long, alias = "parameterization", value_name = "LIST", value_delimiter = ',')]
+    parameterizations: Vec<String>,
+}
+
+impl ParameterizationsFlag {
+    /// Those of the categories, in the registry's order.
+    ///
+    /// # Errors
+    /// As [`parameterizations`].
+    pub fn list(&self, categories: &[Category]) -> Result<Vec<ParameterizationId>> {
+        parameterizations(categories, &self.parameterizations)
+    }
+}
+
+/// `--models`.
+#[derive(Debug, Clone, Args)]
+pub struct ModelsFlag {
+    #[arg(long, alias = "model", value_name = "LIST", value_delimiter = ',', help = models_help())]
+    models: Vec<String>,
+}
+
+impl ModelsFlag {
+    /// In the order of every table; all where none is named.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a model that there is not.
+    pub fn list(&self) -> Result<Vec<ModelId>> {
+        models(&self.models)
+    }
+
+    /// Those that are named; `None` where none is.
+    ///
+    /// # Errors
+    /// As [`ModelsFlag::list`].
+    pub fn named(&self) -> Result<Option<Vec<ModelId>>> {
+        (!self.models.is_empty()).then(|| self.list()).transpose()
+    }
+}
+
+/// What `--models` takes.
+pub fn models_help() -> String {
+    format!("Driver models: {} [default: all]", ModelId::names())
+}
+
+/// `--criterion`.
+#[derive(Debug, Clone, Args)]
+pub struct CriterionFlag {
+    /// Criterion to map, rank or estimate
+    ///
+    /// Of worst lanes, failure maps, shares and stop rules, and of the adaptive estimators.
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
+    criterion: String,
+}
+
+impl CriterionFlag {
+    /// The criterion.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for one that there is not.
+    pub fn get(&self) -> Result<Criterion> {
+        Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
+            let problem = format!("there is no criterion `{}`", self.criterion);
+            Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
+        })
+    }
+}
+
+/// `--hours` and `--km`.
+#[derive(Debug, Clone, Args)]
+pub struct ExposureFlags {
+    /// Time driven, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "h")]
+    hours: Option<f64>,
+    /// Distance driven, of all egos together [default: from the recordings]
+    #[arg(long, value_name = "km")]
+    km: Option<f64>,
+}
+
+impl ExposureFlags {
+    /// What was typed, checked.
+    ///
+    /// # Errors
+    /// As [`Driven::validate`].
+    pub fn driven(&self) -> Result<Driven> {
+        let driven = Driven { hours: self.hours, kilometres: self.km };
+        driven.validate()?;
+        Ok(driven)
+    }
+}
 
 /// The models of `--models`, in the order of every table; all where none is given.
 ///
 /// # Errors
 /// [`Error::Usage`] for a model that there is not.
-pub fn models(list: &[String]) -> Result<Vec<ModelId>> {
-    if list.is_empty() {
+fn models(list: &[String]) -> Result<Vec<ModelId>> {
+    if list.is_empty() || list.iter().any(|name| name.trim() == "all") {
         return Ok(ModelId::ALL.to_vec());
     }
     let parse = |text: &String| {
@@ -54,12 +174,12 @@ pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
     }
 }
 
-/// The parameterizations of `--parameterization` among those of some categories, in the registry's order; all where
+/// The parameterizations of `--parameterizations` among those of some categories, in the registry's order; all where
 /// none is given.
 ///
 /// # Errors
 /// [`Error::Usage`] for one that the categories do not have.
-pub fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<ParameterizationId>> {
+fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<ParameterizationId>> {
     let of_categories = || ParameterizationId::ALL.into_iter().filter(|p| categories.contains(&p.category));
     let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
     if wanted.is_empty() || wanted.contains(&"all") {
@@ -72,7 +192,7 @@ pub fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec
         };
         let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
         return Err(Error::usage(
-            Place::item("--parameterization"),
+            Place::item("--parameterizations"),
             format!("there is no parameterization `{unknown}` of {}", names.join(", ")),
             format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
         ));

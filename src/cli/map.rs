@@ -38,52 +38,56 @@ const BYTES_OF_SHEETS: u64 = 3 << 20;
 /// make any other. Writes a sheet per grid and model (SVG), cells.csv, differences.csv and map.json; the shares go to
 /// stdout.
 #[derive(Debug, Args)]
-#[command(after_help = after_help())]
+#[command(after_help = EXAMPLES, after_long_help = after_long_help())]
 pub struct Map {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(value_name = "CATEGORY")]
     category: String,
-    /// Grids: jrc
+    /// Grids with models of their own: jrc
     #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
     preset: Option<String>,
-    /// OpenSCENARIO file with deterministic distributions of parameters: its first two with several values are the axes,
-    /// unless --x and --y name others; the rest part the panels
+    /// OpenSCENARIO file with deterministic distributions
+    ///
+    /// The first two parameters with several values are the axes, unless --x and --y name others; the rest part the panels.
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
     distribution: Option<PathBuf>,
-    /// With --distribution: a parameter of the file is one of ours, times a factor for its unit; repeatable
+    /// With --distribution: parameter of the file that is one of ours, times a factor; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     rename: Vec<Rename>,
-    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C; with --distribution also a NAME of the file's
+    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C
+    ///
+    /// With --distribution also a NAME of the file's.
     #[arg(long, value_name = "NAME=RANGE")]
     x: Option<String>,
     /// Parameter upwards
     #[arg(long, value_name = "NAME=RANGE")]
     y: Option<String>,
-    /// Parameter that parts the panels; several make a panel of every combination
+    /// Parameter that parts the panels; repeatable
+    ///
+    /// Several make a panel of every combination.
     #[arg(long, value_name = "NAME=RANGE")]
     panel: Vec<String>,
-    /// Value that is the same in every cell
+    /// Value that is the same in every cell; repeatable
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
     /// Only panels in which the ego is faster than the other vehicle
     #[arg(long)]
     closing: bool,
-    /// Every model starts at the distance at which it follows in the JRC's simulator, instead of gap_m or thw_s
+    /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s
     #[arg(long)]
     native_gap: bool,
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help = format!("Driver models [default: {}; a preset's own]", ModelId::names()))]
-    models: Vec<String>,
-    /// Criterion of shares, sheets and differences
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
-    criterion: String,
-    /// A model or a profile: maps where it and each of the models differ
+    #[command(flatten)]
+    models: lists::ModelsFlag,
+    #[command(flatten)]
+    criterion: lists::CriterionFlag,
+    /// Model or profile; maps where it and the models differ
     #[arg(long, value_name = "MODEL|PROFILE")]
     against: Option<String>,
-    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file [default: paper; with --preset jrc: jrc-2021]
+    /// paper, paper-fit, jrc-2021, un-r157 [default: paper; preset jrc: jrc-2021]
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// Time step, s [default: the profile's]
-    #[arg(long, value_name = "SECONDS")]
+    /// Time step [default: the profile's]
+    #[arg(long, value_name = "s")]
     dt: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
@@ -94,7 +98,7 @@ pub struct Map {
     /// Compute in binary64 on the CPU: the reference of the lane arithmetic
     #[arg(long)]
     reference: bool,
-    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    /// Print lanes, memory and estimated time; write nothing
     #[arg(long)]
     dry_run: bool,
     /// Folder of the results
@@ -102,7 +106,10 @@ pub struct Map {
     out: PathBuf,
 }
 
-fn after_help() -> String {
+const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  lanesweep map cut-in --preset jrc --out maps\n  \
+                        lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
+
+fn after_long_help() -> String {
     let names: Vec<&str> = PARAMETERS.iter().map(|p| p.key).collect();
     format!(
         "Parameters: {}\n\nExamples:\n  lanesweep map cut-in --preset jrc --out maps\n  lanesweep map cut-in --x \
@@ -120,12 +127,12 @@ impl Map {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
         })?;
-        let criterion = criterion(&self.criterion)?;
+        let criterion = self.criterion.get()?;
         let profile = self.profile()?;
         let against = self.against.as_deref().map(|text| against(text, self.dt)).transpose()?;
         let is_itself = match &against {
             Some(Against::Profile(other)) => **other == profile,
-            Some(Against::Model(model)) => matches!(&lists::models(&self.models)?[..], [one] if one == model),
+            Some(Against::Model(model)) => matches!(&self.models.list()?[..], [one] if one == model),
             None => false,
         };
         if is_itself {
@@ -225,8 +232,7 @@ impl Map {
                 vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent, is_chosen_to_match: false }]
             }
         };
-        if !self.models.is_empty() {
-            let models = lists::models(&self.models)?;
+        if let Some(models) = self.models.named()? {
             grids.iter_mut().for_each(|preset| preset.models = models.clone());
         }
         Ok(grids)
@@ -420,14 +426,6 @@ fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {
         Some(dt) => profile.with_dt(dt),
         None => Ok(profile),
     }
-}
-
-fn criterion(text: &str) -> Result<Criterion> {
-    let found = Criterion::ALL.into_iter().find(|c| c.key() == text.to_ascii_lowercase());
-    found.ok_or_else(|| {
-        let problem = format!("there is no criterion `{text}`");
-        Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
-    })
 }
 
 /// A model's name, or else a profile.

@@ -1,4 +1,4 @@
-//! `lanesweep merge`: the parts of a run become its result, bit for bit that of the run in one piece.
+//! `lanesweep cluster merge`: the parts of a run become its result, bit for bit that of the run in one piece.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ use crate::{Error, Place, Result};
 /// goes into DIR and is, bit for bit, that of the run in one piece.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
-                        result\n  lanesweep merge result")]
+                        result\n  lanesweep cluster merge result")]
 pub struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR")]

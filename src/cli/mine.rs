@@ -23,14 +23,14 @@ use crate::traffic::mining::counts_text;
 /// its series, or one row where FILE ends in .parquet; `study --scenarios FILE` reads it. How long and how far the recordings' vehicles drove is written
 /// beside it (FILE with the ending .exposure.json), so that `fit --scenarios FILE` can tell events per hour.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep mine recordings -o scenarios.jsonl")]
+#[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
 pub struct Mine {
     /// Folder of highD-format recordings
     #[arg(value_name = "DIR")]
     dir: PathBuf,
-    /// File to write: .jsonl or .parquet [default: standard output, JSON Lines]
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    /// File to write, .jsonl or .parquet [default: standard output, JSON Lines]
+    #[arg(long, short_alias = 'o', alias = "output", value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Only scenarios that pass the paper's filters
     #[arg(long)]
     kept: bool,
@@ -46,21 +46,21 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 
 impl Mine {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
-        if let Some(path) = &self.output {
-            source::refuse_recording(path, &self.dir, "--output")?;
+        if let Some(path) = &self.out {
+            source::refuse_recording(path, &self.dir, "--out")?;
             check_scenario_file(path)?;
-            source::refuse_overwriting(path, configured.files(), "--output")?;
+            source::refuse_overwriting(path, configured.files(), "--out")?;
             // Before the work: a file that cannot be written is known at once.
             AtomicFile::create(path).map(drop)?;
         }
-        let _lock = self.output.as_deref().map(lock_of).transpose()?;
+        let _lock = self.out.as_deref().map(lock_of).transpose()?;
         let from = Source::Folder(self.dir.clone());
         let mut collection = from.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
         tracing::info!("{}", counts_text(&collection.scenarios));
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }
-        match &self.output {
+        match &self.out {
             Some(path) => {
                 // What was driven is that of this file: the former goes first, the new one comes last.
                 ExposureFile::remove_beside(path)?;

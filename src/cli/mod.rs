@@ -3,6 +3,7 @@
 
 mod backend_flags;
 mod case_flags;
+mod cluster;
 mod compare;
 mod config;
 mod configured;
@@ -16,6 +17,7 @@ mod export_lanes;
 mod export_worst;
 mod fit;
 mod format;
+mod help;
 mod lists;
 mod map;
 mod merge;
@@ -58,7 +60,7 @@ use crate::{Error, Place, Result};
     about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios",
     long_about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios and tells how \
                   far the parameterized ones agree with the recorded ones.\n\nStart with: lanesweep study",
-    after_help = Exit::table(),
+    after_long_help = Exit::table(),
     arg_required_else_help = true
 )]
 struct Cli {
@@ -100,29 +102,39 @@ enum Verb {
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
-    Merge(merge::Merge),
     Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
     Export(export::Export),
-    Slurm(slurm::Slurm),
-    Conformance(conformance::Conformance),
-    Verify(verify::Verify),
-    Devices(devices::Devices),
+    Cluster(cluster::Cluster),
+    Verify(Box<verify::Verify>),
     Config(config::Config),
+    // Where these stood in the release before.
+    #[command(hide = true)]
+    Merge(merge::Merge),
+    #[command(hide = true)]
+    Slurm(slurm::Slurm),
+    #[command(hide = true)]
+    Conformance(conformance::Conformance),
+    #[command(hide = true)]
+    Devices(devices::Devices),
+    #[command(hide = true)]
     Completions(shell::Completions),
+    #[command(hide = true)]
     Man(shell::Man),
 }
 
 /// Profile flags of every verb that simulates.
 #[derive(Debug, Clone, Args)]
 struct ProfileFlags {
-    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file
+    /// paper, paper-fit, jrc-2021, un-r157
+    ///
+    /// Or a TOML file of your own.
     #[arg(long, default_value = "paper", value_name = "NAME|FILE")]
     profile: String,
-    /// Time step, s [default: the profile's]
-    #[arg(long, value_name = "SECONDS")]
+    /// Time step [default: the profile's]
+    #[arg(long, value_name = "s")]
     dt: Option<f64>,
 }
 
@@ -194,6 +206,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(cli.common.verbosity()),
         Verb::Export(verb) => verb.run(),
+        Verb::Cluster(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),
         Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),

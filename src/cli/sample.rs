@@ -21,7 +21,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::sampling::SampleHeadways;
 use crate::stats::density::DensityModel;
-use crate::{Error, Place, Result};
+use crate::Result;
 
 /// How likely does a driver fail?
 ///
@@ -31,8 +31,8 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "density" | "distribution" | "category" | "rename" | "set" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "until"
-    | "time_limit" | "worst" | "map" | "pilot" | "worst_share" | "broad" | "defence" | "given" | "proposal"
+    "density" | "distribution" | "category" | "rename" | "set" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "half_width"
+    | "time_limit" | "worst" | "map" | "pilot" | "elite_fraction" | "broad_weight" | "defensive_weight" | "given" | "proposal"
     | "bootstrap" | "bootstrap_samples" | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
@@ -48,49 +48,55 @@ pub struct Sample {
     /// Density file
     #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"])]
     pub(super) density: Option<PathBuf>,
-    /// OpenSCENARIO file with stochastic distributions of parameters, instead of a density; its numberOfTestRuns and
-    /// randomSeed are the defaults of --samples and --seed
+    /// OpenSCENARIO file with stochastic distributions, not a density
+    ///
+    /// Its numberOfTestRuns and randomSeed are the defaults of --samples and --seed.
     #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "bootstrap", "rows", "shard", "plan_only"])]
     pub(super) distribution: Option<PathBuf>,
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", requires = "distribution")]
     pub(super) category: Option<String>,
-    /// With --distribution: a parameter of the file is one of ours, times a factor for its unit; repeatable
+    /// With --distribution: parameter of the file that is one of ours, times a factor; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: value that is the same in every sample; repeatable
     #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given)]
     pub(super) set: Vec<(String, f64)>,
-    /// mc (crude), is (importance sampling around the worst of a pilot), ce (cross-entropy), subset
-    #[arg(long, value_enum, default_value_t)]
+    /// Crude, importance, cross-entropy, subset
+    ///
+    /// Crude Monte Carlo, importance sampling, cross-entropy or subset simulation. Importance sampling draws around the worst points of a pilot.
+    #[arg(long, value_name = "mc|is|ce|subset", value_enum, hide_possible_values = true, default_value_t)]
     pub(super) estimator: EstimatorFlag,
-    /// Samples at most; of ce: of the final sample; of subset: per level [default: 100000; subset: 2000]
+    /// Samples at most [default: 100000; subset: 2000 per level]
+    ///
+    /// With ce: of the final sample.
     #[arg(long, value_name = "N")]
     pub(super) samples: Option<u64>,
-    /// Driver models, separated by commas [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    models: Vec<String>,
-    /// Criterion of the adaptive estimators, of the worst lanes, the map and the stop rule
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
-    criterion: String,
-    /// Time headways in seconds, separated by commas; `paper` (2.0, 1.8, … 0.2) or `sampled` (a density fitted with
-    /// --with-thw) [default: sampled where the density has it, else paper; the adaptive estimators take one]
-    #[arg(long, value_name = "LIST|paper|sampled")]
+    #[command(flatten)]
+    models: lists::ModelsFlag,
+    #[command(flatten)]
+    criterion: lists::CriterionFlag,
+    /// Time headways [default: the density's, else paper]
+    ///
+    /// paper is 2.0, 1.8, … 0.2; sampled needs a density fitted with --with-thw. The adaptive estimators take one headway.
+    #[arg(long, value_name = "s,s,…|paper|sampled")]
     thw: Option<String>,
     /// Kind of points of mc
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "random|sobol", value_enum, hide_possible_values = true, default_value_t)]
     pub(super) points: PointsFlag,
     /// Kind of interval of mc
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_name = "wilson|clopper-pearson", value_enum, hide_possible_values = true, default_value_t)]
     pub(super) interval: IntervalFlag,
     /// Level of the intervals
-    #[arg(long, value_name = "SHARE", default_value_t = 0.95)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.95)]
     pub(super) level: f64,
-    /// End once the interval's half-width over the estimate is at most this; looked at after 4096·2^k samples
-    #[arg(long, value_name = "SHARE")]
-    pub(super) until: Option<f64>,
-    /// End at the first look after so many seconds: not reproducible
-    #[arg(long, value_name = "SECONDS")]
+    /// End once half-width over estimate is at most this
+    ///
+    /// The interval is looked at after 4096·2^k samples.
+    #[arg(long, alias = "until", value_name = "FRACTION")]
+    pub(super) half_width: Option<f64>,
+    /// End at the first look after this time: not reproducible
+    #[arg(long, value_name = "s")]
     pub(super) time_limit: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster
     #[arg(long, value_name = "N", default_value_t = 20)]
@@ -102,36 +108,38 @@ pub struct Sample {
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
     /// Runs of the pilot of is
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, hide = true, value_name = "N", default_value_t = 10_000)]
     pub(super) pilot: u64,
-    /// Share of the pilot's worst points that the proposal of is is fitted to
-    #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
-    pub(super) worst_share: f64,
-    /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
-    #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
-    pub(super) broad: f64,
-    /// Share of the density in the proposals of is and ce; 0 is the published form
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
-    pub(super) defence: f64,
+    /// Elite fraction: worst points of the pilot that the proposal of is is fitted to
+    #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION", default_value_t = 0.02)]
+    pub(super) elite_fraction: f64,
+    /// Mixture weight of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
+    #[arg(long, alias = "broad", hide = true, value_name = "FRACTION", default_value_t = 0.2)]
+    pub(super) broad_weight: f64,
+    /// Defensive mixture weight: of the density in the proposals of is and ce; 0 is the published form
+    #[arg(long, alias = "defence", hide = true, value_name = "FRACTION", default_value_t = 0.1)]
+    pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
     pub(super) given: Vec<(String, f64)>,
-    /// Proposal file to sample instead of looking for one; several are combined by the balance heuristic
+    /// Proposal file to sample, with --estimator is; repeatable
+    ///
+    /// Several are combined by the balance heuristic.
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) bootstrap: u32,
     /// Samples of each replicate
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, hide = true, value_name = "N", default_value_t = 10_000)]
     pub(super) bootstrap_samples: u64,
-    /// Seed of the draws [default: 157; with --distribution: the file's]
+    /// Seed of the draws [default: 157, or the --distribution's]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample")]
     pub(super) out: PathBuf,
-    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
     pub(super) dry_run: bool,
     #[command(flatten)]
@@ -188,14 +196,11 @@ impl Sample {
     }
 
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {
-        lists::models(&self.models)
+        self.models.list()
     }
 
     pub(super) fn criterion(&self) -> Result<Criterion> {
-        Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
-            let problem = format!("there is no criterion `{}`", self.criterion);
-            Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
-        })
+        self.criterion.get()
     }
 
     pub(super) fn headways(&self, density: &DensityModel) -> Result<SampleHeadways> {

@@ -24,14 +24,18 @@ impl Sample {
                 return Ok(());
             }
             let range = if from_zero { "from 0 to below 1" } else { "between 0 and 1" };
-            Err(Error::usage(Place::item(name), format!("{value} is no share"), format!("give a number {range}")))
+            Err(Error::usage(Place::item(name), format!("{value} is no fraction"), format!("give a number {range}")))
         };
         share("--level", self.level, false)?;
-        share("--worst-share", self.worst_share, false)?;
-        share("--defence", self.defence, true)?;
-        share("--broad", self.broad, true)?;
-        if self.until.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
-            return Err(Error::usage(Place::item("--until"), "no half-width", "give a number above 0, such as 0.05"));
+        share("--elite-fraction", self.elite_fraction, false)?;
+        share("--defensive-weight", self.defensive_weight, true)?;
+        share("--broad-weight", self.broad_weight, true)?;
+        if self.half_width.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
+            return Err(Error::usage(
+                Place::item("--half-width"),
+                "no half-width",
+                "give a number above 0, such as 0.05",
+            ));
         }
         if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
             return Err(Error::usage(Place::item("--time-limit"), "no time", "give seconds above 0"));
@@ -92,7 +96,7 @@ impl Sample {
             let help = "use --estimator mc, or --estimator is with one given --proposal";
             return Err(Error::usage(Place::item("--shard"), problem, help));
         }
-        if is_split && (self.until.is_some() || self.time_limit.is_some()) {
+        if is_split && (self.half_width.is_some() || self.time_limit.is_some()) {
             let problem = "a part of a run cannot tell when the whole is good enough";
             return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
         }

@@ -14,7 +14,7 @@ impl Sample {
     pub(super) fn stop(&self, samples: u64) -> StopRule {
         StopRule {
             samples,
-            relative_half_width: self.until,
+            relative_half_width: self.half_width,
             time_limit: self.time_limit.map(Duration::from_secs_f64),
             checkpoints: Checkpoints::Doubling,
         }
@@ -60,17 +60,17 @@ impl Sample {
                 interval: self.interval(),
             },
             EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
-                worst: self.worst_share,
-                broad: self.broad,
-                defence: self.defence,
+                worst: self.elite_fraction,
+                broad: self.broad_weight,
+                defence: self.defensive_weight,
                 ..Pilot::guarded(self.pilot)
             }),
             EstimatorFlag::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
                 let proposals = self.proposal.iter().map(read).collect::<Result<_>>()?;
-                Estimator::Given { proposals, defence: self.defence }
+                Estimator::Given { proposals, defence: self.defensive_weight }
             }
-            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: self.defence },
+            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: self.defensive_weight },
             EstimatorFlag::Subset => Estimator::Subset,
         })
     }

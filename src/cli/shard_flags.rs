@@ -11,8 +11,9 @@ use crate::{Error, Place, Result};
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
 pub struct ShardFlags {
-    /// Compute shard I of N (from 0) and leave its part in --out, where `lanesweep merge` makes the result; `auto/N`
-    /// takes I from a Kubernetes Indexed Job or a Slurm array
+    /// Compute shard I of N (from 0); `cluster merge` joins them
+    ///
+    /// The part is left in --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Run a plan that --plan-only wrote, instead of making one
@@ -21,8 +22,8 @@ pub struct ShardFlags {
     /// Write the plan, plan.json in --out, and end
     #[arg(long, conflicts_with = "shard")]
     pub plan_only: bool,
-    /// End after the chunk that is being computed then, as Ctrl-C does: the same command goes on from there
-    #[arg(long, value_name = "SECONDS")]
+    /// End after the chunk in progress at that time, as Ctrl-C does; the same command resumes
+    #[arg(long, value_name = "s")]
     pub stop_after: Option<f64>,
 }
 

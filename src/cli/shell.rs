@@ -1,4 +1,4 @@
-//! `lanesweep completions` and `lanesweep man`: what a shell and `man` need to know, from the command's own definition.
+//! `lanesweep config completions` and `lanesweep config man`: what a shell and `man` need to know, from the command's own definition.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 /// Where a shell looks for them differs: bash reads files in ~/.local/share/bash-completion/completions, fish in
 /// ~/.config/fish/completions, zsh in a folder of its $fpath (there the file is called _lanesweep).
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep completions bash")]
+#[command(after_help = "Example:\n  lanesweep config completions bash")]
 pub struct Completions {
     /// The shell
     #[arg(value_name = "SHELL")]
@@ -32,11 +32,19 @@ impl Completions {
     }
 }
 
+/// A command with the visible ones below it, by the names of their pages.
+fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap::Command)>) {
+    pages.push((name.clone(), command.clone()));
+    for verb in command.get_subcommands().filter(|verb| !verb.is_hide_set() && verb.get_name() != "help") {
+        collect(format!("{name}-{}", verb.get_name()), verb, pages);
+    }
+}
+
 /// Write the manual pages into a folder
 ///
-/// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, …
+/// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, lanesweep-cluster-merge.1, …
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep man man1")]
+#[command(after_help = "Example:\n  lanesweep config man man1")]
 pub struct Man {
     /// Folder of the pages
     #[arg(value_name = "DIR")]
@@ -49,11 +57,8 @@ impl Man {
         let mut program = command();
         // Global flags and versions reach the verbs.
         program.build();
-        let verbs: Vec<clap::Command> = program.get_subcommands().filter(|verb| !verb.is_hide_set()).cloned().collect();
-        let pages = std::iter::once(("lanesweep".to_owned(), program)).chain(verbs.into_iter().map(|verb| {
-            let name = format!("lanesweep-{}", verb.get_name());
-            (name, verb)
-        }));
+        let mut pages = Vec::new();
+        collect("lanesweep".to_owned(), &program, &mut pages);
         let mut written = 0;
         for (name, command) in pages {
             let mut page = Vec::new();

@@ -26,16 +26,14 @@ use crate::{Error, Place, Result};
 ///
 /// The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as
 /// keys or columns; flags win), or from a finished run or a scenario file with a lane key. The series goes to
-/// stdout as CSV, the outcome to stderr, the figure to --plot. Several models (--model FSM,RSS or all) or
+/// stdout as CSV, the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or
 /// variants (--compare) stand below one another in the CSV and together on the figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
-#[command(
-    after_help = "Examples:\n  lanesweep simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw \
+#[command(after_help = "Examples:\n  lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw \
                         1.2 --lateral-speed 1.0 --plot case.svg\n  lanesweep simulate --from lanesweep-out --lane \
                         01_cut_in_24_22_1/2/1.2s/RSS --compare S --plot lane.svg\n  lanesweep simulate --scenarios \
-                        scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS"
-)]
+                        scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS")]
 pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
@@ -45,28 +43,33 @@ pub struct Simulate {
     /// Table (.csv, .parquet) with one case per row
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
-    /// Row of the table, counted from 1 after the header
+    /// Row of the table, from 1 after the header
     #[arg(long, value_name = "N", default_value_t = 1)]
     row: usize,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
     #[arg(long, value_name = "FILE", requires = "lane")]
     scenarios: Option<PathBuf>,
-    /// Folder (--out) of a `lanesweep study` or `lanesweep sample`, for --lane: reruns that lane with the run's profile and
-    /// options, bit for bit, and says whether f64 ends otherwise
+    /// Folder (--out) of a study or sample, for --lane
+    ///
+    /// Runs that lane again with the run's profile and options, bit for bit, and says whether f64 ends otherwise.
     #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"])]
     from: Option<PathBuf>,
-    /// Lane key: scenario/variant/headway/model, as errors and tables print it
+    /// Lane key: scenario/variant/headway/model
     #[arg(long, value_name = "KEY")]
     lane: Option<String>,
-    /// Beside the lane, others of the same scenario: S (recorded), keys of parameterizations, or all [without a value: S]
+    /// Beside the lane, other variants of its scenario
+    ///
+    /// S (recorded; also without a value), keys of parameterizations, or all.
     #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S")]
     compare: Vec<String>,
-    /// Also draw speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact
+    /// Also draw the time series
+    ///
+    /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Where the figure's time ends, s [default: 2 s after the last change]
-    #[arg(long, value_name = "SECONDS", requires = "plot")]
-    until: Option<f64>,
+    /// Where the figure's time ends [default: 2 s after the last change]
+    #[arg(long, alias = "until", value_name = "s", requires = "plot")]
+    plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
@@ -85,7 +88,7 @@ impl Simulate {
             if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
                 make_folder(dir)?;
             }
-            write_atomically(path, figure(&lanes, self.until).svg().as_bytes())?;
+            write_atomically(path, figure(&lanes, self.plot_end).svg().as_bytes())?;
         }
         self.format.print(|| trace_table::csv(&named), || document(&lanes, &named))?;
         if verbosity != Verbosity::Quiet {
@@ -146,9 +149,9 @@ impl Simulate {
     /// The figure must be one and must replace no input.
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
-        if let Some(until) = self.until.filter(|until| !(*until > 0.0 && *until < 1e9)) {
+        if let Some(until) = self.plot_end.filter(|until| !(*until > 0.0 && *until < 1e9)) {
             let problem = format!("{until} s is no end of a time axis");
-            return Err(Error::usage(Place::item("--until"), problem, "give seconds above 0 and below 10^9"));
+            return Err(Error::usage(Place::item("--plot-end"), problem, "give seconds above 0 and below 10^9"));
         }
         if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
             let problem = format!("{} is no name of an SVG file", plot.display());

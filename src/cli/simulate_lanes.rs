@@ -224,7 +224,7 @@ pub(super) fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
     plan.models.iter().position(|m| *m == id).ok_or_else(|| {
         let there: Vec<&str> = plan.models.iter().map(|m| m.name()).collect();
         let problem = format!("{} is not a model of this run", id.name());
-        Error::usage(Place::item("--model"), problem, format!("use {}", there.join(", ")))
+        Error::usage(Place::item("--models"), problem, format!("use {}", there.join(", ")))
     })
 }
 

@@ -1,4 +1,4 @@
-//! `lanesweep slurm`: a run as a Slurm job array.
+//! `lanesweep cluster slurm`: a run as a Slurm job array.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ use crate::{Error, Place, Result};
 /// queue and continue. All nodes must share --out.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  lanesweep slurm study.toml --array 20 --out result\n  lanesweep slurm --array 20 \
+    after_help = "Examples:\n  lanesweep cluster slurm study.toml --array 20 --out result\n  lanesweep cluster slurm --array 20 \
                         --out result --gpus 1 -- sample cut-in-2.json --samples 1000000000"
 )]
 pub struct Slurm {

@@ -83,7 +83,7 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
 /// What is done about input that no road has.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PlausibilityFlag {
-    /// Use values that are beyond what is physical (a speed of 108 m/s), and tell them
+    /// Use values beyond what is physical (a speed of 108 m/s), and name them
     #[arg(long)]
     accept_implausible: bool,
 }

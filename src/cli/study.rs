@@ -22,7 +22,6 @@ use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
-use crate::scenario::Category;
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -39,11 +38,11 @@ use crate::traffic::mining::counts_text;
     "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
     | "profile" | "dt"
     | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
-    "lanes" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
+    "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
-                        --scenarios scenarios.jsonl --lanes lanes.csv")]
+                        --scenarios scenarios.jsonl --rows lanes.csv")]
 pub struct Study {
     /// Folder of highD-format recordings [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
@@ -55,12 +54,12 @@ pub struct Study {
     #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
     out: PathBuf,
     /// Also write one row per lane: .csv, .jsonl or .parquet
-    #[arg(long, value_name = "FILE")]
-    lanes: Option<PathBuf>,
-    /// Set the paper's published numbers beside (they are highD's)
+    #[arg(long, alias = "lanes", value_name = "FILE")]
+    rows: Option<PathBuf>,
+    /// Show the paper's published numbers beside (they are highD's)
     #[arg(long)]
     published: bool,
-    /// Run the f64 reference instead of the f32 lane arithmetic
+    /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
     #[arg(long)]
     reference: bool,
     /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
@@ -69,20 +68,21 @@ pub struct Study {
     /// Seed of the bootstrap [default: 157]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Leave the plan in --out (run-plan.json), so that `simulate --from` can run each lane again: auto (up to 256 MiB,
-    /// some 150,000 scenarios), always, never
-    #[arg(long, value_name = "WHEN", value_enum, default_value_t = KeepPlan::Auto)]
+    /// Keep the plan in --out for `simulate --from`
+    ///
+    /// The plan is run-plan.json; with it, each lane can run again. auto keeps it up to 256 MiB, some 150,000 scenarios.
+    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,
-    /// Categories, separated by commas [default: cut-in,cut-out,lvd]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    categories: Vec<String>,
-    /// Driver models, separated by commas [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    models: Vec<String>,
-    /// Time headways in seconds, separated by commas, or `paper` (2.0, 1.8, … 0.2): the paper's claims need all of them
-    #[arg(long, value_name = "LIST|paper", default_value = "paper")]
+    #[command(flatten)]
+    categories: lists::CategoriesFlag,
+    #[command(flatten)]
+    models: lists::ModelsFlag,
+    /// Time headways; paper is 2.0, 1.8, … 0.2
+    ///
+    /// The paper's claims need all of its headways.
+    #[arg(long, value_name = "s,s,…|paper", default_value = "paper")]
     thw: String,
-    /// Print lanes, memory and an estimate of the time, and end: nothing is written
+    /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
     dry_run: bool,
     #[command(flatten)]
@@ -125,7 +125,7 @@ impl Study {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        self.lanes.as_deref().map_or(Ok(()), check_folder_of)?;
+        self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
@@ -163,8 +163,8 @@ impl Study {
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let profile = self.profile.load()?;
         let options = StudyOptions {
-            categories: self.categories()?,
-            models: lists::models(&self.models)?,
+            categories: self.categories.list()?,
+            models: self.models.list()?,
             headways: lists::paper_or_headways(&self.thw)?,
             parameterization: config.parameterization.clone(),
         };
@@ -219,7 +219,7 @@ impl Study {
             forecast: Some(forecast),
             backend: backend.describe(),
             before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
-            besides: "scores, figures, the plan file; --lanes and --compare-reference",
+            besides: "scores, figures, the plan file; --rows and --compare-reference",
         }
         .print(self.format)?;
         Ok(Exit::Ok)
@@ -258,7 +258,7 @@ impl Study {
         }
         let StudyResult { counts, summary: mut swept, .. } = run.take_result()?;
         let mut results = run.results()?;
-        if let Some(path) = &self.lanes {
+        if let Some(path) = &self.rows {
             let digits = if study.facts().reference { Digits::Binary64 } else { Digits::Binary32 };
             let (again, table) = write_lanes(path, study.cases(), &executor, digits, study.facts().synthetic)?;
             swept.add(&again);
@@ -296,20 +296,16 @@ impl Study {
 
     /// The lane table must replace neither an input nor another result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        let Some(lanes) = &self.lanes else { return Ok(()) };
+        let Some(lanes) = &self.rows else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         others.extend(self.scenarios.clone());
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
-        source::refuse_overwriting(lanes, &others, "--lanes")?;
+        source::refuse_overwriting(lanes, &others, "--rows")?;
         lane_format(lanes)?;
-        self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--lanes"))
-    }
-
-    fn categories(&self) -> Result<Vec<Category>> {
-        source::categories(&self.categories, "--categories")
+        self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
     }
 }
 

@@ -75,7 +75,7 @@ pub(super) fn write_lanes(
 
 /// The format of a table of lanes.
 pub(super) fn lane_format(path: &Path) -> Result<TableFormat> {
-    TableFormat::of(path, &TableFormat::EVERY, "--lanes")
+    TableFormat::of(path, &TableFormat::EVERY, "--rows")
 }
 
 /// What belongs to the machine and not to the result.

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use super::backend_flags::BackendFlags;
 use super::configured::Configured;
+use super::conformance::Conformance;
 use super::console::{self, Verbosity};
+use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
@@ -28,20 +30,23 @@ use crate::{Error, Place, Result};
 /// Without a GPU name a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --lanes 20000\n  lanesweep \
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
                         verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM"
 )]
 pub struct Verify {
+    #[command(subcommand)]
+    verb: Option<VerifyVerb>,
     /// Folder of highD-format recordings for the study [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) for the study
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
-    /// Random lanes of each model in each category
-    #[arg(long, value_name = "N", default_value_t = 100_000)]
-    lanes: u64,
-    /// Units of 12 lanes of each model on each threshold in each category
+    /// Random lanes per model and category
+    #[arg(long, alias = "lanes", value_name = "N", default_value_t = 100_000)]
+    random_lanes: u64,
+    /// Units of 12 lanes per model, threshold and category
     #[arg(long, value_name = "N", default_value_t = 64)]
     threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
@@ -62,14 +67,26 @@ pub struct Verify {
     generator: GeneratorFlags,
 }
 
+#[derive(Debug, Subcommand)]
+enum VerifyVerb {
+    Devices(Devices),
+    Conformance(Conformance),
+}
+
 /// Random lanes of a model and category at most: their units are named one by one.
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
-        for (flag, value, most) in
-            [("--lanes", self.lanes, MAX_LANES), ("--threshold-units", self.threshold_units, MAX_LANES / 1000)]
-        {
+        match &self.verb {
+            Some(VerifyVerb::Devices(verb)) => return verb.run(),
+            Some(VerifyVerb::Conformance(verb)) => return verb.run(),
+            None => (),
+        }
+        for (flag, value, most) in [
+            ("--random-lanes", self.random_lanes, MAX_LANES),
+            ("--threshold-units", self.threshold_units, MAX_LANES / 1000),
+        ] {
             if value == 0 || value > most {
                 let problem = format!("{value} is not usable; expected 1 to {most}");
                 return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
@@ -140,7 +157,7 @@ impl Verify {
     }
 
     fn random(&self, profile: &Profile) -> Result<LanePlan> {
-        let lanes_per_model_and_category = self.lanes;
+        let lanes_per_model_and_category = self.random_lanes;
         random_plan(profile, &RandomOptions { seed: self.seed, lanes_per_model_and_category, ..Default::default() })
     }
 
@@ -186,7 +203,7 @@ impl Verify {
             Error::usage(
                 Place::item("--lane"),
                 format!("there is no lane `{text}` in this set"),
-                "copy the key from the list of differing lanes, and give the same --seed, --lanes and data",
+                "copy the key from the list of differing lanes, and give the same --seed, --random-lanes and data",
             )
         })?;
         let unit = plan.blocks[key.block].first_unit + key.unit;

@@ -22,7 +22,7 @@ pub use crate::model::case::{Ahead, Case, Category, Participant};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use crate::model::plain_case::{LATERAL_DISTANCE_M, PlainCase};
 pub use case_parameters::CaseParameters;
-pub(crate) use case_parameters::{at_least, needed};
+pub(crate) use case_parameters::at_least;
 pub(crate) use check::problem_of;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios};
 pub use found::ScenarioFile;

@@ -48,7 +48,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
         let out = dir.path().join(name);
         let lanes = out.join("lanes.csv");
         let (out, lanes) = (out.to_str().unwrap(), lanes.to_str().unwrap());
-        let output = lanesweep(&[&["-q", "study", "--out", out, "--lanes", lanes], &SMALL[..], backend].concat());
+        let output = lanesweep(&[&["-q", "study", "--out", out, "--rows", lanes], &SMALL[..], backend].concat());
         assert_eq!(code(&output), 0, "{}", stderr(&output));
         stdout(&output)
     };
@@ -80,7 +80,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
 #[test]
 fn verify_passes_on_the_software_device_and_says_what_it_compared() {
     let Some(device) = device() else { return };
-    let args = ["-q", "verify", "--device", &device, "--lanes", "400", "--threshold-units", "2"];
+    let args = ["-q", "verify", "--device", &device, "--random-lanes", "400", "--threshold-units", "2"];
     let output = lanesweep(&[&args[..], &SMALL].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let text = stdout(&output);
@@ -94,18 +94,18 @@ fn verify_passes_on_the_software_device_and_says_what_it_compared() {
 fn a_lane_can_be_run_again_from_its_key() {
     let Some(device) = device() else { return };
     let key = "random-cut-out-seed157-0000003/mixed/12m/FSM";
-    let output = lanesweep(&["verify", "--device", &device, "--lanes", "400", "--lane", key]);
+    let output = lanesweep(&["verify", "--device", &device, "--random-lanes", "400", "--lane", key]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let text = stdout(&output);
     assert!(text.contains(key) && text.contains("min_ttc") && text.contains("f64 reference"), "{text}");
-    let unknown = lanesweep(&["verify", "--device", &device, "--lanes", "400", "--lane", "random-nothing"]);
+    let unknown = lanesweep(&["verify", "--device", &device, "--random-lanes", "400", "--lane", "random-nothing"]);
     assert_eq!(code(&unknown), 2);
     assert!(stderr(&unknown).contains("no lane `random-nothing`"), "{}", stderr(&unknown));
 }
 
 #[test]
 fn the_cpu_backend_can_be_verified_without_any_device() {
-    let args = ["-q", "verify", "--backend", "cpu", "--lanes", "400", "--threshold-units", "1"];
+    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "400", "--threshold-units", "1"];
     let output = lanesweep(&[&args[..], &SMALL].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert!(stdout(&output).contains("Under test: CPU"));
@@ -133,7 +133,7 @@ fn contradicting_flags_are_answered_with_what_to_write() {
         (&["study", "--reference", "--device", "llvmpipe"], "--reference"),
         (&["study", "--backend", "tpu"], "tpu"),
         (&["study", "--device", "no such device"], "no such device"),
-        (&["verify", "--backend", "cpu", "--lanes", "0"], "--lanes"),
+        (&["verify", "--backend", "cpu", "--random-lanes", "0"], "--random-lanes"),
     ];
     for (args, part) in cases {
         let output = lanesweep(args);
@@ -144,7 +144,7 @@ fn contradicting_flags_are_answered_with_what_to_write() {
 
 #[test]
 fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
-    let args = ["-q", "verify", "--backend", "cpu", "--lanes", "40", "--threshold-units", "1"];
+    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "40", "--threshold-units", "1"];
     let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--synth-duration", "1"]].concat());
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     assert!(stderr(&output).contains("no scenario to simulate"), "{}", stderr(&output));

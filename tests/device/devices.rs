@@ -1,4 +1,4 @@
-//! `lanesweep devices` on a machine with a software device, and on one with none.
+//! `lanesweep verify devices` on a machine with a software device, and on one with none.
 
 use crate::common::device::software_device;
 use assert_cmd::Command;

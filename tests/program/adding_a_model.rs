@@ -134,7 +134,7 @@ fn touches_nothing_else(ours: &Tree, theirs: &Tree) {
 }
 
 /// A leader that brakes to a standstill.
-const CASE: &str = "simulate --category lvd --ego-speed 12 --thw 1.5 --acceleration -6 --model AEB";
+const CASE: &str = "simulate --category lvd --ego-speed 12 --thw 1.5 --acceleration -6 --models AEB";
 
 fn reaction(output: &Output) -> f64 {
     assert!(output.status.success(), "{}", said(output));
@@ -176,7 +176,7 @@ fn stands_in_every_table_of_a_study() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("result");
     let lanes = dir.path().join("lanes.csv");
-    let study = ["-q", "study", "--synth-recordings", "1", "--published", "--out", out.to_str().unwrap(), "--lanes"];
+    let study = ["-q", "study", "--synth-recordings", "1", "--published", "--out", out.to_str().unwrap(), "--rows"];
     let output = lanesweep(&[&study[..], &[lanes.to_str().unwrap()]].concat());
     assert!(output.status.success(), "{}", said(&output));
     let tables = String::from_utf8(output.stdout).unwrap();
@@ -203,7 +203,7 @@ fn gives_the_same_words_on_a_device() {
     if software_device().is_none() {
         return;
     }
-    let verify = "-q verify --device llvmpipe --lanes 2000 --threshold-units 2 --synth-recordings 1";
+    let verify = "-q verify --device llvmpipe --random-lanes 2000 --threshold-units 2 --synth-recordings 1";
     let output = lanesweep(&verify.split(' ').collect::<Vec<_>>());
     let text = said(&output);
     assert!(output.status.success(), "{text}");

@@ -66,10 +66,11 @@ fn lanesweep(args: &[&str]) -> String {
 /// The verbs as the program's own help lists them.
 fn verbs() -> Vec<String> {
     let help = lanesweep(&["--help"]);
-    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let named = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let lines = help.lines().take_while(|line| !line.starts_with("Example"));
+    let named =
+        lines.filter(|line| line.starts_with("  ") && line[2..].starts_with(|first: char| first.is_ascii_lowercase()));
     let verbs: Vec<String> = named.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect();
-    assert!(verbs.len() >= 14, "{help}");
+    assert!(verbs.len() >= 10 && verbs.len() <= 12, "{help}");
     verbs.into_iter().filter(|verb| verb != "help").collect()
 }
 
@@ -265,7 +266,7 @@ const FIGURES: [(&str, &str, &str); 3] = [
     ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
     (
         "case.svg",
-        "simulate --category cut-in --model all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
+        "simulate --category cut-in --models all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
         "case.svg",
     ),
     (

@@ -64,7 +64,7 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_study() {
     };
     run(&[&["-q", "study", "--out", text(&a)], &SMALL[..]].concat());
     run(&["-q", "study", text(data.path()), "--out", text(&b), "--threads", "1"]);
-    run(&["-q", "mine", text(data.path()), "-o", text(&scenarios)]);
+    run(&["-q", "mine", text(data.path()), "--out", text(&scenarios)]);
     run(&["-q", "study", "--scenarios", text(&scenarios), "--out", text(&c), "--threads", "2"]);
     let read = |dir: &Path, file: &str| std::fs::read_to_string(dir.join(file)).unwrap();
     // The column `data` tells synthetic from recorded; every number is the same.
@@ -113,7 +113,7 @@ fn every_lane_of_the_study_can_be_written_and_one_of_them_rerun_by_its_key() {
     let lanes = out.path().join("lanes.csv");
     let result = out.path().join("result");
     let study =
-        lanesweep(&["-q", "study", "--scenarios", text(&scenarios), "--out", text(&result), "--lanes", text(&lanes)]);
+        lanesweep(&["-q", "study", "--scenarios", text(&scenarios), "--out", text(&result), "--rows", text(&lanes)]);
     assert_eq!(code(&study), 0, "{}", stderr(&study));
     let ours = std::fs::read_to_string(&lanes).unwrap();
     let golden = std::fs::read_to_string(common::golden("paper_sumo_01_02_lanes.csv")).unwrap();
@@ -150,7 +150,7 @@ fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
         "category,model,ego_speed,speed,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n",
     )
     .unwrap();
-    let flags = "simulate --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
+    let flags = "simulate --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
     let by_flags = lanesweep(&flags.split(' ').collect::<Vec<_>>());
     let by_toml = lanesweep(&["simulate", "--case-file", text(&toml)]);
     let by_table = lanesweep(&["simulate", "--table", text(&table), "--row", "2"]);
@@ -179,7 +179,7 @@ fn conformance_passes_on_the_golden_tables_and_fails_with_code_5_on_a_wrong_one(
 fn no_time_step_lets_the_ego_drive_through_a_vehicle() {
     let simulate = |dt: &str, model: &str| {
         let case = ["--category", "lvd", "--ego-speed", "50", "--speed", "0", "--gap", "20", "--acceleration", "0"];
-        lanesweep(&[&["simulate", "--dt", dt, "--model", model], &case[..]].concat())
+        lanesweep(&[&["simulate", "--dt", dt, "--models", model], &case[..]].concat())
     };
     for dt in ["0.04", "0.1", "0.17", "0.2", "0.25"] {
         let run = simulate(dt, "FSM");
@@ -220,9 +220,9 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--threads", "0"], 2, "use at least 1"),
         (&["study", "--scenarios", "no-such-file.jsonl"], 6, "no-such-file.jsonl"),
         (&["simulate", "--category", "cutin"], 2, "use cut-in, cut-out or lvd"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--gap", "5", "--model", "XYZ"], 2, "Reg157, CCHDM"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--model", "RSS"], 2, "at least 0"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--model", "RSS"], 2, "--thw"),
+        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--gap", "5", "--models", "XYZ"], 2, "Reg157, CCHDM"),
+        (&["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--models", "RSS"], 2, "at least 0"),
+        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--models", "RSS"], 2, "--thw"),
         (&["conformance"], 2, "nothing to compare"),
         (&["conformance", &no_table], 3, "no conformance table"),
     ];
@@ -249,7 +249,7 @@ fn a_result_folder_that_cannot_be_written_is_named() {
 fn a_reader_that_goes_away_is_no_error() {
     let program = env!("CARGO_BIN_EXE_lanesweep");
     let mut child = std::process::Command::new(program)
-        .args(["simulate", "--category", "lvd", "--model", "RSS", "--ego-speed", "30", "--thw", "2"])
+        .args(["simulate", "--category", "lvd", "--models", "RSS", "--ego-speed", "30", "--thw", "2"])
         .args(["--acceleration", "-0.1", "--end-speed", "1"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::null())
@@ -262,7 +262,7 @@ fn a_reader_that_goes_away_is_no_error() {
 #[test]
 fn help_names_every_verb_and_every_exit_code() {
     let help = String::from_utf8(lanesweep(&["--help"]).stdout).unwrap();
-    for word in ["study", "mine", "synth", "simulate", "conformance", "devices", "Exit codes"] {
+    for word in ["study", "mine", "synth", "simulate", "verify", "cluster", "Exit codes"] {
         assert!(help.contains(word), "{word}");
     }
     for exit in lanesweep::cli::Exit::ALL {
@@ -275,7 +275,7 @@ fn help_names_every_verb_and_every_exit_code() {
     }
 }
 
-const CASE: &str = "simulate --category cut-in --ego-speed 30 --speed 20 --lateral-speed 1.5 --model Reg157";
+const CASE: &str = "simulate --category cut-in --ego-speed 30 --speed 20 --lateral-speed 1.5 --models Reg157";
 
 /// `simulate` on a case with more flags: stdout and, as one line, stderr.
 fn simulated(flags: &str) -> (String, String) {
@@ -392,10 +392,10 @@ fn a_recording_with_speeds_that_no_scenario_holds_is_bad_data_and_no_defect() {
     };
     std::fs::write(&tracks, table.lines().enumerate().map(faster).collect::<String>()).unwrap();
     let out = data.path().join("s.jsonl");
-    let mined = lanesweep(&["-q", "mine", text(data.path()), "-o", text(&out)]);
+    let mined = lanesweep(&["-q", "mine", text(data.path()), "--out", text(&out)]);
     assert_eq!(code(&mined), 4, "{}", stderr(&mined));
     assert!(stderr(&mined).contains("line 2, column `xVelocity`"), "{}", stderr(&mined));
-    let mined = lanesweep(&["-q", "mine", text(data.path()), "-o", text(&out), "--accept-implausible"]);
+    let mined = lanesweep(&["-q", "mine", text(data.path()), "--out", text(&out), "--accept-implausible"]);
     assert_eq!(code(&mined), 3, "{}", stderr(&mined));
     assert!(stderr(&mined).contains("`ego.v0`") && stderr(&mined).contains("at most 1e6"), "{}", stderr(&mined));
 }

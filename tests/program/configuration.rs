@@ -81,8 +81,8 @@ fn every_verb_takes_its_values_from_all_layers() {
                   bootstrap_draws = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n\
                   [compare]\nseed = 14\nsamples = 50\n";
     std::fs::write(dir.join("a.toml"), tables).unwrap();
-    let fit = ["fit", "--category", "lvd", "--parameterization", "i", "--no-comparison", "--out", "lvd-i.json"];
-    let compare = ["compare", "--categories", "lvd", "--parameterization", "i", "--models", "FSM", "--thw", "1"];
+    let fit = ["fit", "--categories", "lvd", "--parameterizations", "i", "--no-comparison", "--out", "lvd-i.json"];
+    let compare = ["compare", "--categories", "lvd", "--parameterizations", "i", "--models", "FSM", "--thw", "1"];
     let verbs: [(&[&str], &str, &str, &str, u64); 4] = [
         (&["study"], "lanesweep-out/run.json", "/score/seed", "SCORE", 11),
         (&fit, "lvd-i.json", "/p_valid/seed", "FIT", 12),
@@ -317,11 +317,12 @@ fn a_dry_run_counts_the_lanes_of_the_run_and_writes_nothing() {
     let small = [("LANESWEEP_GENERATOR_RECORDINGS", "2"), ("LANESWEEP_RUN_BACKEND", "cpu")];
     let study = lanes(&good(dir, &small, &["-q", "study", "--dry-run"]));
     assert_eq!(std::fs::read_dir(dir).unwrap().count(), 0, "nothing was written");
-    let fit = ["-q", "fit", "--category", "cut-in", "--parameterization", "2", "--no-comparison", "--out", "d.json"];
+    let fit = ["-q", "fit", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison", "--out", "d.json"];
     good(dir, &small, &fit);
     let files = || std::fs::read_dir(dir).unwrap().count();
     let before = files();
-    let compare = ["-q", "compare", "--dry-run", "--categories", "lvd", "--parameterization", "i", "--samples", "1000"];
+    let compare =
+        ["-q", "compare", "--dry-run", "--categories", "lvd", "--parameterizations", "i", "--samples", "1000"];
     let compare = lanes(&good(dir, &small, &compare));
     assert_eq!(compare % (10 * ModelId::ALL.len() as u64), 0);
     let sample = |args: &[&str]| lanes(&good(dir, &small, &[&["-q", "sample", "d.json", "--dry-run"], args].concat()));

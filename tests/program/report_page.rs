@@ -46,7 +46,7 @@ fn page(dir: &Path) -> String {
 /// Scenarios of the generator, as lines of a scenario file.
 fn scenarios(dir: &Path) -> Vec<String> {
     lanesweep(dir, &["synth", "recordings", "--synth-recordings", "2", "--synth-duration", "240"]);
-    lanesweep(dir, &["mine", "recordings", "-o", "all.jsonl"]);
+    lanesweep(dir, &["mine", "recordings", "--out", "all.jsonl"]);
     let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
     let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();
     assert!(kept.len() > 20);
@@ -110,7 +110,8 @@ fn little_data_makes_a_readable_page_too() {
 fn sampling_runs_maps_and_comparisons_have_their_page() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let fit = ["fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2", "--no-comparison"];
+    let fit =
+        ["fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison"];
     lanesweep(dir, &[&fit[..], &["--out", "d"]].concat());
     let sample = ["sample", "d/cut-in-2.json", "--backend", "cpu", "--samples", "3000"];
     lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());

@@ -17,10 +17,11 @@ fn text(output: &Output) -> String {
 /// The verbs as the program's own help lists them.
 fn verbs(dir: &Path) -> Vec<String> {
     let help = text(&lanesweep(dir, &["--help"]));
-    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let verbs = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let lines = help.lines().take_while(|line| !line.starts_with("Example"));
+    let verbs =
+        lines.filter(|line| line.starts_with("  ") && line[2..].starts_with(|first: char| first.is_ascii_lowercase()));
     let verbs: Vec<String> = verbs.filter_map(|line| line.split_whitespace().next().map(str::to_owned)).collect();
-    assert!(verbs.len() >= 14, "{help}");
+    assert!(verbs.len() >= 10 && verbs.len() <= 12, "{help}");
     verbs
 }
 
@@ -48,7 +49,7 @@ fn every_verb_has_a_manual_page() {
     text(&lanesweep(dir.path(), &["man", "man1"]));
     for verb in verbs(dir.path()).iter().filter(|verb| *verb != "help") {
         let page = std::fs::read_to_string(dir.path().join(format!("man1/lanesweep-{verb}.1"))).unwrap();
-        assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS") && page.contains(".SH OPTIONS"), "{verb}");
+        assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS") && page.contains(".SH RUN"), "{verb}");
         assert!(page.contains("Example"), "{verb} has no example");
     }
     assert!(dir.path().join("man1/lanesweep.1").exists());
@@ -77,5 +78,46 @@ fn a_reader_that_goes_away_is_no_error() {
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(0), "{args:?}: {said}");
         assert!(!said.contains("panicked"), "{said}");
+    }
+}
+
+#[test]
+fn the_short_help_of_every_verb_fits_on_one_screen_below_headings() {
+    let dir = tempfile::tempdir().unwrap();
+    let inner =
+        ["export xosc", "cluster merge", "cluster slurm", "verify devices", "verify conformance", "config show"];
+    let help = text(&lanesweep(dir.path(), &["-h"]));
+    assert!(help.lines().count() <= 40, "{help}");
+    for verb in verbs(dir.path()).iter().map(String::as_str).chain(inner) {
+        let words: Vec<&str> = verb.split(' ').chain(["-h"]).collect();
+        let help = text(&lanesweep(dir.path(), &words));
+        assert!(help.lines().count() <= 40, "{verb}: {} lines\n{help}", help.lines().count());
+        assert!(!help.contains("\nOptions:"), "a flag of {verb} has no heading\n{help}");
+    }
+}
+
+#[test]
+fn spellings_of_the_release_before_are_understood() {
+    let dir = tempfile::tempdir().unwrap();
+    // What stands before `--help` is read and nothing runs.
+    for line in [
+        "study --lanes lanes.csv --category lvd --model FSM",
+        "mine recordings -o s.jsonl",
+        "mine recordings --output s.jsonl",
+        "fit --category lvd --parameterization i --valid-draws 1000 --synth-seed 3 --synth-duration 60",
+        "compare --parameterization i",
+        "simulate --category lvd --model all --plot a.svg --until 3",
+        "export xosc --category lvd --model FSM",
+        "sample d.json --until 0.1 --pilot 500 --worst-share 0.1 --broad 0 --defence 0 --bootstrap-samples 100",
+        "verify --lanes 10",
+        "conformance --scenarios s.jsonl --lanes lanes.csv",
+        "merge result",
+        "slurm study.toml --array 2 --out result",
+        "devices --no-self-check",
+        "completions bash",
+        "man man1",
+    ] {
+        let words: Vec<&str> = line.split(' ').chain(["--help"]).collect();
+        text(&lanesweep(dir.path(), &words));
     }
 }

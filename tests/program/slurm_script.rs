@@ -1,4 +1,4 @@
-//! The scripts of `lanesweep slurm`: valid shell whatever the paths hold, and saying what they must to Slurm.
+//! The scripts of `lanesweep cluster slurm`: valid shell whatever the paths hold, and saying what they must to Slurm.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -57,7 +57,7 @@ fn the_scripts_ask_slurm_for_what_was_asked() {
         ),
     );
     assert!(array.contains("scontrol requeue \"$task\""));
-    has(&merge, &format!("exec lanesweep merge {out} --threads 4"));
+    has(&merge, &format!("exec lanesweep cluster merge {out} --threads 4"));
     assert!(!merge.contains("gpu:1") && !merge.contains("--array"));
     has(&submit, &format!("lanesweep study --config study.toml --plan-only --out {out}"));
     has(&submit, &format!("array=$(sbatch --parsable {out}/slurm/array.sbatch)"));

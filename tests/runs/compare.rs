@@ -55,7 +55,7 @@ fn number(row: &HashMap<String, String>, column: &str) -> f64 {
 fn rates_are_those_of_study_and_of_fit_and_sample() {
     let dir = tempfile::tempdir().unwrap();
     let [compared, study, fit, sample] = ["compared", "study", "fit.json", "sample"].map(|n| dir.path().join(n));
-    let wanted = ["--parameterization", "1,6,i", "--samples", "800", "--backend", "cpu"];
+    let wanted = ["--parameterizations", "1,6,i", "--samples", "800", "--backend", "cpu"];
     let args = [&["-q", "compare", "--out", text(&compared)], &wanted[..], &SMALL[..]].concat();
     let printed = succeeds(&args);
     succeeds(&[&["-q", "study", "--backend", "cpu", "--out", text(&study)], &SMALL[..]].concat());
@@ -81,7 +81,7 @@ fn rates_are_those_of_study_and_of_fit_and_sample() {
         assert!(number(cell, "s_low") <= number(cell, "s_rate") && number(cell, "s_rate") <= number(cell, "s_high"));
         assert!(number(cell, "s_per_1000_km") >= 0.0 && cell["data"].contains("SYNTHETIC"));
     }
-    succeeds(&[&["-q", "fit", "--parameterization", "i", "--out", text(&fit)], &SMALL[..]].concat());
+    succeeds(&[&["-q", "fit", "--parameterizations", "i", "--out", text(&fit)], &SMALL[..]].concat());
     succeeds(&["-q", "sample", text(&fit), "--samples", "800", "--backend", "cpu", "--out", text(&sample)]);
     let estimates = rows(&sample.join("estimates.csv"));
     for cell in cells.iter().filter(|cell| cell["parameterization"] == "i") {
@@ -110,7 +110,7 @@ fn results_do_not_depend_on_threads_and_do_on_the_seed() {
     let dir = tempfile::tempdir().unwrap();
     let run = |name: &str, more: &[&str]| {
         let out = dir.path().join(name);
-        let args = ["-q", "compare", "--parameterization", "2,7", "--samples", "3000", "--backend", "cpu"];
+        let args = ["-q", "compare", "--parameterizations", "2,7", "--samples", "3000", "--backend", "cpu"];
         let narrow = ["--models", "FSM,CCHDM", "--thw", "1.2,0.4", "--out", text(&out)];
         succeeds(&[&args, &narrow[..], &SMALL[..], more].concat());
         let json = std::fs::read_to_string(out.join("compare.json")).unwrap();
@@ -239,8 +239,8 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
     lanesweep::scenario::write_scenarios(&none, &scenarios).unwrap();
     std::fs::copy(&golden, &input).unwrap();
     let cases: [(&[&str], i32, &str); 8] = [
-        (&["--parameterization", "9"], 2, "there is no parameterization `9`"),
-        (&["--categories", "lvd", "--parameterization", "2"], 2, "of LVD"),
+        (&["--parameterizations", "9"], 2, "there is no parameterization `9`"),
+        (&["--categories", "lvd", "--parameterizations", "2"], 2, "of LVD"),
         (&["--categories", "lane-change"], 2, "use cut-in, cut-out, lvd"),
         (&["--samples", "0"], 2, "0 samples estimate nothing"),
         (&["--models", "Nobody"], 2, "there is no driver model `Nobody`"),
@@ -263,7 +263,7 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
     scenarios.iter_mut().for_each(|s| s.kept = true);
     lanesweep::scenario::write_scenarios(&few, &scenarios).unwrap();
     let args = ["compare", "--backend", "cpu", "--scenarios", text(&few), "--samples", "200", "--out", text(&out)];
-    let some = lanesweep(&[&args, &["--parameterization", "i,v"][..]].concat());
+    let some = lanesweep(&[&args, &["--parameterizations", "i,v"][..]].concat());
     assert_eq!(some.status.code(), Some(4), "{}", stderr(&some));
     assert!(stderr(&some).contains("too few for a decomposition"), "{}", stderr(&some));
     let printed = String::from_utf8(some.stdout).unwrap();

@@ -71,7 +71,7 @@ fn shared() -> &'static Path {
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
         std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
-        let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+        let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
         done(&dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
         for (name, run) in RUNS {
             done(&dir, &[run, &["--out", name]].concat());
@@ -238,10 +238,10 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         }
     }
     for command in [
-        "study --scenarios scenarios.jsonl --out fresh --lanes taken/lanes.csv",
+        "study --scenarios scenarios.jsonl --out fresh --rows taken/lanes.csv",
         "sample density.json --samples 1000 --out fresh --rows taken/rows.csv",
         "mine recordings -o taken/scenarios.jsonl",
-        "fit --scenarios scenarios.jsonl --category cut-in --parameterization 2 --out taken/density.json",
+        "fit --scenarios scenarios.jsonl --categories cut-in --parameterizations 2 --out taken/density.json",
         "slurm --array 2 --out fresh --scripts taken/scripts -- study",
     ] {
         let args: Vec<&str> = command.split(' ').collect();
@@ -250,7 +250,7 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         assert!(said.contains("taken") && said.contains("a file is where a folder is needed"), "{args:?}: {said}");
     }
     for command in [
-        "study --scenarios scenarios.jsonl --out fresh --lanes recordings",
+        "study --scenarios scenarios.jsonl --out fresh --rows recordings",
         "sample density.json --samples 1000 --out fresh --rows recordings",
         "mine recordings -o .",
     ] {

@@ -40,14 +40,14 @@ const VERBS: [Verb; 16] = [
     verb(
         "study",
         Some("run.json"),
-        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --lanes out/lanes.csv --out out"),
+        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --rows out/lanes.csv --out out"),
         "study --plan plan/plan.json --threads 1 --out out",
     ),
     verb(
-        "study --lanes",
+        "study --rows",
         Some("run.json"),
         Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
-        "study --synth-recordings 1 --categories cut-in --lanes rows/lanes.csv --out out",
+        "study --synth-recordings 1 --categories cut-in --rows rows/lanes.csv --out out",
     ),
     verb(
         "merge",
@@ -108,23 +108,23 @@ const VERBS: [Verb; 16] = [
     verb(
         "compare",
         Some("compare.json"),
-        Some("compare --synth-recordings 1 --categories cut-in --parameterization 1 --samples 50 --thw 1.0 --out out"),
-        "compare --synth-recordings 2 --categories lvd --parameterization i --samples 300 --thw 1.0,0.6 --out out",
+        Some("compare --synth-recordings 1 --categories cut-in --parameterizations 1 --samples 50 --thw 1.0 --out out"),
+        "compare --synth-recordings 2 --categories lvd --parameterizations i --samples 300 --thw 1.0,0.6 --out out",
     ),
     verb(
         "fit",
         None,
         Some(
-            "fit --synth-recordings 2 --category cut-in --parameterization 2 --no-comparison --valid-draws 999 --out out",
+            "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --valid-draws 999 --out out",
         ),
-        "fit --synth-recordings 3 --category cut-in --no-comparison --valid-draws 1000 --out out",
+        "fit --synth-recordings 3 --categories cut-in --no-comparison --valid-draws 1000 --out out",
     ),
     verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --synth-duration 30"),
     verb(
         "export",
         Some("index.csv"),
         Some(
-            "export xosc --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1 --out out",
+            "export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1 --out out",
         ),
         "export xosc --from old-study --worst 3 --ego external --out out",
     ),
@@ -218,7 +218,7 @@ fn put(dir: &Path, from: Option<&str>) {
 
 /// What the verbs read.
 fn furnish(dir: &Path) {
-    let fit = "fit --synth-recordings 2 --category cut-in --parameterization 2 --no-comparison";
+    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison";
     done(dir, &format!("{fit} --out d.json"));
     let plan = "study --synth-recordings 1 --reference --dt 0.02 --plan-only";
     done(dir, &format!("{plan} --out plan"));

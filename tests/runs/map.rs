@@ -193,7 +193,7 @@ fn a_cell_is_what_simulate_says_of_the_same_numbers() {
             "simulate",
             "--category",
             "cut-in",
-            "--model",
+            "--models",
             "RSS",
             "--ego-speed",
             "30",

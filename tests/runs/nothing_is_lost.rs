@@ -30,8 +30,8 @@ fn an_output_never_replaces_an_input_or_another_result() {
     assert!(made.status.success());
     let tracks = recordings.join("01_tracks.csv");
     let before = std::fs::read(&tracks).unwrap();
-    refused(&["mine", text(&recordings), "-o", text(&tracks)], "would be overwritten");
-    refused(&["study", text(&recordings), "--lanes", text(&tracks), "--out", text(&out)], "would be overwritten");
+    refused(&["mine", text(&recordings), "--out", text(&tracks)], "would be overwritten");
+    refused(&["study", text(&recordings), "--rows", text(&tracks), "--out", text(&out)], "would be overwritten");
     refused(&["synth", text(&recordings), "--synth-recordings", "1"], "already holds a recording");
     assert!(std::fs::read(&tracks).unwrap() == before);
 
@@ -39,7 +39,7 @@ fn an_output_never_replaces_an_input_or_another_result() {
     std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), &scenarios).unwrap();
     let study = |lanes: &Path| {
         refused(
-            &["study", "--scenarios", text(&scenarios), "--lanes", text(lanes), "--out", text(&out)],
+            &["study", "--scenarios", text(&scenarios), "--rows", text(lanes), "--out", text(&out)],
             "would be overwritten",
         );
     };
@@ -79,7 +79,8 @@ fn what_an_earlier_run_left_in_the_folder_does_not_stay_beside_a_new_record() {
 fn files_that_no_record_lists_stay_whatever_they_are_called() {
     let dir = tempfile::tempdir().unwrap();
     let (density, out) = (dir.path().join("d.json"), dir.path().join("out"));
-    let fit = ["fit", "--synth-recordings", "2", "--category", "cut-in", "--parameterization", "2", "--no-comparison"];
+    let fit =
+        ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison"];
     let run = |args: &[&str]| {
         let output = lanesweep(&[&["-q"], args].concat());
         assert!(output.status.success(), "{output:?}");
@@ -104,7 +105,7 @@ fn files_that_no_record_lists_stay_whatever_they_are_called() {
 fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     let dir = tempfile::tempdir().unwrap();
     let (density, precious) = (dir.path().join("d.json"), dir.path().join("precious"));
-    let fit = ["-q", "fit", "--synth-recordings", "2", "--category", "cut-in", "--parameterization", "2"];
+    let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
     assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
     std::fs::write(&precious, "mine").unwrap();
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
@@ -157,7 +158,10 @@ fn values_that_no_lane_can_hold_are_refused_with_their_line() {
     let said = String::from_utf8_lossy(&study.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(study.status.code(), Some(4), "{said}");
     assert!(said.contains("line 1") && said.contains("ego.v0"), "{said}");
-    refused(&["simulate", "--category", "lvd", "--model", "FSM", "--ego-speed", "30", "--gap", "1e300"], "at most 1e6");
+    refused(
+        &["simulate", "--category", "lvd", "--models", "FSM", "--ego-speed", "30", "--gap", "1e300"],
+        "at most 1e6",
+    );
 }
 
 #[test]
@@ -189,12 +193,12 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     // Copied without the sentence beside them, as among recordings of other origin.
     std::fs::remove_file(recordings.join("SYNTHETIC.txt")).unwrap();
     let scenarios = at("s.jsonl");
-    ran(&["-q", "mine", text(&recordings), "-o", text(&scenarios)]);
+    ran(&["-q", "mine", text(&recordings), "--out", text(&scenarios)]);
     // What was driven is told beside the file, which may be lost too.
     std::fs::remove_file(at("s.exposure.json")).unwrap();
     let mut files = vec![scenarios.clone()];
     if cfg!(feature = "parquet") {
-        ran(&["-q", "mine", text(&recordings), "-o", text(&at("s.parquet"))]);
+        ran(&["-q", "mine", text(&recordings), "--out", text(&at("s.parquet"))]);
         std::fs::remove_file(at("s.parquet.exposure.json")).unwrap();
         files.push(at("s.parquet"));
     }
@@ -219,7 +223,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
         }
     }
     let (file, density) = (text(&scenarios), at("i.json"));
-    let fit = ["fit", "--scenarios", file, "--category", "lvd", "--parameterization", "i", "--valid-draws", "1000"];
+    let fit = ["fit", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i", "--valid-draws", "1000"];
     let fitted = ran(&[&["-q"], &fit[..], &["--no-comparison", "--format", "json", "--out", text(&density)]].concat());
     assert!(is_synthetic(&fitted));
     let sampled = ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--format", "json"];
@@ -233,7 +237,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     let mut played = std::fs::read_dir(at("played")).unwrap().map(|entry| entry.unwrap().path());
     let played = played.find(|path| path.extension().is_some_and(|ending| ending == "xosc")).unwrap();
     assert!(std::fs::read_to_string(played).unwrap().contains("SYNTHETIC DATA"));
-    let compare = ["-q", "compare", "--scenarios", file, "--categories", "lvd", "--parameterization", "i"];
+    let compare = ["-q", "compare", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i"];
     let compared = at("compared");
     let more = ["--samples", "500", "--thw", "0.6", "--format", "json", "--out", text(&compared)];
     assert!(is_synthetic(&ran(&[&compare[..], &more].concat())));

@@ -68,7 +68,7 @@ fn same(a: &Path, b: &Path) {
 const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
 
 fn density(dir: &Path) {
-    let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
 }
 

@@ -154,7 +154,7 @@ fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
 fn lanes_run_again_by_the_program_are_the_rows_of_the_studys_table() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--lanes", "lanes.csv"];
+    let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--rows", "lanes.csv"];
     done(dir, &study);
     let table = rows(&dir.join("lanes.csv"));
     for index in 1000..1012 {
@@ -207,7 +207,7 @@ fn a_rerun_takes_profile_time_step_options_and_arithmetic_from_the_run() {
         ["-q", "study", "--synth-recordings", "2", "--config", "study.toml", "--profile", "un-r157", "--dt", "0.1"];
     for (out, flags) in [("narrow", &["--backend", "cpu"][..]), ("wide", &["--reference"])] {
         let lanes = format!("{out}.csv");
-        done(dir, &[&base[..], flags, &["--out", out, "--lanes", &lanes]].concat());
+        done(dir, &[&base[..], flags, &["--out", out, "--rows", &lanes]].concat());
         let table = rows(&dir.join(&lanes));
         for index in 0..6 {
             compare_with_row(dir, out, &table[drawn(index, table.len() as u64) as usize], out == "wide");
@@ -220,7 +220,7 @@ fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu"];
-    done(dir, &[&study[..], &["--out", "whole", "--lanes", "lanes.csv"]].concat());
+    done(dir, &[&study[..], &["--out", "whole", "--rows", "lanes.csv"]].concat());
     done(dir, &[&study[..], &["--out", "parts", "--shard", "0/2"]].concat());
     let table = rows(&dir.join("lanes.csv"));
     let key = key_of(&table[table.len() / 2]);
@@ -231,12 +231,12 @@ fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
     done(dir, &["-q", "merge", "parts"]);
     assert_eq!(trace("parts"), of_whole);
     // A sampling run's parts as well.
-    let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
     let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "3000", "--thw", "0.6", "--backend", "cpu"];
     done(dir, &[&sample[..], &["--out", "sampled"]].concat());
     done(dir, &[&sample[..], &["--out", "shard", "--shard", "1/2"]].concat());
-    let trace = |from: &str| done(dir, &["simulate", "--from", from, "--lane", "#77/2/0.6s/FSM", "--model", "all"]);
+    let trace = |from: &str| done(dir, &["simulate", "--from", from, "--lane", "#77/2/0.6s/FSM", "--models", "all"]);
     assert_eq!(trace("shard"), trace("sampled"));
 }
 
@@ -244,7 +244,7 @@ fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
 fn models_and_variants_stand_together_in_the_table_and_on_the_sheet() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    done(dir, &["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--lanes", "lanes.csv"]);
+    done(dir, &["-q", "study", "--synth-recordings", "2", "--backend", "cpu", "--out", "r", "--rows", "lanes.csv"]);
     let table = rows(&dir.join("lanes.csv"));
     let row = table.iter().find(|row| row["category"] == "cut_in" && row["param"] == "2").unwrap();
     let key = key_of(row);
@@ -266,8 +266,8 @@ fn models_and_variants_stand_together_in_the_table_and_on_the_sheet() {
     // The rows of the lane itself are those that it has alone.
     let rows_of_own: Vec<&str> = compared.lines().filter_map(|line| line.strip_prefix(&format!("{own},"))).collect();
     assert_eq!(rows_of_own, alone.lines().skip(1).collect::<Vec<_>>());
-    assert_eq!(lanes(&of_lane(&["--model", "all", "--plot", "figures/all.svg"])).len(), MODELS);
-    assert_eq!(lanes(&of_lane(&["--model", "RSS,FSM", "--compare", "S,1"])).len(), 6);
+    assert_eq!(lanes(&of_lane(&["--models", "all", "--plot", "figures/all.svg"])).len(), MODELS);
+    assert_eq!(lanes(&of_lane(&["--models", "RSS,FSM", "--compare", "S,1"])).len(), 6);
     for (figure, names) in [("one.svg", 1), ("two.svg", 2), ("figures/all.svg", MODELS)] {
         let svg = std::fs::read_to_string(dir.join(figure)).unwrap();
         assert!(svg.contains("SYNTHETIC DATA"), "{figure} says what its data are");
@@ -285,7 +285,7 @@ fn a_folder_without_its_plan_says_how_to_make_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu"];
-    done(dir, &[&study[..], &["--out", "r", "--keep-plan", "never", "--lanes", "lanes.csv"]].concat());
+    done(dir, &[&study[..], &["--out", "r", "--keep-plan", "never", "--rows", "lanes.csv"]].concat());
     assert!(!dir.join("r/run-plan.json").exists());
     let key = key_of(&rows(&dir.join("lanes.csv"))[0]);
     let rerun = ["simulate", "--from", "r", "--lane", &key];

@@ -197,7 +197,7 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     let read = |folder: &str| std::fs::read_to_string(dir.path().join(folder).join("estimates.csv")).unwrap();
     assert_eq!(read("g"), read("again"));
     // The weighed sums of a run that stops by a rule are the same ones.
-    run(&[&given[..], &["--out", "ruled", "--until", "0.000001"]].concat());
+    run(&[&given[..], &["--out", "ruled", "--half-width", "0.000001"]].concat());
     assert_eq!(read("ruled"), read("again"));
     let both = ["--proposal", is, "--proposal", ce];
     run(&[&["--estimator", "is", "--samples", "20000", "--out", "balance"], &both[..]].concat());
@@ -330,7 +330,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--estimator", "subset"], 2, "one headway at a time"),
         (&[d, "--estimator", "ce", "--thw", "1", "--shard", "0/5"], 2, "with one given --proposal"),
         (&[d, "--shard", "5/5"], 2, "no shard 5 of 5"),
-        (&[d, "--shard", "0/2", "--until", "0.1"], 2, "when the whole is good enough"),
+        (&[d, "--shard", "0/2", "--half-width", "0.1"], 2, "when the whole is good enough"),
         (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "the adaptive estimators are sequential"),
         (&[d, "--shard", "0/2", "--bootstrap", "20"], 2, "no replicates"),
         (&[d, "--plan", "plan.json"], 2, "cannot be used with"),

@@ -85,8 +85,8 @@ fn readers() -> Vec<Vec<&'static str>> {
         "simulate --scenarios @ --lane a/S/1.0s/FSM",
         "simulate --profile @",
         "conformance @",
-        "conformance --lanes lanes.csv --scenarios @",
-        "conformance --lanes @ --scenarios scenarios.jsonl",
+        "conformance --golden-lanes lanes.csv --scenarios @",
+        "conformance --golden-lanes @ --scenarios scenarios.jsonl",
         "verify --backend cpu --scenarios @",
         "verify --backend cpu --profile @",
     ]
@@ -105,7 +105,7 @@ fn furnish(dir: &Path) {
         lanesweep(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--synth-duration", "60"]);
     assert_eq!(code, 0, "{said}");
     std::fs::write(dir.join("lanes.csv"), "scenario,param,thw,model\n").unwrap();
-    let fit = ["-q", "fit", "--synth-recordings", "3", "--category", "cut-in", "--parameterization", "2"];
+    let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     let (code, said) = lanesweep(dir, &[&fit[..], &["--no-comparison", "--out", "density.json"]].concat());
     assert_eq!(code, 0, "{said}");
 }
@@ -272,7 +272,7 @@ fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
     let named = "no\u{1b}[2J\u{202e}\nsuch.jsonl";
     let runs: [(&[&str], i32); 9] = [
         (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane], 0),
-        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--compare", "all", "--model", "all"], 0),
+        (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--compare", "all", "--models", "all"], 0),
         (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--format", "json"], 0),
         (&["simulate", "--scenarios", "s.jsonl", "--lane", "\u{1b}[2J/S/1.2s/FSM"], 2),
         (&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--compare-reference"], 0),
@@ -304,7 +304,7 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
     let dir = dir.path();
     for id in ["=HYPERLINK(1)", "@a", "-2+3", "+x,y", "'=q"] {
         scenarios_with(dir, id);
-        let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--lanes", "lanes.csv", "--thw", "1.2"];
+        let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--rows", "lanes.csv", "--thw", "1.2"];
         let (code, _, err) = raw(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
         assert_eq!(code, 0, "{err}");
         let table = std::fs::read_to_string(dir.join("lanes.csv")).unwrap();
@@ -315,7 +315,7 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
         let mut reader = csv::Reader::from_path(dir.join("lanes.csv")).unwrap();
         assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
         // Our readers take the apostrophe away: of lanes, and of scenarios.
-        let (code, _, err) = raw(dir, &["conformance", "--scenarios", "s.jsonl", "--lanes", "lanes.csv"]);
+        let (code, _, err) = raw(dir, &["conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
         assert_eq!(code, 0, "{id}: {err}");
         let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
         std::fs::write(dir.join("cases.csv"), row).unwrap();

@@ -153,7 +153,7 @@ fn compare(scenario: &str, csv: &str) -> usize {
 const CUT_IN: [&str; 12] = [
     "--category",
     "cut-in",
-    "--model",
+    "--models",
     "FSM",
     "--ego-speed",
     "30",
@@ -167,7 +167,7 @@ const CUT_IN: [&str; 12] = [
 const CUT_OUT: [&str; 14] = [
     "--category",
     "cut-out",
-    "--model",
+    "--models",
     "RSS",
     "--ego-speed",
     "27.3",
@@ -181,7 +181,7 @@ const CUT_OUT: [&str; 14] = [
     "26",
 ];
 const LVD: [&str; 10] =
-    ["--category", "lvd", "--model", "CCHDM", "--ego-speed", "25", "--gap", "20", "--acceleration", "-6.5"];
+    ["--category", "lvd", "--models", "CCHDM", "--ego-speed", "25", "--gap", "20", "--acceleration", "-6.5"];
 
 fn only_scenario(dir: &Path) -> String {
     let found: Vec<_> = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
@@ -207,7 +207,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
     good(root, &["synth", "data", "--synth-recordings", "1"]);
-    good(root, &["mine", "data", "--output", "s.jsonl"]);
+    good(root, &["mine", "data", "--out", "s.jsonl"]);
     good(root, &["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--out", "study"]);
     let check = |args: &[&str], from: &str| {
         let listed = good(root, &[&["export", "xosc", "--out", "x"], args].concat());
@@ -225,8 +225,8 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
         listed.lines().count()
     };
     // Lengths by their sums, then by the scenarios; both keep every gap.
-    assert_eq!(check(&["--from", "study", "--worst", "3", "--model", "FSM,RSS", "--side", "left"], "study"), 6);
-    let listed = good(root, &["export", "xosc", "--from", "study", "--worst", "1", "--model", "RSS", "--out", "y"]);
+    assert_eq!(check(&["--from", "study", "--worst", "3", "--models", "FSM,RSS", "--side", "left"], "study"), 6);
+    let listed = good(root, &["export", "xosc", "--from", "study", "--worst", "1", "--models", "RSS", "--out", "y"]);
     let lane = listed.lines().next().unwrap().split_once("  ").unwrap().1;
     let told = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
     assert_eq!(check(&told, "study"), 1);
@@ -241,7 +241,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
             "s.jsonl",
             "--category",
             "cut-in",
-            "--parameterization",
+            "--parameterizations",
             "2",
             "--no-comparison",
             "--out",
@@ -249,7 +249,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
         ],
     );
     good(root, &["sample", "d/cut-in-2.json", "--samples", "500", "--backend", "cpu", "--thw", "0.6", "--out", "run"]);
-    assert_eq!(check(&["--from", "run", "--worst", "2", "--model", "FSM"], "run"), 2);
+    assert_eq!(check(&["--from", "run", "--worst", "2", "--models", "FSM"], "run"), 2);
     refused(root, &["export", "xosc", "--from", "run"], 2, "a run has many lanes");
     refused(
         root,
@@ -264,12 +264,11 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
 fn the_worst_lanes_of_a_study_are_those_with_the_smallest_margin() {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path();
-    let study =
-        ["study", "--synth-recordings", "1", "--backend", "cpu", "--out", "study", "--lanes", "study/lanes.csv"];
+    let study = ["study", "--synth-recordings", "1", "--backend", "cpu", "--out", "study", "--rows", "study/lanes.csv"];
     good(root, &study);
     good(
         root,
-        &["export", "xosc", "--from", "study", "--worst", "4", "--model", "CCHDM", "--variant", "S", "--out", "x"],
+        &["export", "xosc", "--from", "study", "--worst", "4", "--models", "CCHDM", "--variant", "S", "--out", "x"],
     );
     let mut reader = csv::Reader::from_path(root.join("study/lanes.csv")).unwrap();
     let rows: Vec<HashMap<String, String>> = reader.deserialize().map(Result::unwrap).collect();
@@ -398,7 +397,7 @@ fn what_cannot_be_exported_is_named() {
     let xosc = |more: &[&'static str]| [&["export", "xosc"], more].concat();
     refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not say what it is of");
     refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
-    refused(root, &xosc(&["--category", "cut-in", "--model", "FSM"]), 2, "distance is missing");
+    refused(root, &xosc(&["--category", "cut-in", "--models", "FSM"]), 2, "distance is missing");
     refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "no width of a lane");
     refused(root, &[&xosc(&["--out", "file/x"])[..], &CUT_IN].concat(), 0, "");
     std::fs::write(root.join("taken"), "").unwrap();
@@ -407,7 +406,7 @@ fn what_cannot_be_exported_is_named() {
     let crash = [
         "--category",
         "cut-out",
-        "--model",
+        "--models",
         "FSM",
         "--ego-speed",
         "30",

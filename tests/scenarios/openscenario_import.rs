@@ -153,7 +153,7 @@ fn a_stochastic_file_becomes_estimates_and_its_lanes_run_again() {
     let first = series.lines().nth(1).unwrap();
     let speed: f64 = first.split(',').nth(2).unwrap().parse().unwrap();
     assert!((speed - value("ego_speed_kmh").parse::<f64>().unwrap() / 3.6).abs() < 1e-5);
-    let listed = good(root, &["export", "xosc", "--from", "a", "--worst", "1", "--model", "FSM", "--out", "x"]);
+    let listed = good(root, &["export", "xosc", "--from", "a", "--worst", "1", "--models", "FSM", "--out", "x"]);
     assert_eq!(listed.lines().count(), 1);
     // Headways by flag where the file has no distance, other values by --set.
     let text = std::fs::read_to_string(file).unwrap();

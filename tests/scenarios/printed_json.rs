@@ -77,7 +77,7 @@ fn a_study_prints_its_tables_and_a_merged_one_the_same() {
 #[test]
 fn densities_and_samples_print_what_their_files_hold() {
     let dir = tempfile::tempdir().unwrap();
-    let fit: Vec<&str> = ["fit", "--category", "cut-in", "--parameterization", "2", "--out", "d", "--no-comparison"]
+    let fit: Vec<&str> = ["fit", "--categories", "cut-in", "--parameterizations", "2", "--out", "d", "--no-comparison"]
         .into_iter()
         .chain(SMALL.into_iter().take(4))
         .collect();
@@ -91,7 +91,7 @@ fn densities_and_samples_print_what_their_files_hold() {
     let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("s/estimate.json")).unwrap()).unwrap();
     assert_eq!(printed, file);
 
-    let compare = ["compare", "--samples", "100", "--parameterization", "i", "--categories", "lvd", "--out", "c"];
+    let compare = ["compare", "--samples", "100", "--parameterizations", "i", "--categories", "lvd", "--out", "c"];
     let compare: Vec<&str> = compare.iter().chain(&SMALL).copied().collect();
     let printed = json(dir.path(), &compare);
     let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("c/compare.json")).unwrap()).unwrap();
@@ -114,7 +114,7 @@ fn maps_traces_and_checks_print_documents() {
     }
 
     let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--thw", "0.4", "--lateral-speed", "1.5"];
-    let simulate: Vec<&str> = ["simulate", "--model", "all"].iter().chain(&case).copied().collect();
+    let simulate: Vec<&str> = ["simulate", "--models", "all"].iter().chain(&case).copied().collect();
     let (printed, csv) = (json(dir.path(), &simulate), lanesweep(dir.path(), &simulate));
     assert_eq!(printed["steps"].as_array().unwrap().len(), csv.lines().count() - 1);
     let lanes = printed["lanes"].as_array().unwrap();
@@ -124,7 +124,8 @@ fn maps_traces_and_checks_print_documents() {
         assert_eq!(outcome["collision"] == Value::Bool(true), outcome["t_crash_s"].is_number(), "{lane}");
     }
 
-    let verify = ["verify", "--backend", "cpu", "--lanes", "24", "--threshold-units", "1", "--synth-recordings", "1"];
+    let verify =
+        ["verify", "--backend", "cpu", "--random-lanes", "24", "--threshold-units", "1", "--synth-recordings", "1"];
     let printed = json(dir.path(), &verify);
     let sets = printed["sets"].as_array().unwrap();
     assert_eq!((printed["equal"].as_bool(), sets.len()), (Some(true), 3));

@@ -89,13 +89,13 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
     lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "1"]);
-    lanesweep(at, &["-q", "mine", "rec", "-o", "s.jsonl"]);
-    lanesweep(at, &["-q", "mine", "rec", "-o", "s.parquet"]);
+    lanesweep(at, &["-q", "mine", "rec", "--out", "s.jsonl"]);
+    lanesweep(at, &["-q", "mine", "rec", "--out", "s.parquet"]);
     let study = ["-q", "study", "--backend", "cpu", "--keep-plan", "never"];
     for (file, out, threads) in [("s.jsonl", "a", "2"), ("s.parquet", "b", "1")] {
         for ending in ["csv", "parquet", "jsonl"] {
             let lanes = format!("{out}.{ending}");
-            let args = ["--scenarios", file, "--out", out, "--threads", threads, "--lanes", &lanes];
+            let args = ["--scenarios", file, "--out", out, "--threads", threads, "--rows", &lanes];
             lanesweep(at, &[&study[..], &args].concat());
         }
     }
@@ -115,7 +115,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     // A density of the same scenarios, of either file: its exposure stands beside each.
     for file in ["s.jsonl", "s.parquet"] {
         let name = format!("{file}.json");
-        let fit = ["-q", "fit", "--scenarios", file, "--category", "lvd", "--parameterization", "i", "--out", &name];
+        let fit = ["-q", "fit", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i", "--out", &name];
         lanesweep(at, &[&fit[..], &["--no-comparison"]].concat());
     }
 }
@@ -207,8 +207,8 @@ fn check_facts(table: &Read, kind: &str, has_lanes: bool) {
 fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
     let dir = tempfile::tempdir().unwrap();
     let cases: [(&[&str], &str); 4] = [
-        (&["study", "--lanes", "lanes.xlsx"], ".csv, .jsonl or .parquet"),
-        (&["mine", "rec", "-o", "s.csv"], ".jsonl or .parquet"),
+        (&["study", "--rows", "lanes.xlsx"], ".csv, .jsonl or .parquet"),
+        (&["mine", "rec", "--out", "s.csv"], ".jsonl or .parquet"),
         (&["study", "--scenarios", "s.xml"], ".jsonl, .parquet or .csv"),
         (&["simulate", "--table", "cases.jsonl"], ".csv or .parquet"),
     ];
@@ -223,7 +223,7 @@ fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
 fn a_lane_table_must_not_replace_the_scenarios_it_is_of() {
     let dir = tempfile::tempdir().unwrap();
     write_scenarios(&dir.path().join("s.parquet"), &synthetic()).unwrap();
-    let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet", "--lanes", "s.parquet"]);
+    let (code, text) = said(dir.path(), &["study", "--scenarios", "s.parquet", "--rows", "s.parquet"]);
     assert!(code == 2 && text.contains("would be overwritten"), "{text}");
 }
 

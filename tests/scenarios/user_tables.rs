@@ -249,7 +249,7 @@ fn simulate_takes_a_row_of_a_parquet_table() {
     ];
     made::write(&dir.path().join("cases.parquet"), columns, Compression::SNAPPY);
     let table = lanesweep(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "2"]);
-    let flags = "simulate --category cut-in --model FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
+    let flags = "simulate --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
     assert_eq!(table, lanesweep(dir.path(), &flags.split(' ').collect::<Vec<_>>()));
     let (code, text) = said(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "3"]);
     assert!(code == 2 && text.contains("there is no row 3"), "{text}");
@@ -402,7 +402,7 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert_eq!(of_parquet(-0.49).unwrap()[1].target.v, [1.0, 0.0]);
     assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
 
-    let lvd = |speed: &str| ["simulate --category lvd --model FSM --ego-speed 30 --gap 30 --speed", speed].join(" ");
+    let lvd = |speed: &str| ["simulate --category lvd --models FSM --ego-speed 30 --gap 30 --speed", speed].join(" ");
     let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
     let (code, text) = simulate(&lvd("-0.01"));
     assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");
@@ -421,7 +421,7 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
 #[test]
 fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let dir = tempfile::tempdir().unwrap();
-    let cut_in = "simulate --category cut-in --model FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
+    let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
     let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
     let (code, text) = simulate("108");
     assert!(

@@ -40,10 +40,10 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
         String::from_utf8(output.stdout).unwrap()
     };
     run(&[&["-q", "synth", text(&data)], &SMALL[..]].concat());
-    let wanted = ["--parameterization", "2,e,i"];
+    let wanted = ["--parameterizations", "2,e,i"];
     let printed = run(&[&["-q", "fit", "--out", text(&a)], &wanted[..], &SMALL[..]].concat());
     run(&[&["-q", "fit", text(&data), "--out", text(&b), "--threads", "1"], &wanted[..]].concat());
-    run(&["-q", "mine", text(&data), "-o", text(&scenarios)]);
+    run(&["-q", "mine", text(&data), "--out", text(&scenarios)]);
     run(&[&["-q", "fit", "--scenarios", text(&scenarios), "--out", text(&c), "--threads", "3"], &wanted[..]].concat());
     for word in ["SYNTHETIC DATA", "no number above is a statement about real traffic", "lateral_speed_mps", "P_valid"]
     {
@@ -68,9 +68,9 @@ fn what_was_driven_comes_with_the_mined_file_from_flags_or_is_unknown() {
     let [data, out] = ["data", "out.json"].map(|name| dir.path().join(name));
     let scenarios = dir.path().join("scenarios.jsonl");
     assert_eq!(code(&lanesweep(&[&["-q", "synth", text(&data)], &SMALL[..]].concat())), 0);
-    assert_eq!(code(&lanesweep(&["-q", "mine", text(&data), "-o", text(&scenarios)])), 0);
+    assert_eq!(code(&lanesweep(&["-q", "mine", text(&data), "--out", text(&scenarios)])), 0);
     let fit = |more: &[&str]| {
-        let args = ["fit", "--scenarios", text(&scenarios), "--parameterization", "3", "--no-comparison"];
+        let args = ["fit", "--scenarios", text(&scenarios), "--parameterizations", "3", "--no-comparison"];
         lanesweep(&[&args, &["--out", text(&out)][..], more].concat())
     };
     let beside = dir.path().join("scenarios.exposure.json");
@@ -113,7 +113,7 @@ fn sets_that_make_no_density_are_told_apart() {
     let fit = |name: &str, set: &[lanesweep::scenario::Scenario], key: &str| {
         let path = dir.path().join(name);
         write_scenarios(&path, set).unwrap();
-        lanesweep(&["fit", "--scenarios", text(&path), "--parameterization", key, "--out", text(&out)])
+        lanesweep(&["fit", "--scenarios", text(&path), "--parameterizations", key, "--out", text(&out)])
     };
     let mut dropped = lvd.clone();
     dropped.iter_mut().for_each(|s| s.kept = false);
@@ -151,10 +151,10 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let cases: [(&[&str], i32, &str); 11] = [
         (&["fit", "--valid-draws", "0"], 2, "out of range (1 to 1000000000)"),
         (&["fit", "--valid-draws", "1000000001"], 2, "out of range (1 to 1000000000)"),
-        (&["fit", "--parameterization", "9"], 2, "there is no parameterization `9`"),
-        (&["fit", "--parameterization", "9"], 2, "LVD: i ii iii iv v"),
-        (&["fit", "--category", "cut-in", "--parameterization", "ii"], 2, "of cut-in"),
-        (&["fit", "--category", "cutin"], 2, "use cut-in, cut-out, lvd"),
+        (&["fit", "--parameterizations", "9"], 2, "there is no parameterization `9`"),
+        (&["fit", "--parameterizations", "9"], 2, "LVD: i ii iii iv v"),
+        (&["fit", "--categories", "cut-in", "--parameterizations", "ii"], 2, "of cut-in"),
+        (&["fit", "--categories", "cutin"], 2, "use cut-in, cut-out, lvd"),
         (&["fit", "--bandwidth-rule", "best"], 2, "reduction"),
         (&["fit", "--hours", "-1"], 2, "--hours"),
         (&["fit", "--km", "nan"], 2, "--km"),
@@ -170,7 +170,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     }
     let input = dir.path().join("input.json");
     std::fs::copy(&scenarios, &input).unwrap();
-    let over = lanesweep(&["fit", "--scenarios", text(&input), "--parameterization", "i", "--out", text(&input)]);
+    let over = lanesweep(&["fit", "--scenarios", text(&input), "--parameterizations", "i", "--out", text(&input)]);
     assert_eq!(code(&over), 2, "{}", stderr(&over));
     assert!(stderr(&over).contains("would be overwritten"), "{}", stderr(&over));
     let help = String::from_utf8(lanesweep(&["fit", "--help"]).stdout).unwrap();

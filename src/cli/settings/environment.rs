@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 
-use super::keys::{Key, nearest};
+use super::keys::{Key, RENAMED, nearest};
 use crate::{Error, Place, Result};
 
 /// Names the configuration file, where `--config` names none.
@@ -41,7 +41,9 @@ pub(super) fn read<'k>(variables: &[(OsString, OsString)], keys: &'k [Key]) -> R
             continue;
         }
         let place = || Place::item(format!("environment variable {name}"));
-        let Some((_, key)) = known.iter().find(|(variable, _)| variable == name) else {
+        let old = || RENAMED.iter().find(|(old, _)| variable_of(old) == name).and_then(|(old, _)| Key::find(keys, old));
+        let key = known.iter().find(|(variable, _)| variable == name).map(|(_, key)| *key);
+        let Some(key) = key.or_else(old) else {
             let names = known.iter().map(|(variable, _)| variable.as_str()).chain([FILE_VARIABLE]);
             let help = nearest(name, names).map_or(String::new(), |near| format!("did you mean {near}? "));
             let help = format!("{help}Variables are LANESWEEP_ and a key of `lanesweep config show` in capitals");
@@ -50,7 +52,7 @@ pub(super) fn read<'k>(variables: &[(OsString, OsString)], keys: &'k [Key]) -> R
         let Some(word) = word.to_str() else {
             return Err(Error::usage(place(), "it is no UTF-8 text", format!("expected {}", key.expected())));
         };
-        found.push((*key, name.to_owned(), word.to_owned()));
+        found.push((key, name.to_owned(), word.to_owned()));
     }
     found.sort_by(|a, b| a.1.cmp(&b.1));
     Ok(found)

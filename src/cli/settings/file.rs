@@ -84,7 +84,7 @@ impl Reader<'_> {
         let refused = |wrong: Wrong| Error::usage(place(), wrong.problem, wrong.help);
         let value = from_toml(key, value.get_ref()).map_err(refused)?;
         check(key, &value).map_err(refused)?;
-        lines.push(Line { key: name.to_owned(), value, row });
+        lines.push(Line { key: key.name.clone(), value, row });
         Ok(())
     }
 }

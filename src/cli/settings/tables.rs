@@ -58,7 +58,7 @@ pub struct RunSettings {
     pub threads: Option<usize>,
     /// What computes the lanes.
     pub backend: BackendChoice,
-    /// Device: a part of its name, pci:BUS or its index in `lanesweep devices`. Without it: the first GPU.
+    /// Device: a part of its name, pci:BUS or its index in `lanesweep verify devices`. Without it: the first GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
     /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file. `map --preset jrc` takes jrc-2021 unless it is set.
@@ -138,7 +138,7 @@ pub struct SampleSettings {
     /// End once the interval's half-width over the estimate is at most this. Without it: all samples are drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub until: Option<f64>,
+    pub half_width: Option<f64>,
     /// End at the first look after so many seconds, s: not reproducible. Without it: no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
@@ -148,15 +148,15 @@ pub struct SampleSettings {
     /// Runs of the pilot of is.
     #[schemars(range(min = 500, max = 10_000_000))]
     pub pilot: u64,
-    /// Share of the pilot's worst points that the proposal of is is fitted to.
+    /// Elite fraction: of the pilot's points, the worst that the proposal of is is fitted to.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub worst_share: f64,
-    /// Share of one broad Gaussian over the worst points in the proposal of is; 0 is the published form.
+    pub elite_fraction: f64,
+    /// Mixture weight of one broad Gaussian over the worst points in the proposal of is; 0 is the published form.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub broad: f64,
-    /// Share of the density in the proposals of is and ce; 0 is the published form.
+    pub broad_weight: f64,
+    /// Defensive mixture weight: of the density in the proposals of is and ce; 0 is the published form.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub defence: f64,
+    pub defensive_weight: f64,
     /// Replicates over resampled scenarios (mc); 0: none.
     #[schemars(range(max = 1_048_576))]
     pub bootstrap: u32,
@@ -176,13 +176,13 @@ impl Default for SampleSettings {
             points: PointKind::Random,
             interval: IntervalKind::Wilson,
             level: 0.95,
-            until: None,
+            half_width: None,
             time_limit_s: None,
             worst: 20,
             pilot: 10_000,
-            worst_share: 0.02,
-            broad: 0.2,
-            defence: 0.1,
+            elite_fraction: 0.02,
+            broad_weight: 0.2,
+            defensive_weight: 0.1,
             bootstrap: 0,
             bootstrap_samples: 10_000,
             seed: 157,

@@ -14,7 +14,7 @@ use crate::{Error, Place, Result};
 /// A device as a user names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeviceName {
-    /// Position in the list of `lanesweep devices`.
+    /// Position in the list of `lanesweep verify devices`.
     Index(usize),
     /// Place on the PCI bus, as [`pci_bus_id`] writes it.
     Pci(String),
@@ -29,7 +29,7 @@ impl FromStr for DeviceName {
     /// [`Error::Usage`] for an empty text and for a `pci:` that no bus id follows.
     fn from_str(text: &str) -> Result<Self> {
         let text = text.trim();
-        let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep devices` lists them";
+        let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep verify devices` lists them";
         if text.is_empty() {
             return Err(Error::usage(Place::item("--device"), "no device is named", help));
         }
@@ -86,7 +86,7 @@ impl FromStr for BackendChoice {
             _ => Err(Error::usage(
                 Place::item("--backend"),
                 format!("there is no backend `{text}`"),
-                "write auto, cpu or gpu; a certain device: --device, see `lanesweep devices`",
+                "write auto, cpu or gpu; a certain device: --device, see `lanesweep verify devices`",
             )),
         }
     }
@@ -192,7 +192,7 @@ fn same_device(a: &AdapterCard, b: &AdapterCard) -> bool {
 fn list<'a>(cards: impl Iterator<Item = &'a AdapterCard>) -> String {
     let lines: Vec<String> = cards.map(AdapterCard::one_line).collect();
     if lines.is_empty() {
-        return "this machine has none; `lanesweep devices` says what to install".to_owned();
+        return "this machine has none; `lanesweep verify devices` says what to install".to_owned();
     }
     format!("name one by its index or PCI bus id:\n{}", lines.join("\n"))
 }
@@ -207,7 +207,7 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
         return Error::device(
             "--backend gpu",
             "this machine has no GPU that its drivers show",
-            format!("`lanesweep devices` shows what there is; use --backend cpu{named}"),
+            format!("`lanesweep verify devices` shows what there is; use --backend cpu{named}"),
         );
     }
     Error::device(
@@ -218,7 +218,7 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
         ),
         match visible {
             Some(visible) if !visible.is_empty() => format!(
-                "it allows pci:{}, which the graphics driver does not show: see `lanesweep devices`, or use \
+                "it allows pci:{}, which the graphics driver does not show: see `lanesweep verify devices`, or use \
                  --backend cpu",
                 visible.join(", pci:")
             ),

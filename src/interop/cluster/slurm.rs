@@ -118,7 +118,7 @@ impl SlurmArray {
         let out = self.out_quoted()?;
         let _ = writeln!(
             text,
-            "\n# The result of the whole run, from the parts of all tasks.\nexec {program} merge {out} --threads {}",
+            "\n# The result of the whole run, from the parts of all tasks.\nexec {program} cluster merge {out} --threads {}",
             self.resources.cpus
         );
         Ok(text)

@@ -1,4 +1,4 @@
-//! Lanes of the `paper` profile: every lane of a golden table (`--scenarios S.jsonl --lanes L.csv`) is run
+//! Lanes of the `paper` profile: every lane of a golden table (`--scenarios S.jsonl --golden-lanes L.csv`) is run
 //! in f64 and in f32 and compared.
 
 use std::collections::HashMap;
@@ -117,7 +117,7 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         }
     }
     if result.lanes == 0 {
-        return Err(Error::input(Place::item("--lanes"), "no lane to compare", "give a table with rows"));
+        return Err(Error::input(Place::item("--golden-lanes"), "no lane to compare", "give a table with rows"));
     }
     Ok(result)
 }

@@ -1,0 +1,36 @@
+//! `lanesweep cluster`: a run over several machines.
+
+use clap::{Args, Subcommand};
+
+use super::Exit;
+use super::merge::Merge;
+use super::slurm::Slurm;
+use crate::Result;
+
+/// Split a run over several machines and join its parts
+///
+/// `--shard I/N` of `study` and `sample` computes a part; `cluster merge` makes the result of all parts, `cluster slurm`
+/// writes the scripts of a Slurm job array.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
+                        result\n  lanesweep cluster merge result\n  lanesweep cluster slurm study.toml --array 20 \
+                        --out result")]
+pub struct Cluster {
+    #[command(subcommand)]
+    verb: ClusterVerb,
+}
+
+#[derive(Debug, Subcommand)]
+enum ClusterVerb {
+    Merge(Merge),
+    Slurm(Slurm),
+}
+
+impl Cluster {
+    pub fn run(&self) -> Result<Exit> {
+        match &self.verb {
+            ClusterVerb::Merge(verb) => verb.run(),
+            ClusterVerb::Slurm(verb) => verb.run(),
+        }
+    }
+}
