@@ -1,6 +1,6 @@
 //! `lanesweep sample`: a density in, probabilities of failure out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -35,7 +35,6 @@ use crate::run::sampling::{EstimateRow, MapAxes, SampleHeadways, SamplePlanOptio
 use crate::stats::density::{DensityModel, read_density};
 use crate::stats::estimate::{Checkpoints, Pilot, StopRule};
 use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder};
-use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
@@ -75,7 +74,7 @@ pub struct Sample {
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: value that is the same in every sample; repeatable
-    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given)]
+    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = sample_checks::given)]
     pub(super) set: Vec<(String, f64)>,
     /// Crude, importance, cross-entropy, subset
     ///
@@ -135,7 +134,7 @@ pub struct Sample {
     #[arg(long, alias = "defence", hide = true, value_name = "FRACTION", default_value_t = 0.1)]
     pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
-    #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = sample_checks::given)]
     pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable
     ///
@@ -207,7 +206,7 @@ impl Sample {
         let headways = self.headways(&density)?;
         let opened = self.backend.open()?;
         if let Some(rows) = &self.rows {
-            guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
+            sample_checks::guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }
         let run = Run { flags: self, density, profile, models, criterion, headways, opened: &opened, started };
         tracing::info!("{}", run.density.provenance.data);
@@ -253,7 +252,7 @@ impl Sample {
         let (planned, _) = PlannedSample::read(path)?;
         let stop = StopRule::samples(planned.facts.samples);
         if let Some(rows) = &self.rows {
-            guard(rows, &self.out, std::iter::once(path))?;
+            sample_checks::guard(rows, &self.out, std::iter::once(path))?;
         }
         sample_crude::run(self, &planned, &self.backend.open()?, stop, started, verbosity)
     }
@@ -444,19 +443,4 @@ pub(super) fn one_headway(list: &[Headway], estimator: EstimatorFlag) -> Result<
         ));
     };
     Ok(*one)
-}
-
-/// `NAME=VALUE`.
-fn given(text: &str) -> std::result::Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
-    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
-}
-
-/// The rows must replace neither an input nor another result.
-fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
-    super::source::refuse_overwriting(rows, &others, "--rows")?;
-    TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
 }
