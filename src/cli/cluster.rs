@@ -23,7 +23,7 @@ pub struct Cluster {
 #[derive(Debug, Subcommand)]
 enum ClusterVerb {
     Merge(Merge),
-    Slurm(Slurm),
+    Slurm(Box<Slurm>),
 }
 
 impl Cluster {

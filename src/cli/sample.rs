@@ -60,7 +60,7 @@ pub struct Sample {
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: value that is the same in every sample; repeatable
-    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given)]
+    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = sample_checks::given)]
     pub(super) set: Vec<(String, f64)>,
     /// Crude, importance, cross-entropy, subset
     ///
@@ -120,7 +120,7 @@ pub struct Sample {
     #[arg(long, alias = "defence", hide = true, value_name = "FRACTION", default_value_t = 0.1)]
     pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
-    #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = sample_checks::given)]
     pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable
     ///

@@ -1,6 +1,9 @@
 //! What the flags of `lanesweep sample` must fulfil whatever the density is.
 
+use std::path::{Path, PathBuf};
+
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// Points that an adaptive estimator holds at once, at most.
@@ -109,4 +112,19 @@ impl Sample {
         }
         Ok(())
     }
+}
+
+/// The rows must replace neither an input nor another result.
+pub(super) fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
+    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
+    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
+    super::source::refuse_overwriting(rows, &others, "--rows")?;
+    TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
+}
+
+/// `NAME=VALUE`.
+pub(super) fn given(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
+    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
+    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }
