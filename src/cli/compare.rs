@@ -11,24 +11,16 @@ use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, Part};
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
-use super::study_run::run_plan;
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
-use crate::engine::{Forecast, Headway, LanePlan, Partial, SweepSummary, Wanted, forecast};
+use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
 use crate::report::compare::CompareFile;
 use crate::report::compare_figures;
 use crate::report::html::PageFigure;
-use crate::run::sampling::{
-    CategoryComparison, ComparedParameterization, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts,
-    compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
-};
-use crate::run::study::{StudyOptions, plan_study};
-use crate::scenario::Scenario;
+use crate::run::compare::{self, CompareOptions, CompareResult};
+use crate::run::study::StudyOptions;
 use crate::scenario::parameterization::ParameterizationId;
-use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
@@ -38,9 +30,6 @@ use crate::{Error, Place, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
 const BYTES_OF_COUNTS: u64 = 8 << 20;
-
-/// Nominal level of every interval.
-const LEVEL: f64 = 0.95;
 
 /// Which parameterizations give the right risk, not only the right labels?
 ///
@@ -95,21 +84,6 @@ pub struct Compare {
     generator: GeneratorFlags,
 }
 
-/// Everything that a run was given, read and checked, with the lanes of its study.
-struct Run<'a> {
-    flags: &'a Compare,
-    scenarios: &'a [Scenario],
-    facts: &'a DataFacts,
-    fit: FitOptions,
-    profile: &'a Profile,
-    models: Vec<ModelId>,
-    headways: Vec<Headway>,
-    enough: Enough,
-    opened: &'a Opened,
-    study: &'a LanePlan,
-    partial: &'a Partial,
-}
-
 impl Compare {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
@@ -137,79 +111,43 @@ impl Compare {
             tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
         }
 
-        let options = StudyOptions {
-            // Categories without a wanted parameterization have nothing to be compared with.
-            categories: categories.into_iter().filter(|c| ids.iter().any(|id| id.category == *c)).collect(),
-            models: models.clone(),
-            headways: headways.clone(),
-            parameterization: config.parameterization.clone(),
+        let options = CompareOptions {
+            study: StudyOptions {
+                categories,
+                models: models.clone(),
+                headways: headways.clone(),
+                parameterization: config.parameterization.clone(),
+            },
+            parameterizations: ids.clone(),
+            samples: self.samples,
+            seed: self.seed,
+            enough: Enough {
+                failures: config.score.least_failures.into(),
+                margin: config.compare.margin,
+                ..Enough::default()
+            },
         };
-        let planned = plan_study(&collection.scenarios, &profile, &options)?;
-        let plan = &planned.plan;
-        if plan.unit_count() == 0 {
-            return Err(Error::input(
-                Place::item(facts.data),
-                format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
-                "use more recordings, or relax the filters ([mining] in --config)",
-            ));
-        }
+        let enough = options.enough;
+        let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;
+        let plan = compare.lane_plan();
         if self.dry_run {
             return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
         let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(self.seed);
-        let (partial, mut swept) = run_plan(plan, &executor, verbosity)?;
-
-        let run = Run {
-            flags: self,
-            scenarios: &collection.scenarios,
-            facts: &facts,
-            fit: FitOptions {
-                parameterization: config.parameterization.clone(),
-                with_thw: false,
-                rule: BandwidthRule::Reduction,
-                representativeness: false,
-                ..FitOptions::default()
-            },
-            profile: &profile,
-            models: models.clone(),
-            headways: headways.clone(),
-            enough: Enough {
-                failures: config.score.least_failures.into(),
-                margin: config.compare.margin,
-                ..Enough::default()
-            },
-            opened: &opened,
-            study: plan,
-            partial: &partial,
-        };
-        let mut compared: Vec<CategoryComparison> =
-            (0..plan.blocks.len()).map(|block| run.recorded(block)).collect::<Result<_>>()?;
-        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
-        let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
-        for id in &ids {
-            match run.parameterization(*id, &mut swept, |n| bar.inc(n)) {
-                Ok((cells, left_out)) => {
-                    complete &= left_out.is_empty();
-                    for error in &left_out {
-                        bar.suspend(|| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
-                    }
-                    let of = compared.iter_mut().find(|c| c.category == id.category);
-                    of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
-                }
-                // A profile whose cut-outs cannot be sampled is a usage error of that category alone.
-                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => failed.push(error),
-                Err(error) => return Err(error),
-            }
-        }
+        let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
+        let (counts, mut swept) = compare.replay(&executor, |units| bar.inc(units))?;
         bar.finish_and_clear();
-        if compared.iter().all(|c| c.parameterizations.is_empty()) && !failed.is_empty() {
-            return Err(failed.swap_remove(0));
-        }
-        for error in &failed {
+        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
+        let result = compare.sample(&counts, &executor, |samples| bar.inc(samples));
+        bar.finish_and_clear();
+        let CompareResult { categories, left_out, failed, summary } = result?;
+        swept.add(&summary);
+        for error in left_out.iter().chain(&failed) {
             tracing::warn!("{error}; {}", error.help().unwrap_or_default());
         }
+        let complete = collection.problems.is_empty() && left_out.is_empty();
 
         let mut file = CompareFile {
             lanesweep_comparison: 1,
@@ -223,11 +161,11 @@ impl Compare {
             headways: headways.iter().map(Headway::to_string).collect(),
             samples: self.samples,
             seed: self.seed,
-            level: LEVEL,
-            enough: run.enough,
+            level: compare::Compare::LEVEL,
+            enough,
             study_plan_sha256: plan.hash().to_owned(),
             left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
-            categories: compared,
+            categories,
             files: Vec::new(),
             host: opened.host(swept.rechecked_lanes, started),
         };
@@ -311,63 +249,5 @@ impl Compare {
             source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
         }
         Ok(())
-    }
-}
-
-impl Run<'_> {
-    /// S of one category.
-    fn recorded(&self, block: usize) -> Result<CategoryComparison> {
-        let of = &self.study.blocks[block];
-        let exposure = self.facts.driven.map(|driven| Exposure::new(of.units.len(), driven));
-        let counts = ScenarioCounts::of_variant(self.study, self.partial, block, 0)?;
-        Ok(CategoryComparison {
-            category: of.category,
-            scenarios: of.units.len(),
-            exposure,
-            recorded: recorded_cells(self.study, &counts, exposure.as_ref(), LEVEL),
-            parameterizations: Vec::new(),
-        })
-    }
-
-    /// One parameterization, with the scenarios that its density leaves out.
-    fn parameterization(
-        &self,
-        id: ParameterizationId,
-        swept: &mut SweepSummary,
-        progress: impl FnMut(u64),
-    ) -> Result<(ComparedParameterization, Vec<Error>)> {
-        let fitted = DensityModel::fit(id, self.scenarios, self.facts, &self.fit)?;
-        let density = fitted.model;
-        let find = |(at, block): (usize, &crate::engine::Block)| {
-            let variant = block.variants.iter().position(|v| v == id.key)?;
-            (block.category == id.category).then_some((at, variant))
-        };
-        let Some((block, variant)) = self.study.blocks.iter().enumerate().find_map(find) else {
-            return Err(Error::Internal(format!("{} {} has a density but no lanes", id.category.label(), id.key)));
-        };
-        let options = SamplePlanOptions {
-            samples: self.flags.samples,
-            seed: self.flags.seed,
-            source: SampleSource::Random,
-            models: self.models.clone(),
-            headways: SampleHeadways::Each(self.headways.clone()),
-        };
-        let plan = plan_samples(&density, &density.mixture()?, self.profile, &options)?;
-        let executor = self.opened.executor().with_recheck(self.flags.seed);
-        let kernels = kernel_scenarios(&density, self.scenarios)?;
-        let scenarios = self.study.blocks[block].units.len() as usize;
-        let exposure = density.exposure.as_ref();
-        let sampled = sample_by_scenario(&plan, &kernels, scenarios, &executor, exposure, LEVEL, progress)?;
-        swept.add(&sampled.summary);
-        let compared = ComparedParameterization {
-            key: id.key,
-            parameters: id.parameters,
-            density_sha256: density.content_sha256()?,
-            kernels: kernels.len(),
-            plan_sha256: plan.hash().to_owned(),
-            voids: sampled.tally.voids,
-            cells: compare_cells(self.study, self.partial, block, variant, &sampled, self.enough, LEVEL)?,
-        };
-        Ok((compared, fitted.left_out))
     }
 }

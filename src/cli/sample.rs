@@ -8,8 +8,10 @@ use super::ProfileFlags;
 use super::backend_flags::{BackendFlags, Opened};
 use super::format::FormatFlag;
 use super::lists;
+use super::sample_checks;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
+use crate::Result;
 use crate::cli::settings::SampleSettings;
 pub(super) use crate::cli::settings::{
     Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
@@ -21,7 +23,6 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::sampling::SampleHeadways;
 use crate::stats::density::DensityModel;
-use crate::Result;
 
 /// How likely does a driver fail?
 ///
@@ -211,11 +212,4 @@ impl Sample {
             Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `sampled`")?)),
         }
     }
-}
-
-/// `NAME=VALUE`.
-fn given(text: &str) -> std::result::Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
-    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }

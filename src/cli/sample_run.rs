@@ -1,6 +1,5 @@
 //! `lanesweep sample`: plans what the flags ask for, runs it whole or as a shard, and writes the result.
 
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::Exit;
@@ -9,7 +8,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::sample::Sample;
-use super::sample_checks::only_crude;
+use super::sample_checks::{guard, only_crude};
 use super::sample_distribution;
 use super::sample_forecast::forecast_sample;
 use super::sample_lanes::{self, RowTable};
@@ -22,7 +21,6 @@ use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::readable::count;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
-use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// A condition that so few scenarios are near is outside the data.
@@ -219,12 +217,4 @@ fn write(
     format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", out.display());
     Ok(Exit::Ok)
-}
-
-/// The rows must replace neither an input nor another result.
-fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
-    let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
-    super::source::refuse_overwriting(rows, &others, "--rows")?;
-    TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
 }

@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use super::Exit;
-use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use crate::Result;
-use crate::engine::{Backend, CpuBackend, ENGINE_VERSION, Executor, LanePlan, Partial, SweepSummary, Wanted, chunks};
+use crate::engine::{Backend, CpuBackend, ENGINE_VERSION, Executor, Partial, SweepSummary, Wanted, chunks};
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
@@ -18,19 +17,6 @@ use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder;
 use crate::support::run_dir::Results;
 use crate::support::table::{TableFacts, TableFormat, TableWriter};
-
-/// Every lane of a plan, counted.
-pub(super) fn run_plan(plan: &LanePlan, executor: &Executor, verbosity: Verbosity) -> Result<(Partial, SweepSummary)> {
-    let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
-    let mut parts = Vec::new();
-    let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-        bar.inc(chunk.units.end - chunk.units.start);
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })?;
-    bar.finish_and_clear();
-    Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
-}
 
 /// Every lane in f32 and in f64, chunk by chunk.
 pub(super) fn compare_reference(study: &StudyCases) -> Result<ReferenceComparison> {

@@ -23,6 +23,7 @@ pub mod panels;
 pub mod radar;
 pub mod records;
 pub mod reference;
+mod run_facts;
 pub mod run_record;
 pub mod sampled_rows;
 pub mod sampling;

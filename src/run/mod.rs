@@ -1,8 +1,10 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
-//! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`grid`] sweeps maps.
+//! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
+//! one another, [`grid`] sweeps maps.
 //! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
 
+pub mod compare;
 pub mod grid;
 pub mod parts;
 #[cfg(test)]

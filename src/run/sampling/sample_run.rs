@@ -30,8 +30,8 @@ pub struct SampleRun<'s> {
 }
 
 enum State {
-    Crude(RunState<SampleTally>),
-    Weighted(RunState<WeightedTally>),
+    Crude(Box<RunState<SampleTally>>),
+    Weighted(Box<RunState<WeightedTally>>),
 }
 
 impl Sample {
@@ -74,12 +74,12 @@ impl Sample {
             if run_dir.is_done::<SampleTally>()? {
                 return Ok(None);
             }
-            State::Crude(run_dir.begin(&checkpoints(unit_count), is_journalled)?)
+            State::Crude(Box::new(run_dir.begin(&checkpoints(unit_count), is_journalled)?))
         } else {
             if run_dir.is_done::<WeightedTally>()? {
                 return Ok(None);
             }
-            State::Weighted(run_dir.begin(&[], is_journalled)?)
+            State::Weighted(Box::new(run_dir.begin(&[], is_journalled)?))
         };
         Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
     }
@@ -208,9 +208,7 @@ impl SampleRun<'_> {
                 self.crude = Some(sample_into(&planned.plan, &mut state.ledger, executor, &counting, &options, each)?);
                 Ok(())
             }
-            (State::Weighted(state), Kind::Weighted(planned)) => {
-                planned.sample(&mut state.ledger, executor, |samples| progress(samples))
-            }
+            (State::Weighted(state), Kind::Weighted(planned)) => planned.sample(&mut state.ledger, executor, progress),
             _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
         }
     }
@@ -223,8 +221,8 @@ impl SampleRun<'_> {
         let summary = self.crude.map_or(SweepSummary::default(), |crude| crude.summary);
         let lanes = [summary.redone_lanes, summary.rechecked_lanes];
         match self.state {
-            State::Crude(state) => self.run_dir.finish(state, lanes),
-            State::Weighted(state) => self.run_dir.finish(state, lanes),
+            State::Crude(state) => self.run_dir.finish(*state, lanes),
+            State::Weighted(state) => self.run_dir.finish(*state, lanes),
         }
     }
 

@@ -220,7 +220,7 @@ impl Study {
         match &self.file {
             Some((_, run_sha256)) => Ok(run_sha256.clone()),
             None if is_part => Ok(self.seal()?.1),
-            None => Ok(sha256(&format!("{} reference {}", self.plan().hash(), self.facts.reference))),
+            None => Ok(sha256(format!("{} reference {}", self.plan().hash(), self.facts.reference))),
         }
     }
 

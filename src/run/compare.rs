@@ -1,0 +1,238 @@
+//! A comparison: rates of failure of recorded scenarios (S), of their parameterized replays (S') and of densities fitted on
+//! the same scenarios, set beside one another.
+
+use crate::engine::{Block, Executor, LanePlan, Partial, SweepSummary, Wanted};
+use crate::model::profile::Profile;
+use crate::run::sampling::{
+    CategoryComparison, ComparedParameterization, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts,
+    compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
+};
+use crate::run::study::{StudyOptions, plan_study};
+use crate::scenario::Scenario;
+use crate::scenario::parameterization::ParameterizationId;
+use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
+use crate::stats::estimate::Enough;
+use crate::traffic::mining::counts_text;
+use crate::{Error, Place, Result};
+
+/// What is compared.
+#[derive(Debug, Clone)]
+pub struct CompareOptions {
+    /// Categories, models, headways, options of the parameterizations.
+    pub study: StudyOptions,
+    /// Parameterizations that densities are fitted for.
+    pub parameterizations: Vec<ParameterizationId>,
+    /// Samples of each density; every sample runs from every headway.
+    pub samples: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+    /// How many failures a ratio needs, and how near to 1 agrees.
+    pub enough: Enough,
+}
+
+/// A planned comparison.
+///
+/// ```
+/// use lanesweep::engine::{CpuBackend, Executor, Headway};
+/// use lanesweep::model::profile::Profile;
+/// use lanesweep::run::compare::{Compare, CompareOptions};
+/// use lanesweep::run::study::StudyOptions;
+/// use lanesweep::scenario::Category;
+/// use lanesweep::scenario::parameterization::ParameterizationId;
+/// # use lanesweep::stats::density::DataFacts;
+/// # use lanesweep::stats::estimate::Enough;
+/// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+/// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+///
+/// # fn main() -> lanesweep::Result<()> {
+/// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
+/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
+/// # let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+/// let options = CompareOptions {
+///     study: StudyOptions { headways: vec![Headway::ThwS(0.6)], ..StudyOptions::default() },
+///     parameterizations: ParameterizationId::find(Category::CutIn, "2").into_iter().collect(),
+///     samples: 1000,
+///     seed: 157,
+///     enough: Enough::default(),
+/// };
+/// let compare = Compare::plan(&scenarios, &facts, Profile::load("paper")?, options)?;
+/// let result = compare.run(&Executor::new(&CpuBackend::lane_arithmetic()))?;
+/// assert_eq!(result.categories[0].parameterizations[0].key, "2");
+/// # Ok(())
+/// # }
+/// ```
+pub struct Compare<'a> {
+    scenarios: &'a [Scenario],
+    facts: &'a DataFacts,
+    profile: Profile,
+    options: CompareOptions,
+    plan: LanePlan,
+}
+
+/// What a comparison gave.
+#[derive(Debug, Default)]
+pub struct CompareResult {
+    /// The rates, category by category.
+    pub categories: Vec<CategoryComparison>,
+    /// Scenarios that a density leaves out, with the reason.
+    pub left_out: Vec<Error>,
+    /// Parameterizations that have no density, with the reason.
+    pub failed: Vec<Error>,
+    /// How the sweeps went.
+    pub summary: SweepSummary,
+}
+
+impl<'a> Compare<'a> {
+    /// Nominal level of every interval.
+    pub const LEVEL: f64 = 0.95;
+
+    /// Plans the lanes of S and S'. Categories without a wanted parameterization have nothing to be compared with.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where no scenario of these categories was kept; as [`plan_study`].
+    pub fn plan(
+        scenarios: &'a [Scenario],
+        facts: &'a DataFacts,
+        profile: Profile,
+        mut options: CompareOptions,
+    ) -> Result<Compare<'a>> {
+        options.study.categories.retain(|c| options.parameterizations.iter().any(|id| id.category == *c));
+        let plan = plan_study(scenarios, &profile, &options.study)?.plan;
+        if plan.unit_count() == 0 {
+            return Err(Error::input(
+                Place::item(&facts.data),
+                format!("no scenario to simulate ({})", counts_text(scenarios)),
+                "use more recordings, or relax the filters ([mining] in --config)",
+            ));
+        }
+        Ok(Compare { scenarios, facts, profile, options, plan })
+    }
+
+    /// The lanes of S and S'.
+    pub fn lane_plan(&self) -> &LanePlan {
+        &self.plan
+    }
+
+    /// Runs S and S', then fits and samples every density.
+    ///
+    /// # Errors
+    /// As [`Compare::replay`] and [`Compare::sample`].
+    pub fn run(&self, executor: &Executor) -> Result<CompareResult> {
+        let (counts, summary) = self.replay(executor, |_| ())?;
+        let mut result = self.sample(&counts, executor, |_| ())?;
+        result.summary.add(&summary);
+        Ok(result)
+    }
+
+    /// Runs every lane of S and S'; `progress` is told the units of every chunk.
+    ///
+    /// # Errors
+    /// As [`Executor::sweep`].
+    pub fn replay(&self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<(Partial, SweepSummary)> {
+        let (plan, mut parts) = (&self.plan, Vec::new());
+        let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+            progress(chunk.units.end - chunk.units.start);
+            parts.push(Partial::from_chunk(plan, &chunk)?);
+            Ok(())
+        })?;
+        Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
+    }
+
+    /// Fits and samples every density and sets its rates beside those of the counts of S and S'; `progress` is told the
+    /// samples of every chunk.
+    ///
+    /// # Errors
+    /// Of the lanes; of the densities where there is none.
+    pub fn sample(
+        &self,
+        counts: &Partial,
+        executor: &Executor,
+        mut progress: impl FnMut(u64),
+    ) -> Result<CompareResult> {
+        let recorded = (0..self.plan.blocks.len()).map(|block| self.recorded(counts, block));
+        let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        let mut result =
+            CompareResult { categories: recorded.collect::<Result<_>>()?, summary, ..CompareResult::default() };
+        for id in &self.options.parameterizations {
+            match self.parameterization(*id, counts, executor, &mut result.summary, &mut progress) {
+                Ok((cells, left_out)) => {
+                    result.left_out.extend(left_out);
+                    let of = result.categories.iter_mut().find(|c| c.category == id.category);
+                    of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
+                }
+                // A profile whose cut-outs cannot be sampled is a usage error of that category alone.
+                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => result.failed.push(error),
+                Err(error) => return Err(error),
+            }
+        }
+        if result.categories.iter().all(|c| c.parameterizations.is_empty()) && !result.failed.is_empty() {
+            return Err(result.failed.swap_remove(0));
+        }
+        Ok(result)
+    }
+
+    /// S of one category.
+    fn recorded(&self, counts: &Partial, block: usize) -> Result<CategoryComparison> {
+        let of = &self.plan.blocks[block];
+        let exposure = self.facts.driven.map(|driven| Exposure::new(of.units.len(), driven));
+        let counts = ScenarioCounts::of_variant(&self.plan, counts, block, 0)?;
+        Ok(CategoryComparison {
+            category: of.category,
+            scenarios: of.units.len(),
+            exposure,
+            recorded: recorded_cells(&self.plan, &counts, exposure.as_ref(), Self::LEVEL),
+            parameterizations: Vec::new(),
+        })
+    }
+
+    /// One parameterization, with the scenarios that its density leaves out.
+    fn parameterization(
+        &self,
+        id: ParameterizationId,
+        counts: &Partial,
+        executor: &Executor,
+        summary: &mut SweepSummary,
+        progress: impl FnMut(u64),
+    ) -> Result<(ComparedParameterization, Vec<Error>)> {
+        let options = &self.options;
+        let fit = FitOptions {
+            parameterization: options.study.parameterization.clone(),
+            with_thw: false,
+            rule: BandwidthRule::Reduction,
+            representativeness: false,
+            ..FitOptions::default()
+        };
+        let fitted = DensityModel::fit(id, self.scenarios, self.facts, &fit)?;
+        let density = fitted.model;
+        let find = |(at, block): (usize, &Block)| {
+            let variant = block.variants.iter().position(|v| v == id.key)?;
+            (block.category == id.category).then_some((at, variant))
+        };
+        let Some((block, variant)) = self.plan.blocks.iter().enumerate().find_map(find) else {
+            return Err(Error::Internal(format!("{} {} has a density but no lanes", id.category.label(), id.key)));
+        };
+        let plan_options = SamplePlanOptions {
+            samples: options.samples,
+            seed: options.seed,
+            source: SampleSource::Random,
+            models: options.study.models.clone(),
+            headways: SampleHeadways::Each(options.study.headways.clone()),
+        };
+        let plan = plan_samples(&density, &density.mixture()?, &self.profile, &plan_options)?;
+        let kernels = kernel_scenarios(&density, self.scenarios)?;
+        let scenarios = self.plan.blocks[block].units.len() as usize;
+        let exposure = density.exposure.as_ref();
+        let sampled = sample_by_scenario(&plan, &kernels, scenarios, executor, exposure, Self::LEVEL, progress)?;
+        summary.add(&sampled.summary);
+        let compared = ComparedParameterization {
+            key: id.key,
+            parameters: id.parameters,
+            density_sha256: density.content_sha256()?,
+            kernels: kernels.len(),
+            plan_sha256: plan.hash().to_owned(),
+            voids: sampled.tally.voids,
+            cells: compare_cells(&self.plan, counts, block, variant, &sampled, options.enough, Self::LEVEL)?,
+        };
+        Ok((compared, fitted.left_out))
+    }
+}
