@@ -14,4 +14,4 @@ mod report_page;
 mod report_width;
 mod shell;
 mod slurm_script;
-mod supply_chain;
+mod source_rules;
