@@ -11,8 +11,10 @@ mod common;
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
-use lanesweep::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose};
-use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, LanePlan, LaneRunner, Wanted};
+use lanesweep::engine::gpu::{Adapters, GpuBackend, GpuOptions, choose};
+use lanesweep::engine::{
+    Backend, BackendChoice, CpuBackend, DeviceName, Executor, Headway, LanePlan, LaneRunner, Wanted,
+};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::{Counting, OperationCount};

@@ -4,9 +4,8 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::engine::gpu::{Adapters, BackendChoice, DeviceName, GpuBackend, GpuOptions, choose, visible_here};
-use crate::engine::verify::self_check;
-use crate::engine::{Backend, CpuBackend, Executor};
+use super::open_device::{OpenDevice, open_checked, open_device};
+use crate::engine::{Backend, BackendChoice, CpuBackend, DeviceName, Executor};
 use crate::report::run_record::DeviceRecord;
 use crate::report::sampling::HostRecord;
 use crate::{Error, Place, Result};
@@ -28,7 +27,7 @@ pub struct BackendFlags {
 pub struct Opened {
     /// The CPU in the lane arithmetic: the backend, or what stands in for a device that fails.
     cpu: CpuBackend<f32>,
-    gpu: Option<GpuBackend>,
+    device: Option<OpenDevice>,
 }
 
 impl BackendFlags {
@@ -40,21 +39,9 @@ impl BackendFlags {
     pub fn open(&self) -> Result<Opened> {
         let cpu = CpuBackend::lane_arithmetic();
         if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, gpu: None });
+            return Ok(Opened { cpu, device: None });
         }
-        let adapters = Adapters::enumerate();
-        let visible = visible_here()?;
-        let chosen = choose(adapters.cards(), self.backend, self.device.as_ref(), visible.as_deref())?;
-        let Some(index) = chosen else { return Ok(Opened { cpu, gpu: None }) };
-        match open_checked(&adapters, index) {
-            Ok(gpu) => Ok(Opened { cpu, gpu: Some(gpu) }),
-            // Nobody named it: the CPU computes the same.
-            Err(error) if self.backend == BackendChoice::Auto && self.device.is_none() => {
-                tracing::warn!("{error}; the CPU computes instead");
-                Ok(Opened { cpu, gpu: None })
-            }
-            Err(error) => Err(error),
-        }
+        Ok(Opened { cpu, device: open_checked(self.backend, self.device.as_ref())? })
     }
 
     /// Opens what is to be verified: no check before the check, and no silent CPU.
@@ -64,14 +51,12 @@ impl BackendFlags {
     pub fn open_to_verify(&self) -> Result<Opened> {
         let cpu = CpuBackend::lane_arithmetic();
         if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, gpu: None });
+            return Ok(Opened { cpu, device: None });
         }
-        let adapters = Adapters::enumerate();
-        let visible = visible_here()?;
         let backend = if self.backend == BackendChoice::Cpu { BackendChoice::Cpu } else { BackendChoice::Gpu };
-        let chosen = choose(adapters.cards(), backend, self.device.as_ref(), visible.as_deref())?;
-        let index = chosen.ok_or_else(|| Error::Internal("a device was asked for and none was chosen".to_owned()))?;
-        Ok(Opened { cpu, gpu: Some(GpuBackend::open(&adapters, index, GpuOptions::default())?) })
+        let device = open_device(backend, self.device.as_ref())?
+            .ok_or_else(|| Error::Internal("a device was asked for and none was chosen".to_owned()))?;
+        Ok(Opened { cpu, device: Some(device) })
     }
 
     /// The CPU, for a flag that leaves no choice.
@@ -83,36 +68,22 @@ impl BackendFlags {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
             return Err(Error::usage(Place::item(flag), problem, "leave --backend and --device out"));
         }
-        Ok(Opened { cpu: CpuBackend::lane_arithmetic(), gpu: None })
+        Ok(Opened { cpu: CpuBackend::lane_arithmetic(), device: None })
     }
-}
-
-/// Opens a device; where equality is not promised, the self-check decides.
-fn open_checked(adapters: &Adapters, index: usize) -> Result<GpuBackend> {
-    let gpu = GpuBackend::open(adapters, index, GpuOptions::default())?;
-    if !gpu.is_exact() {
-        let check = self_check(&gpu)?;
-        if check.differing > 0 {
-            let problem =
-                format!("{} of {} lanes of the self-check differ from the CPU's", check.differing, check.lanes);
-            return Err(Error::device(&gpu.card().name, problem, "use --backend cpu, or the device through Vulkan"));
-        }
-    }
-    Ok(gpu)
 }
 
 impl Opened {
     /// What computes.
     pub fn backend(&self) -> &dyn Backend {
-        match &self.gpu {
-            Some(gpu) => gpu,
+        match &self.device {
+            Some(device) => &*device.backend,
             None => &self.cpu,
         }
     }
 
     /// What stands in for a device.
     pub fn fallback(&self) -> Option<&dyn Backend> {
-        self.gpu.as_ref().map(|_| &self.cpu as &dyn Backend)
+        self.device.as_ref().map(|_| &self.cpu as &dyn Backend)
     }
 
     /// Both.
@@ -133,14 +104,6 @@ impl Opened {
 
     /// The device, for the record of the run.
     pub fn device(&self) -> Option<DeviceRecord> {
-        let gpu = self.gpu.as_ref()?;
-        let card = gpu.card();
-        Some(DeviceRecord {
-            name: card.name.clone(),
-            api: card.api.label(),
-            driver: [&card.driver[..], &card.driver_info].join(" ").trim().to_owned(),
-            pci_bus_id: card.pci_bus_id.clone(),
-            exact_path: gpu.is_exact(),
-        })
+        self.device.as_ref().map(|device| device.record.clone())
     }
 }

@@ -9,6 +9,8 @@ mod config;
 mod configured;
 mod conformance;
 mod console;
+#[cfg(feature = "gpu")]
+mod device_list;
 mod devices;
 mod dry_run;
 mod exit;
@@ -22,6 +24,7 @@ mod lists;
 mod map;
 mod merge;
 mod mine;
+mod open_device;
 mod rerun;
 mod sample;
 mod sample_checks;

@@ -1,6 +1,6 @@
 //! The engine: cases become lanes, lanes become outcomes.
 //!
-//! Here live the lane's record and step, the lane plan, the backends ([`cpu`], [`gpu`]), the checks of one against the
+//! Here live the lane's record and step, the lane plan, the backends (`cpu`, `gpu`), the checks of one against the
 //! other ([`verify`], rechecks during a sweep), outcomes and partial counts. Cases come from [`model`](crate::model) and
 //! [`scenario`](crate::scenario::parameterization); partials go to [`run`](crate::run). A driver or a criterion lives in
 //! [`model`](crate::model).
@@ -8,11 +8,13 @@
 mod backend;
 mod confusion;
 pub(crate) mod cpu;
+mod device_choice;
 mod drivers;
 mod executor;
 mod forecast;
 mod frame;
 pub mod generated;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 mod lane;
 pub(crate) mod lane_case;
@@ -36,6 +38,7 @@ pub(crate) use cpu::backend::lanes_within_seconds;
 pub use cpu::instructions::Instructions;
 pub use cpu::lane_result::Ending;
 pub use cpu::runner::LaneRunner;
+pub use device_choice::{BackendChoice, DeviceName};
 pub use drivers::Constants;
 pub use executor::{Executor, SweepSummary, chunks};
 pub use forecast::{Forecast, forecast};

@@ -2,7 +2,8 @@
 
 use crate::common::device::software_device;
 use assert_cmd::Command;
-use lanesweep::engine::gpu::{BackendChoice, choose, visible_here};
+use lanesweep::engine::BackendChoice;
+use lanesweep::engine::gpu::{choose, visible_here};
 
 /// The verb without what a cluster may have set, in a home of its own.
 fn devices(home: &tempfile::TempDir) -> Command {

@@ -4,7 +4,6 @@ use crate::common;
 
 use std::sync::OnceLock;
 
-use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::{
     Backend, CpuBackend, Executor, Headway, Instructions, LaneCase, LanePlan, Outcome, Session, Wanted, words,
 };
@@ -160,8 +159,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
 
 #[test]
 fn a_device_makes_the_same_lanes_of_the_same_samples() {
-    let Some((adapters, index)) = common::device::software_device() else { return };
-    let backend = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+    let Some(backend) = common::device::software_backend() else { return };
     let mut compared = 0;
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
         for id in ParameterizationId::ALL {
@@ -171,7 +169,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
                 let mixture = density.mixture().unwrap();
                 let plan = plan_samples(&density, &mixture, &profile, &options(n, source)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-                let theirs = outcomes(&plan, &backend, &[0, 3, 150, n]);
+                let theirs = outcomes(&plan, &*backend, &[0, 3, 150, n]);
                 let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
                 assert_eq!(differing, 0, "{} {} {source:?}: of {} lanes", profile.name, id.key, ours.len());
                 compared += ours.len();
@@ -183,8 +181,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
 
 #[test]
 fn a_device_draws_headways_weighted_components_and_given_points_alike() {
-    let Some((adapters, index)) = common::device::software_device() else { return };
-    let backend = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+    let Some(backend) = common::device::software_backend() else { return };
     let profile = Profile::load("paper").unwrap();
     let n = 500;
     for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
@@ -205,12 +202,12 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
         let options = SamplePlanOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
         let plan = plan_samples(&density, &mixture, &profile, &options).unwrap();
         let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
-        assert!(ours == outcomes(&plan, &backend, &[0, 77, n]), "{}", id.key);
+        assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{}", id.key);
         let points = density.kde.points();
         let given = plan_points(&density, points, &profile, &ModelId::ALL, &SampleHeadways::Sampled).unwrap();
         let last = points.len() as u64;
         let ours = outcomes(&given, &CpuBackend::lane_arithmetic(), &[0, last]);
-        assert!(ours == outcomes(&given, &backend, &[0, 5, last]), "{} given", id.key);
+        assert!(ours == outcomes(&given, &*backend, &[0, 5, last]), "{} given", id.key);
     }
 }
 
@@ -229,10 +226,9 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
     let cpu = CpuBackend::lane_arithmetic();
     assert!(run(&cpu, low) != run(&cpu, high));
     // Across the border of the low word, on a device too.
-    if let Some((adapters, index)) = common::device::software_device() {
-        let device = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
+    if let Some(device) = common::device::software_backend() {
         let border = (1 << 32) - 32;
-        assert!(run(&cpu, border) == run(&device, border));
+        assert!(run(&cpu, border) == run(&*device, border));
     }
     let key = plan.key(plan.lane_count() - 1).unwrap();
     assert_eq!(plan.parse_key(&plan.key_text(&key)), Some(key));

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array, StringArray};
+use arrow_array::{ArrayRef, Float64Array, StringArray};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::read_scenario_file;

@@ -15,4 +15,4 @@ mod report_width;
 mod rooms;
 mod shell;
 mod slurm_script;
-mod supply_chain;
+mod source_rules;

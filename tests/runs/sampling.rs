@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
-use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
@@ -92,9 +91,8 @@ fn counts_and_worst_lanes_are_the_same_however_a_run_is_cut_up() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert!(whole == pool.install(|| tally(&plan, &cpu, &of_37, &options)), "{key}: {threads} threads");
         }
-        if let Some((adapters, index)) = common::device::software_device() {
-            let device = GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap();
-            assert!(whole == tally(&plan, &device, &[(2000, n), (0, 2000)], &options), "{key}: device");
+        if let Some(device) = common::device::software_backend() {
+            assert!(whole == tally(&plan, &*device, &[(2000, n), (0, 2000)], &options), "{key}: device");
         }
     }
 }

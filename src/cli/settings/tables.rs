@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::engine::gpu::BackendChoice;
+use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::ParameterizationOptions;

@@ -1,6 +1,12 @@
 //! What a point's numbers mean, as one flat record that host and device share. Twin: `Recipe` in
 //! `shaders/shared/recipe.wgsl`.
 
+// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the sizes
+// below are checked when this is compiled.
+#![allow(unsafe_code)]
+
+use bytemuck::{Pod, Zeroable};
+
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
@@ -140,6 +146,15 @@ pub struct Recipe {
     /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
     pub attention: [AttentionRule<f32>; MODELS],
 }
+
+const _: () = assert!(size_of::<AttentionRule<f32>>() == 20);
+const _: () = assert!(size_of::<ReducedColumns>() == 36);
+const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
+
+// SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
+unsafe impl Zeroable for Recipe {}
+// SAFETY: as above.
+unsafe impl Pod for Recipe {}
 
 impl Recipe {
     /// How motions follow from a point.

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::engine::device_choice::pci_bus_id;
 use crate::{Error, Result};
 
 /// What kind of processor stands behind an adapter, as its driver says.
@@ -241,50 +242,9 @@ fn order(card: &AdapterCard) -> impl Ord {
     (card.api, software, bus.is_none(), bus.map(|b| (b.len(), b)), card.name.clone(), card.vendor, card.device)
 }
 
-/// A place on the PCI bus in one form: `dddd:bb:dd.f`, hexadecimal, lower case.
-///
-/// Takes what tools print: `65:00.0`, `0000:65:00.0`, `00000000:65:00.0`, with or without `pci:` and the function.
-/// `None` if the text is no PCI bus id.
-pub fn pci_bus_id(text: &str) -> Option<String> {
-    let text = text.trim();
-    let text = match text.get(..4) {
-        Some(prefix) if prefix.eq_ignore_ascii_case("pci:") => &text[4..],
-        _ => text,
-    };
-    let hex = |digits: &str, most: u32| {
-        let plain = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_hexdigit());
-        plain.then(|| u32::from_str_radix(digits, 16).ok()).flatten().filter(|&n| n <= most)
-    };
-    let parts: Vec<&str> = text.split(':').collect();
-    let (domain, bus, rest) = match parts[..] {
-        [domain, bus, rest] => (hex(domain, u32::MAX)?, bus, rest),
-        [bus, rest] => (0, bus, rest),
-        _ => return None,
-    };
-    let (device, function) = rest.split_once('.').unwrap_or((rest, "0"));
-    let (bus, device, function) = (hex(bus, 0xff)?, hex(device, 0x1f)?, hex(function, 7)?);
-    Some(format!("{domain:04x}:{bus:02x}:{device:02x}.{function:x}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_bus_id_has_one_form_however_a_tool_prints_it() {
-        for text in ["65:00.0", "0000:65:00.0", "00000000:65:00.0", "pci:0:65:0", "PCI:0000:65:00", " 0000:65:00.0\n"] {
-            assert_eq!(pci_bus_id(text).as_deref(), Some("0000:65:00.0"), "{text}");
-        }
-        assert_eq!(pci_bus_id("10000:E1:1F.7").as_deref(), Some("10000:e1:1f.7"));
-    }
-
-    #[test]
-    fn what_is_no_bus_id_gives_none() {
-        for text in ["", "65", "0000:65:00.8", "0000:100:00.0", "0000:65:20.0", "x:65:00.0", "1:2:3:4", "+1:00.0", ":"]
-        {
-            assert_eq!(pci_bus_id(text), None, "{text}");
-        }
-    }
 
     #[test]
     fn the_list_is_ordered_numbered_and_the_same_twice() {

@@ -2,95 +2,9 @@
 //!
 //! A software rasterizer runs on the same cores as the CPU backend, only slower; it is taken only when it is named.
 
-use std::fmt;
-use std::str::FromStr;
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::adapters::{AdapterCard, DeviceKind, pci_bus_id};
+use super::adapters::{AdapterCard, DeviceKind};
+use crate::engine::device_choice::{BackendChoice, DeviceName};
 use crate::{Error, Place, Result};
-
-/// A device as a user names it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum DeviceName {
-    /// Position in the list of `lanesweep verify devices`.
-    Index(usize),
-    /// Place on the PCI bus, as [`pci_bus_id`] writes it.
-    Pci(String),
-    /// A part of the device's name, in any case.
-    Name(String),
-}
-
-impl FromStr for DeviceName {
-    type Err = Error;
-
-    /// # Errors
-    /// [`Error::Usage`] for an empty text and for a `pci:` that no bus id follows.
-    fn from_str(text: &str) -> Result<Self> {
-        let text = text.trim();
-        let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep verify devices` lists them";
-        if text.is_empty() {
-            return Err(Error::usage(Place::item("--device"), "no device is named", help));
-        }
-        if text.bytes().all(|b| b.is_ascii_digit()) {
-            let index = text.parse().map_err(|_| {
-                Error::usage(Place::item("--device"), format!("`{text}` is larger than any index"), help)
-            })?;
-            return Ok(DeviceName::Index(index));
-        }
-        if text.get(..4).is_some_and(|prefix| prefix.eq_ignore_ascii_case("pci:")) {
-            let bus = pci_bus_id(text).ok_or_else(|| {
-                let problem = format!("`{text}` is no PCI bus id such as pci:0000:65:00.0");
-                Error::usage(Place::item("--device"), problem, help)
-            })?;
-            return Ok(DeviceName::Pci(bus));
-        }
-        Ok(DeviceName::Name(text.to_owned()))
-    }
-}
-
-impl fmt::Display for DeviceName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            DeviceName::Index(index) => write!(f, "{index}"),
-            DeviceName::Pci(bus) => write!(f, "pci:{bus}"),
-            DeviceName::Name(name) => f.write_str(name),
-        }
-    }
-}
-
-/// What is to compute the lanes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum BackendChoice {
-    /// The first GPU; the processor where there is none.
-    #[default]
-    Auto,
-    /// The processor.
-    Cpu,
-    /// A GPU, or an error where there is none.
-    Gpu,
-}
-
-impl FromStr for BackendChoice {
-    type Err = Error;
-
-    /// # Errors
-    /// [`Error::Usage`] for any other word than `auto`, `cpu` and `gpu`.
-    fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "auto" => Ok(BackendChoice::Auto),
-            "cpu" => Ok(BackendChoice::Cpu),
-            "gpu" => Ok(BackendChoice::Gpu),
-            _ => Err(Error::usage(
-                Place::item("--backend"),
-                format!("there is no backend `{text}`"),
-                "write auto, cpu or gpu; a certain device: --device, see `lanesweep verify devices`",
-            )),
-        }
-    }
-}
 
 /// The index of the device to use, or `None` for the processor.
 ///
@@ -109,12 +23,7 @@ pub fn choose(
     visible: Option<&[String]>,
 ) -> Result<Option<usize>> {
     match (backend, device) {
-        (BackendChoice::Cpu, None) => Ok(None),
-        (BackendChoice::Cpu, Some(device)) => Err(Error::usage(
-            Place::item("--device"),
-            format!("`{device}` is named, but --backend cpu uses no device"),
-            "leave out one of the two",
-        )),
+        (BackendChoice::Cpu, _) => backend.check(device).map(|()| None),
         (_, Some(device)) => named(cards, device, visible).map(|card| Some(card.index)),
         (BackendChoice::Auto, None) => Ok(first_real(cards, visible).map(|card| card.index)),
         (BackendChoice::Gpu, None) => match first_real(cards, visible) {
@@ -418,25 +327,5 @@ mod tests {
         assert!(matches!(error, Error::Device { .. }) && says(error).contains("hides every GPU"));
         let error = choose(&cards, BackendChoice::Gpu, None, Some(&ids(&["0000:ff:00.0"]))).unwrap_err();
         assert!(says(error).contains("it allows pci:0000:ff:00.0, which the graphics driver does not show"));
-    }
-
-    #[test]
-    fn a_backend_is_one_of_three_words() {
-        let parsed = ["auto", "cpu", "gpu"].map(|word| word.parse::<BackendChoice>().unwrap());
-        assert_eq!(parsed, [BackendChoice::Auto, BackendChoice::Cpu, BackendChoice::Gpu]);
-        assert!(says("cuda".parse::<BackendChoice>().unwrap_err()).contains("auto, cpu or gpu"));
-    }
-
-    #[test]
-    fn a_device_is_named_by_index_bus_id_or_part_of_its_name() {
-        assert_eq!(name(" 12 "), DeviceName::Index(12));
-        assert_eq!(name("PCI:65:00.0"), DeviceName::Pci(B.to_owned()));
-        assert_eq!(name("Radeon RX 7900"), DeviceName::Name("Radeon RX 7900".to_owned()));
-        for device in ["12", "pci:0000:65:00.0", "Radeon"] {
-            assert_eq!(name(device).to_string(), device);
-        }
-        for wrong in ["", "  ", "pci:", "pci:65", "99999999999999999999999"] {
-            assert!(matches!(wrong.parse::<DeviceName>(), Err(Error::Usage { .. })), "{wrong:?}");
-        }
     }
 }

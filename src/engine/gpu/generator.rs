@@ -1,28 +1,12 @@
 //! The generator on the device: what it reads, and the dispatch that fills a session's cases and tables.
 
-// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the sizes
-// below are checked when this is compiled.
-#![allow(unsafe_code)]
-
-use bytemuck::{Pod, Zeroable};
-
 use super::device::Device;
 use super::inputs::{GeneratorInputs, Inputs};
 use super::records::Generation;
 use crate::Result;
 use crate::engine::LaneCase;
-use crate::engine::generated::{Generator, MAX_PARAMETERS, PointSource, Recipe, ReducedColumns};
-use crate::model::driver::{AttentionRule, MODELS};
+use crate::engine::generated::{Generator, PointSource, Recipe};
 use crate::stats::random::normal_table;
-
-const _: () = assert!(size_of::<AttentionRule<f32>>() == 20);
-const _: () = assert!(size_of::<ReducedColumns>() == 36);
-const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
-
-// SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
-unsafe impl Zeroable for Recipe {}
-// SAFETY: as above.
-unsafe impl Pod for Recipe {}
 
 /// What a device needs to make cases.
 pub(super) struct GeneratorSetup {

@@ -20,9 +20,9 @@ pub mod shader;
 mod spirv;
 mod visible;
 
-pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind, pci_bus_id};
+pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
 pub use backend::GpuBackend;
-pub use choice::{BackendChoice, DeviceName, choose};
+pub use choice::choose;
 pub use device::{Fault, FaultKind, GpuOptions};
 pub use records::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};

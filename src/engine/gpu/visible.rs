@@ -16,7 +16,7 @@
 
 use std::path::Path;
 
-use super::adapters::pci_bus_id;
+use crate::engine::device_choice::pci_bus_id;
 use crate::{Error, Place, Result};
 
 const CUDA: &str = "CUDA_VISIBLE_DEVICES";

@@ -8,9 +8,9 @@ use super::{
     AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, SHORT_STEP_S, View, delay_bound_s,
     delay_steps, latched_braking,
 };
+use crate::model::case::Category;
 use crate::model::flag::Flag;
 use crate::model::scalar::Real;
-use crate::model::case::Category;
 
 /// Constants of the model as a profile gives them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,12 +7,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{
-    ArrayRef, BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder,
-    StringDictionaryBuilder,
+use arrow_array::builder::{
+    BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder, StringDictionaryBuilder,
 };
-use arrow::datatypes::{DataType, Field, Int32Type, Schema};
-use arrow::record_batch::RecordBatch;
+use arrow_array::types::Int32Type;
+use arrow_array::{ArrayRef, RecordBatch};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
@@ -168,7 +168,7 @@ impl Builder {
     }
 
     /// What does not fit the column is null; the caller lets nothing such through.
-    fn append(&mut self, cell: &Cell) -> std::result::Result<(), arrow::error::ArrowError> {
+    fn append(&mut self, cell: &Cell) -> std::result::Result<(), ArrowError> {
         let number = match cell {
             Cell::Number(number) | Cell::Decimal(number) => Some(*number),
             _ => None,

@@ -7,10 +7,12 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray, Float64Builder, ListBuilder};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float32Type, Float64Type};
-use arrow::record_batch::RecordBatch;
+use arrow_array::builder::{Float64Builder, ListBuilder};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, Float64Type};
+use arrow_array::{Array, ArrayRef, RecordBatch};
+use arrow_cast::cast;
+use arrow_schema::{DataType, Field};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
@@ -38,7 +40,7 @@ pub fn read(path: &Path) -> Read {
         let columns: Vec<Vec<String>> = batch.columns().iter().map(texts).collect();
         rows.extend((0..batch.num_rows()).map(|row| columns.iter().map(|c| c[row].clone()).collect()));
     }
-    let word = |field: &arrow::datatypes::Field, key: &str| field.metadata().get(key).unwrap().to_string();
+    let word = |field: &Field, key: &str| field.metadata().get(key).unwrap().to_string();
     Read {
         columns: schema.fields().iter().map(|field| field.name().clone()).collect(),
         metadata: schema.fields().iter().map(|field| (word(field, "unit"), word(field, "description"))).collect(),
