@@ -96,7 +96,7 @@ impl ParameterRows {
     }
 
     /// An error about a value, told with file, row and column.
-    pub fn told(&self, row: u64, error: Error) -> Error {
+    pub fn at_row(&self, row: u64, error: Error) -> Error {
         let Error::Usage { place, problem, help } = error else { return error };
         Error::input(self.place(row, &place.item.unwrap_or_default(), None), problem, help)
     }
@@ -128,7 +128,7 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
         let mut doubts = found.doubts();
         let place = |key: &str| rows.place(row, key, None).to_string();
         let scenario = map.and_then(|map| {
-            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.told(row, error))
+            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.at_row(row, error))
         });
         match scenario {
             Err(error) => found.refuse(error),

@@ -172,7 +172,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         lateral_gap.is_positive() & !lateral_towards.is_positive()
     }
 
-    const KNOWS_EASE: bool = true;
+    const KNOWS_STEADY_FOLLOWING: bool = true;
 
     /// CFS is 0 beyond it at every deceleration of the ego. Without one this is its safe distance, and one after which
     /// v_new is above v_o makes that shorter; a larger one, above dv/τ, stops the closing within half of dv·τ.
