@@ -97,7 +97,7 @@ mod tests {
         (lane, state, place)
     }
 
-    /// Steps at ease are those that the lane makes anyway: same speed, gap and deceleration, to the bit, and no verdict
+    /// Steady-following steps equal whole steps: same speed, gap and deceleration, to the bit, and no verdict
     /// changes. A lane that ends among them does so because it is settled, from the first such step past the horizon
     /// on.
     #[test]
@@ -148,8 +148,8 @@ mod tests {
         }
     }
 
-    /// No lane is at ease whose driver does not attend yet or waits, whose leader is beside the lane or drives
-    /// backwards, or that is about to reach the cap.
+    /// A lane does not follow steadily if its driver does not attend yet or is delayed, if its leader is beside the lane
+    /// or drives backwards, or near the step cap.
     #[test]
     fn a_driver_that_does_not_follow_is_not_steady() {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);

@@ -182,7 +182,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         dv * self.tau + dv * dv * self.half_inverse_comf
     }
 
-    /// PFS alone: demand PFS·b_comf.
+    /// PFS only: demand PFS·b_comf.
     #[inline(always)]
     fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);

@@ -31,7 +31,7 @@ const WHOLE: u64 = 1 << 32;
 const MAX_WEIGHTS: usize = 1 << 20;
 
 impl AliasTable {
-    /// A table for weights, of which only the ratios count. Deterministic: the same weights give the same table.
+    /// A table for weights; only their ratios matter. Deterministic: the same weights give the same table.
     ///
     /// Each weight, relative to the sum, is rounded down to a multiple of 2⁻³²/n, for n components; the largest (the
     /// first of equals) takes what is left over, less than 2⁻³². So in the distribution that
