@@ -40,10 +40,10 @@ fn is_behind(view: View) -> bool {
 // One unsafe step of any model: the reaction time is paid once, coasting; then the deceleration follows
 // `braking`, and the speed stops at 0.
 fn latched_braking(state: DriverState, coasting: f32, braking: f32, v_ego: f32) -> Reaction {
-    let waiting = state.delay_steps > 0u;
-    let applied = select(braking, coasting, waiting);
-    let deceleration = select(braking, state.deceleration, waiting);
-    let delay_steps = select(0u, state.delay_steps - 1u, waiting);
+    let is_delayed = state.delay_steps > 0u;
+    let applied = select(braking, coasting, is_delayed);
+    let deceleration = select(braking, state.deceleration, is_delayed);
+    let delay_steps = select(0u, state.delay_steps - 1u, is_delayed);
     let v_next = larger(v_ego - applied * frame_dt, 0.0);
     return Reaction(DriverState(deceleration, delay_steps), v_next);
 }

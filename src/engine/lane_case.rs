@@ -1,5 +1,5 @@
 //! From a [`Case`] to the record that lanes read: motions encoded, sizes summed, everything that depends
-//! on the other vehicles alone (attention, exposure, freezing) worked out once on the host.
+//! on the other vehicles alone (attention, exposure, freezing) computed once on the host.
 
 pub use crate::model::driver::NEVER;
 use crate::model::driver::{AttentionRule, DriverProfile, MODELS};

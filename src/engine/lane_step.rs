@@ -1,8 +1,9 @@
 //! One step of a lane as a pure function, written once for the scalar lane and for batches of lanes. The latched
 //! step stands here, once for all models.
 //!
-//! Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the contact, then the check,
-//! then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32 keeps millimetres.
+//! Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the
+//! contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32
+//! keeps millimetres.
 //!
 //! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
 //! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
@@ -47,7 +48,7 @@ pub struct LaneConstants<R> {
 }
 
 impl<R: Real> LaneConstants<R> {
-    /// Of a case under a model.
+    /// Constants of a case under a model.
     #[inline(always)]
     pub fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
         let known = |step: u32| step.min(Flag::LATEST_STEP);
@@ -129,8 +130,8 @@ pub struct LaneState<R> {
     pub reaction_step: u32,
     /// What the steps have gathered.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: its [ending](crate::engine::cpu::lane_result) says why. Later steps
-    /// change nothing; where only verdicts are wanted, nothing that verdicts look at.
+    /// The last step has been made, even if the time cap is far: its [ending](crate::engine::cpu::lane_result) says
+    /// why. Later steps change nothing; where only verdicts are wanted, nothing that verdicts look at.
     pub over: Flag,
 }
 
@@ -306,8 +307,8 @@ pub(super) fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &
     Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
 }
 
-/// The gap, m ≥ 0, beyond which no criterion that a record keeps begins to fail at this closing speed, m/s, or a smaller
-/// one, but for rounding.
+/// The gap, m ≥ 0, beyond which no criterion that a record keeps begins to fail at this closing speed, m/s, or a
+/// smaller one, but for rounding.
 #[inline(always)]
 pub(super) fn criteria_safe_gap<R: Real>(criteria: &Criteria<R>, record: &Record<R>, closing: R) -> R {
     let Record { ttc, btn, min_gap: _ } = record;

@@ -1,5 +1,5 @@
-//! What remains of lanes: exact integer counts per unit, and the worst lanes by value. A chunk, a journal record and a shard's part are
-//! all partials; merging is associative and does not depend on the order.
+//! Results of lanes as exact integer counts per unit, and the worst lanes by value. A chunk, a journal record and a
+//! shard's part are partials. Merging is associative and commutative.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::model::criterion::Criterion;
 use crate::support::hex::hex;
 use crate::{Error, Place, Result};
 
-/// Number of worst lanes that a partial keeps unless told otherwise.
+/// Default number of worst lanes that a partial keeps.
 pub const WORST_LANES: usize = 20;
 
 /// What the serialized form calls itself.
@@ -197,7 +197,7 @@ impl Partial {
         &self.worst
     }
 
-    /// Number of lanes whose values were computed, not their verdicts alone.
+    /// Number of lanes whose values were computed, not only their verdicts.
     pub fn valued_lanes(&self) -> u64 {
         self.valued_lanes
     }

@@ -1,8 +1,9 @@
-//! The lane plan: what is swept, in which order, with everything f64 that the host computes before the lanes, or what
-//! that follows from; and the hash of it.
+//! The lane plan: the lanes of a sweep and their order, everything that the host computes in f64 before the lanes (or
+//! its inputs), and the hash.
 //!
 //! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by
-//! mixed radix from the plan's own counts. Ranges are intervals of units, so S and its S' never part.
+//! mixed radix from the plan's own counts. Ranges are intervals of units, so a shard boundary
+//! never separates S from its S'.
 
 use std::ops::Range;
 
@@ -91,7 +92,7 @@ pub struct Block {
     pub first_lane: u64,
 }
 
-/// What is swept.
+/// The lanes of a sweep.
 pub struct LanePlan {
     /// Profile, with the time step.
     pub profile: Profile,
@@ -105,7 +106,7 @@ pub struct LanePlan {
     hash: String,
 }
 
-/// Where a lane stands in its plan.
+/// Position of a lane in its plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LaneKey {
     /// Index into [`LanePlan::blocks`].
@@ -331,8 +332,8 @@ impl LanePlan {
     }
 }
 
-/// Checks the cases of these units of blocks, where they are known before their lanes run. What a [generator](crate::engine::generated) makes
-/// ends or begins in the ego's lane and passes nobody.
+/// Checks the cases of these units of blocks, where they are known before their lanes run. What a
+/// [generator](crate::engine::generated) makes ends or begins in the ego's lane and passes nobody.
 ///
 /// # Errors
 /// As [`check_time_step`].

@@ -1,5 +1,5 @@
-//! What is faster than a single lane of the CPU is believed only where it was seen to be right: one in a thousand of a
-//! device's lanes, and of those of batches that leave steps out, is computed again with every step made.
+//! One in a thousand lanes of a device, and of batches that skip steps, is computed again on the CPU with every step.
+//! A difference stops the run.
 
 use std::ops::Range;
 
@@ -12,18 +12,18 @@ use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
 use crate::{Error, Result};
 
-/// One lane in so many is checked unless told otherwise.
+/// Default: one lane in so many is checked.
 pub const ONE_IN: u64 = 1000;
 
-/// One in so many of the lanes that are checked in batches is checked as a single lane besides. A single lane costs about
-/// forty times a lane of batches that leave steps out, one of a batch that makes every step four to ten times.
+/// One in so many of the lanes checked in batches is also checked as a single lane. A single lane costs about forty
+/// times a lane of batches that skip steps, and four to ten times a lane of batches that do not.
 const SINGLE_ONE_IN: u64 = 4;
 
 /// Lanes of one task.
 const TASK: usize = 1024;
 
-/// A seeded sample of a plan's lanes: one of each `one_in` consecutive ones. Which depends on the seed and the
-/// lane alone, not on chunks.
+/// A seeded sample of a plan's lanes: one of each `one_in` consecutive ones. The choice depends only on seed and lane,
+/// not on chunks.
 pub(super) struct Recheck<'p> {
     plan: &'p LanePlan,
     again: Box<dyn Again + 'p>,
@@ -49,9 +49,9 @@ impl RecheckOptions {
 
 /// Makes every step of a lane again.
 trait Again: Sync {
-    /// Of a single lane.
+    /// Outcome of a single lane.
     fn single(&self, key: &LaneKey) -> Outcome<f32>;
-    /// Of lanes of one block and model in batches: position in `keys`, verdicts.
+    /// Verdicts of lanes of one block and model in batches, with their position in `keys`.
     fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts));
 }
 
@@ -119,12 +119,12 @@ impl<'p> Recheck<'p> {
         first
     }
 
-    /// Is a lane that is checked in a batch also checked as a single lane?
+    /// Whether a lane that is checked in a batch is also checked as a single lane.
     fn is_single(&self, key: &LaneKey) -> bool {
         mixed(!self.seed, self.plan.lane(key)).is_multiple_of(SINGLE_ONE_IN)
     }
 
-    /// The chosen units of an interval, for a sweep that gives no lanes back.
+    /// The chosen units of an interval, for a sweep that returns no lanes.
     pub fn units(&self, units: Range<u64>) -> impl Iterator<Item = u64> {
         self.chosen(units, self.one_in)
     }
@@ -227,7 +227,7 @@ mod tests {
         SafeGap,
         /// Every vehicle beside the lane is ignored.
         Ignores,
-        /// The driver is at ease at every gap, and asks for nothing there.
+        /// The driver follows steadily at every gap, and `check_steady` never reacts.
         Ease,
     }
 
@@ -239,7 +239,7 @@ mod tests {
         const SEES_LATERAL_SPEED: bool = M::SEES_LATERAL_SPEED;
         const SEES_OWN_ACCELERATION: bool = M::SEES_OWN_ACCELERATION;
         const KEEPS_DECELERATION: bool = M::KEEPS_DECELERATION;
-        const KNOWS_EASE: bool = M::KNOWS_EASE;
+        const KNOWS_STEADY_FOLLOWING: bool = M::KNOWS_STEADY_FOLLOWING;
 
         fn safe_gap(&self, v_ego: f32, v_other: f32) -> f32 {
             if self.1 == FalsePromise::SafeGap { 0.0 } else { self.0.safe_gap(v_ego, v_other) }
@@ -290,7 +290,7 @@ mod tests {
     }
 
     impl<M: DriverModel<f32>> Instead<'_, M> {
-        /// The lanes of a case at a time: what is known of one is not lost among others.
+        /// Runs the lanes of one case at a time, so that lanes share their properties.
         fn run(&self, keys: &[LaneKey], every_step: bool, mut each: impl FnMut(usize, Verdicts)) {
             let mut from = 0;
             for lanes in keys.chunk_by(|a, b| (a.unit, a.variant) == (b.unit, b.variant)) {
@@ -383,7 +383,7 @@ mod tests {
         (run(false).expect_err(&format!("{category:?} {}", id.name())), run(true).unwrap())
     }
 
-    /// One for each way to leave steps out: calm steps, lanes that go on with the second vehicle alone, and steps at ease.
+    /// One for each way to skip work: quiescent steps, lanes with the lead only, steady following.
     #[test]
     fn a_false_promise_of_every_kind_stops_the_run_and_names_the_lane() {
         if Instructions::best() == Instructions::Scalar {

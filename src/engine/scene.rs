@@ -1,27 +1,27 @@
-//! What is known of the vehicles around the ego before a lane runs, so that its steps need not ask.
+//! Properties of the other vehicles that are decided before a lane runs, so that its steps need not test them.
 
 use crate::model::scalar::Real;
 use crate::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED, Tables};
 
 use super::lane_case::{LaneCase, LaneOther, NEVER};
 
-/// What all lanes of a stream have in common.
+/// Properties that all lanes of a stream share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scene {
     /// Two other vehicles are looked at.
     pub is_pair: bool,
-    /// The principal vehicle is there from the first step to the last, and judged.
+    /// The principal vehicle is present from the first step to the last, and judged.
     pub always_there: bool,
     /// It also stays in the middle of the ego's lane, and the driver attends to it from the first step on.
     pub in_lane: bool,
-    /// Neither contact nor a criterion comes near, and the driver is at ease with it.
+    /// No contact and no criterion is possible, and the driver follows in steady state.
     pub is_steady: bool,
-    /// A step may lead a vehicle's centre past the ego's: contacts between two steps are looked for.
+    /// A step may move a vehicle's centre past the ego's, so contacts between two steps are tested.
     pub may_cross: bool,
 }
 
 impl Scene {
-    /// One or two other vehicles of which nothing is known.
+    /// One or two other vehicles without common properties.
     pub fn unknown(is_pair: bool) -> Scene {
         Scene { is_pair, always_there: false, in_lane: false, is_steady: false, may_cross: true }
     }
@@ -31,9 +31,9 @@ impl Scene {
         Scene { is_pair: false, always_there: true, in_lane: true, is_steady: false, may_cross: false }
     }
 
-    /// What holds for all of these cases under a model. Where one vehicle comes or goes, there is a second one as
-    /// well, if one that is never there. Of lanes that may cross nothing else is known: such time steps
-    /// are rare.
+    /// Common properties of these cases under a model. Where one vehicle appears or leaves, there is a second one as
+    /// well, possibly one that is never present. Lanes that may cross have no further properties, because such time
+    /// steps are rare.
     pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
         if may_cross {
             return Scene::unknown(true);
@@ -43,18 +43,18 @@ impl Scene {
         Scene { is_pair: !always_there, always_there, in_lane, is_steady: false, may_cross: false }
     }
 
-    /// What holds for lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only): they are there,
-    /// judged and attended to.
+    /// Properties of lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only):
+    /// these are present, judged and attended to.
     pub(super) fn of_lead_only<R: Real>(cases: &[LaneCase<R>]) -> Scene {
         let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
         Scene { is_pair: false, always_there: true, in_lane, is_steady: false, may_cross: false }
     }
 }
 
-/// Can one step of a lane of this case lead a vehicle's centre past the ego's from wholly ahead or behind? No driver
-/// accelerates and no speed is negative, so the faster of the two vehicles bounds how far the gap moves.
+/// Whether one step of a lane of this case can move a vehicle's centre past the ego's from wholly ahead or behind. No
+/// driver accelerates and no speed is negative, so the faster of the two vehicles bounds the change of the gap.
 pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) -> bool {
-    // Less by a thousandth, for rounding.
+    // A thousandth less, for rounding.
     let reach = R::from_f64(0.999);
     case.others.iter().filter(|other| other.used != 0).any(|other| {
         let motion = &other.motion;
@@ -70,7 +70,7 @@ pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) 
     })
 }
 
-/// One other vehicle, and it neither comes nor goes.
+/// One other vehicle, which neither appears nor leaves.
 fn is_always_there<R: Real>(case: &LaneCase<R>) -> bool {
     let other = &case.others[0];
     case.pair == 0 && other.used != 0 && other.judged != 0 && other.present_from == 0 && other.present_until == NEVER
@@ -81,7 +81,7 @@ fn is_in_lane<R: Real>(case: &LaneCase<R>, model_index: usize) -> bool {
     is_centred(&case.others[0], case.ego_width) && case.others[0].attend_from[model_index] == 0
 }
 
-/// It keeps to the middle of the ego's lane.
+/// The vehicle keeps to the middle of the ego's lane.
 fn is_centred<R: Real>(other: &LaneOther<R>, ego_width: R) -> bool {
     let motion = &other.motion;
     let positions = [motion.lateral_initial, motion.lateral_per_step, motion.lateral_end, motion.lateral_towards];
@@ -109,8 +109,8 @@ mod tests {
         LaneCase::encode(&case, &Profile::load("paper").unwrap(), &mut Tables::default())
     }
 
-    /// A leader is in the lane, one that cuts in is there, and one that cuts out has another one ahead of it. One
-    /// case of another kind takes what is known from all.
+    /// A leader is in the lane, a cutting-in vehicle is present, and a cutting-out vehicle has another one ahead. One
+    /// case without a property removes it from all.
     #[test]
     fn only_what_holds_for_all_cases_is_known() {
         let leader = case(Category::Lvd, Lateral::Centred, false);
@@ -125,7 +125,8 @@ mod tests {
         assert_eq!(Scene::of(&[leader, cut_out], 0, false), known(false, false));
     }
 
-    /// One that comes, goes, is not judged or is not attended to from the start has to be asked for.
+    /// A vehicle that appears, leaves, is not judged, or is not attended to from the start must be tested at every
+    /// step.
     #[test]
     fn what_changes_within_a_lane_is_not_known() {
         let leader = case(Category::Lvd, Lateral::Centred, false);

@@ -1,4 +1,4 @@
-//! The units of a block: named scenarios, or samples that are told apart by their index alone.
+//! The units of a block: named scenarios, or samples, which are identified by their index.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -9,14 +9,14 @@ use std::sync::Arc;
 pub enum Units {
     /// Scenarios by their keys.
     Named(Vec<String>),
-    /// Scenarios of which this process holds an interval: how many there are, the first one held, the keys of those held.
+    /// Scenarios of which this process holds an interval: total number, index of the first held, keys of those held.
     Held(u64, u64, Arc<[String]>),
     /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ of them keeps no names.
     Numbered(u64),
 }
 
 impl Units {
-    /// How many.
+    /// Number of units.
     pub fn len(&self) -> u64 {
         match self {
             Units::Named(names) => names.len() as u64,
@@ -32,7 +32,7 @@ impl Units {
         }
     }
 
-    /// None at all?
+    /// Whether there are no units.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -2,7 +2,8 @@
 //!
 //! A step of a lane has no branches, so that it can run for many lanes side by side. Its comparisons end in sign
 //! bits and are combined by the vector units' plain word operations; as `bool`s, a compiler would keep them in
-//! AVX-512's mask registers, whose operations are a quarter to a half as fast on Zen 5. Comparisons: [`Real`](crate::model::scalar::Real).
+//! AVX-512's mask registers, whose operations are a quarter to a half as fast on Zen 5. Comparisons:
+//! [`Real`](crate::model::scalar::Real).
 
 use std::ops::{BitAnd, BitOr, Not};
 
@@ -49,7 +50,7 @@ impl Flag {
         self.0 < 0
     }
 
-    /// One of two values, both of which are there already.
+    /// Selects one of two values, both already computed.
     #[inline(always)]
     pub fn choose<T>(self, where_it_holds: T, otherwise: T) -> T {
         if self.holds() { where_it_holds } else { otherwise }

@@ -5,7 +5,7 @@ use super::case::{Ahead, Case, Category, Participant};
 use super::motion::{Lateral, Speed};
 use crate::{Error, Place, Result};
 
-/// Lateral distance of a lane change unless told otherwise, m.
+/// Default lateral distance of a lane change, m.
 pub const LATERAL_DISTANCE_M: f64 = 3.5;
 
 /// The numbers; speeds in m/s, lengths in m. What a category does not have is not looked at.

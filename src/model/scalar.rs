@@ -1,5 +1,5 @@
 //! The number a lane computes with: f64 (the reference), f32 (the lane arithmetic of every backend) and
-//! a counting type that tells the operations of a step.
+//! a type that counts the operations of a step.
 //!
 //! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
 //! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.

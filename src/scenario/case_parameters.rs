@@ -76,7 +76,7 @@ impl CaseParameters {
         Ok(())
     }
 
-    /// The case; vehicles have the size given here unless told otherwise.
+    /// The case; vehicles have the size given here by default.
     ///
     /// # Errors
     /// [`Error::Usage`] that names what is missing or out of range.
@@ -120,7 +120,7 @@ impl CaseParameters {
         })
     }
 
-    /// What the category does not have would not be heeded. 0 says that there is none, which is true.
+    /// Refuses parameters that the category does not have. 0 is accepted, as it means none.
     fn refuse_of_other_categories(&self, category: Category) -> Result<()> {
         let given = [
             ("lateral_speed", self.lateral_speed, category == Category::Lvd),

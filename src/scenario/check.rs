@@ -1,4 +1,4 @@
-//! What no type says of a scenario: lengths, signs, what a category needs, and what is plausible on a road.
+//! Checks that no type expresses: lengths, signs, what a category needs, and what is plausible on a road.
 
 use super::{Category, Other, Scenario};
 use crate::support::error::{Error, Place, Result};
@@ -85,7 +85,7 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     Ok(())
 }
 
-/// Least sample rate, Hz: no motion can be told at a lower one.
+/// Minimum sample rate, Hz: a lower one cannot resolve a motion.
 const MIN_RATE_HZ: f64 = 0.1;
 
 /// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.

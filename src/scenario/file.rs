@@ -56,7 +56,7 @@ pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a 
     }
 }
 
-/// The format of a file of scenarios that is to be written: for what is known before the work.
+/// The format of a file of scenarios that is to be written, checked before the work starts.
 ///
 /// # Errors
 /// [`crate::Error::Usage`] as [`write_scenarios`].

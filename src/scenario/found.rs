@@ -9,9 +9,9 @@ use crate::support::plausibility::{Doubts, Implausible};
 
 /// One scenario in so many may be left out; where more cannot be used, the file is not what it is taken for.
 const ONE_IN: u64 = 10;
-/// Errors that are told one by one.
+/// Number of errors that are listed one by one.
 const TOLD: usize = 20;
-/// Errors that are kept.
+/// Number of errors that are kept.
 const KEPT: usize = 1000;
 
 /// What a file of scenarios holds.
@@ -26,7 +26,7 @@ pub struct ScenarioFile {
 }
 
 /// Scenarios that have been read, with where each id came from.
-pub(super) struct Found {
+pub(super) struct ScenariosRead {
     scenarios: Vec<Scenario>,
     rows: HashMap<String, u64>,
     /// Ids that came more than once.
@@ -39,11 +39,11 @@ pub(super) struct Found {
     help: &'static str,
 }
 
-impl Found {
+impl ScenariosRead {
     /// `help` says what to do about two scenarios of one id.
-    pub fn new(implausible: Implausible, help: &'static str) -> Found {
+    pub fn new(implausible: Implausible, help: &'static str) -> ScenariosRead {
         let doubts = Doubts::new(implausible);
-        Found {
+        ScenariosRead {
             scenarios: Vec::new(),
             rows: HashMap::new(),
             doubled: HashSet::new(),
@@ -101,8 +101,8 @@ impl Found {
     /// What was found; `help` says what a file without any scenario should hold.
     ///
     /// # Errors
-    /// [`Error::Input`] for such a file, and for one of which more than one scenario in ten cannot be used: with what is
-    /// wrong with each, up to a number.
+    /// [`Error::Input`] for such a file, and if more than one scenario in ten is unusable; it lists the problems up to
+    /// a maximum number.
     pub fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
         self.scenarios.retain(|scenario| !self.doubled.contains(&scenario.id));
         self.doubled.clear();

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::Scenario;
 use super::check::{check_written, name};
-use super::found::{Found, ScenarioFile};
+use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
 use crate::support::atomic_file::AtomicFile;
 use crate::support::error::{Error, Place, Result};
@@ -22,7 +22,7 @@ use crate::support::plausibility::Implausible;
 pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
     let file = input_file::open(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
-    let mut found = Found::new(implausible, "remove one of the two lines or rename one scenario");
+    let mut found = ScenariosRead::new(implausible, "remove one of the two lines or rename one scenario");
     let mut line = Vec::new();
     for row in 1.. {
         line.clear();

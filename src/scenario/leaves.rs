@@ -110,7 +110,7 @@ impl Leaf {
     pub fn typed(&self, value: Value, divisor: f64) -> Value {
         match self.field.content {
             Content::Number => number(value, divisor),
-            // Of an instant: one of the series.
+            // One value of the series, at an instant.
             Content::Series => match value {
                 Value::Array(values) => values.into_iter().map(|value| number(value, divisor)).collect(),
                 one => number(one, divisor),

@@ -1,7 +1,7 @@
-//! Scenarios: what was found in a recording ([`Scenario`]) and what is simulated ([`Case`]).
+//! Scenarios as found in a recording ([`Scenario`]) and cases as simulated ([`Case`]).
 //!
-//! Here live the mined scenario, its files and tables, and the concrete case with its motions. Here lives
-//! nothing about how scenarios are found or parameterized. Data comes from [`crate::traffic::mining`] or from a
+//! Here live the mined scenario, its files and tables, and the concrete case with its motions. Mining and
+//! simulation live elsewhere. Data comes from [`crate::traffic::mining`] or from a
 //! scenario file and goes to [`crate::scenario::parameterization`].
 
 mod case_parameters;

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::case_parameters::{CaseParameters, at_least};
 use super::check::name;
 use super::columns::{Chosen, HELP, choose};
-use super::found::{Found, ScenarioFile};
+use super::found::{ScenarioFile, ScenariosRead};
 use super::leaves::number;
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
 use crate::support::error::{Error, Place, Result};
@@ -34,14 +34,14 @@ const COLUMNS: [(&str, &str); 17] = [
     ("rate", "Hz"),
 ];
 
-/// Sizes of vehicles unless told otherwise: those of all profiles that come with the program, m.
+/// Default sizes of vehicles: those of all profiles that come with the program, m.
 const LENGTH_M: f64 = 4.3;
 const WIDTH_M: f64 = 1.9;
-/// Samples per second unless told otherwise.
+/// Default samples per second.
 const RATE_HZ: f64 = 25.0;
-/// A scenario lasts at least so long unless told otherwise, s.
+/// Default minimum duration of a scenario, s.
 const MIN_DURATION_S: f64 = 1.0;
-/// And at most so long, s: the time cap of the paper's profile.
+/// Maximum duration, s: the time cap of the paper's profile.
 const MAX_DURATION_S: f64 = 120.0;
 /// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
@@ -95,8 +95,8 @@ impl ParameterRows {
         Ok(map)
     }
 
-    /// An error about a value, told with file, row and column.
-    pub fn told(&self, row: u64, error: Error) -> Error {
+    /// An error about a value, with file, row and column.
+    pub fn at_row(&self, row: u64, error: Error) -> Error {
         let Error::Usage { place, problem, help } = error else { return error };
         Error::input(self.place(row, &place.item.unwrap_or_default(), None), problem, help)
     }
@@ -116,7 +116,7 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
     if rows.chosen.iter().all(|column| COLUMNS[column.field].0 != "category") {
         return Err(Error::input(header, "no column `category`: this is no table of scenarios", HELP));
     }
-    let mut found = Found::new(implausible, "rename one of the two; rows of one scenario stand together");
+    let mut found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario stand together");
     let mut samples = 0.0;
     while let Some((row, map)) = rows.next_row()? {
         let count = found.count();
@@ -128,7 +128,7 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
         let mut doubts = found.doubts();
         let place = |key: &str| rows.place(row, key, None).to_string();
         let scenario = map.and_then(|map| {
-            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.told(row, error))
+            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.at_row(row, error))
         });
         match scenario {
             Err(error) => found.refuse(error),

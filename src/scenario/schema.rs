@@ -33,7 +33,7 @@ pub(super) struct Field {
     pub name: &'static str,
     pub presence: Presence,
     pub content: Content,
-    /// Empty for what is no number.
+    /// Empty for a field that is not numeric.
     pub unit: &'static str,
     pub about: &'static str,
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::check::name;
 use super::columns::{Chosen, HELP, choose};
-use super::found::{Found, ScenarioFile};
+use super::found::{ScenarioFile, ScenariosRead};
 use super::leaves::{Leaf, leaves, names};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
@@ -53,7 +53,7 @@ struct Reader {
     chosen: Vec<Chosen>,
     /// Per chosen column: may its value change within a scenario?
     may_change: Vec<bool>,
-    found: Found,
+    found: ScenariosRead,
     /// The scenario whose instants are being read.
     open: Option<Open>,
     /// The scenario that is left out for one of its instants.
@@ -65,7 +65,7 @@ struct Open {
     /// Row of every instant.
     rows: Vec<u64>,
     id: Value,
-    /// Of the first row, per chosen column.
+    /// Values of the first row, per chosen column.
     first: Vec<Value>,
     /// Per chosen column that is a series.
     series: Vec<Vec<Value>>,
@@ -97,7 +97,7 @@ impl Reader {
             return Err(Error::input(table.header(), problem, HELP));
         }
         let may_change = chosen.iter().map(|column| names.get(column.known).is_none_or(|name| name.2)).collect();
-        let found = Found::new(implausible, "rename one of the two; rows of one scenario stand together");
+        let found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario stand together");
         Ok(Reader { table, leaves, chosen, may_change, found, open: None, refused: None })
     }
 

@@ -143,7 +143,7 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
-/// A failure to begin the file. Of a folder that is not there the system says only that something is not.
+/// A failure to begin the file. If the folder is missing, the system's message does not name it.
 fn not_begun(target: &Path, source: std::io::Error) -> Error {
     if source.kind() != ErrorKind::NotFound {
         return Error::io(target, "write", source);
@@ -197,8 +197,8 @@ pub(crate) struct StagedFile {
 }
 
 impl AtomicFile {
-    /// Begins the file `target` that a user named, whose folder must exist; a link is followed. What is there under that
-    /// name stays until [`StagedFile::publish`]. What killed processes left of the same target is removed.
+    /// Begins the file `target` that a user named, whose folder must exist; a link is followed. What is there under
+    /// that name stays until [`StagedFile::publish`]. What killed processes left of the same target is removed.
     ///
     /// # Errors
     /// If the folder cannot be written to.

@@ -181,7 +181,7 @@ impl Error {
                 }
                 std::io::ErrorKind::WouldBlock | std::io::ErrorKind::OutOfMemory => {
                     "the limit of processes or of memory \
-                     is reached: use fewer --threads (more than there are cores serve nothing), or raise the limit \
+                     is reached: use fewer --threads (more threads than cores do not help), or raise the limit \
                      (`ulimit -u`, `ulimit -v`)"
                         .to_owned()
                 }

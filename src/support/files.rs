@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
-/// Whether a folder is there, or could be made as far as names tell: what is known before the work.
+/// Whether a folder is there, or could be made, judged by names only, before the work starts.
 ///
 /// # Errors
 /// [`Error::Io`] naming the file that is where a folder is needed.

@@ -26,7 +26,7 @@ impl FolderLock {
         FolderLock::take(path, File::try_lock, true)
     }
 
-    /// The same lock together with others who share it; who has it alone keeps them out, and they keep him out.
+    /// The same lock, shared: excludes an exclusive holder, and an exclusive holder excludes sharers.
     ///
     /// # Errors
     /// As [`FolderLock::acquire`].
@@ -61,8 +61,8 @@ impl FolderLock {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // While the lock is still held alone, so that nobody else's file can be under that name, unless the folder was
-        // taken away and made again. A file that stays is harmless.
+        // While the lock is still held exclusively, so that nobody else's file can be under that name, unless the
+        // folder was taken away and made again. A file that stays is harmless.
         let is_alone = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
         if is_alone && is_named(&self.path, &self.file) {
             let _ = std::fs::remove_file(&self.path);

@@ -2,7 +2,8 @@
 //! and every flag. `docs/src/tables.md` shows it to users; a test compares the two.
 //!
 //! A value outside the plausible range is used and reported. One beyond the physical range is refused, unless the user
-//! accepts implausible input; then it is reported too. What no arithmetic can hold is refused by the readers themselves.
+//! accepts implausible input; then it is reported too. What no arithmetic can hold is refused by the readers
+//! themselves.
 
 /// What a value is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,7 +97,7 @@ impl Quantity {
         contains(self.limits().plausible, value)
     }
 
-    fn told(self, value: f64) -> String {
+    fn describe(self, value: f64) -> String {
         let of = self.limits();
         let ((least, most), words) = match contains(of.physical, value) {
             true => (of.plausible, "is not plausible"),
@@ -172,7 +173,7 @@ impl Doubts {
 
     #[cold]
     fn doubt(&mut self, quantity: Quantity, value: f64, place: String) -> Result<(), String> {
-        let text = quantity.told(value);
+        let text = quantity.describe(value);
         if self.policy == Implausible::Refused && !contains(quantity.limits().physical, value) {
             return Err(text);
         }

@@ -78,17 +78,17 @@ mod tests {
 
     #[test]
     fn an_error_names_the_key_and_what_was_meant() {
-        let told = |text: &str| {
+        let problem = |text: &str| {
             let error = parse::<Lengths>(text, &Place::file("a.toml"), "see there").unwrap_err();
             (error.to_string(), error.help().unwrap_or_default())
         };
-        let (text, _) = told("# far\ngap_m = 'far'\n");
+        let (text, _) = problem("# far\ngap_m = 'far'\n");
         assert!(text.contains("line 2") && text.contains("`gap_m`") && text.ends_with("expected a number"), "{text}");
-        let (text, _) = told("gap_m = 1.0\nrows = -1\n");
+        let (text, _) = problem("gap_m = 1.0\nrows = -1\n");
         assert!(text.contains("`rows`") && text.contains("a whole number"), "{text}");
-        let (text, help) = told("gap = 1.0\n");
+        let (text, help) = problem("gap = 1.0\n");
         assert!(text.contains("unknown field `gap`") && help == "did you mean `gap_m`? see there", "{text}; {help}");
-        let (_, help) = told("colour = 1.0\n");
+        let (_, help) = problem("colour = 1.0\n");
         assert_eq!(help, "see there");
     }
 

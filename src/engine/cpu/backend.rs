@@ -20,19 +20,19 @@ use crate::scenario::Category;
 const FULL_TASK: u64 = 8192;
 /// Lanes per model below which tasks are not cut for the sake of more of them.
 const SMALL_TASK: u64 = 2048;
-/// Tasks that every thread should have, so that none is left waiting for long.
+/// Tasks per thread, so that no thread idles for long at the end.
 const TASKS_PER_THREAD: u64 = 4;
-/// Entries of a task's unrolled motions at most, 64 MiB, should every motion last as long as its lane; most are a tenth.
+/// Maximum number of entries in a task's unrolled motions, 64 MiB, if every motion lasts as long as its lane.
 const TASK_ENTRIES: u64 = 1 << 24;
 
 /// Steps per thread of the lanes of a chunk, should each make every step: about two seconds in batches, one or two as
 /// single lanes, up to five where their criterion iterates.
 const CHUNK_STEPS: u64 = 1 << 29;
 const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
-/// Lanes of a chunk at most.
+/// Maximum number of lanes in a chunk.
 const CHUNK_LANES: u64 = 1 << 17;
 
-/// Lanes, of so many steps at most, that all threads together compute in batches within seconds; at least one.
+/// Number of lanes with so many steps that all threads together compute in batches within seconds; at least one.
 pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
     lanes_of_steps(CHUNK_STEPS, step_cap)
 }
@@ -69,8 +69,8 @@ impl CpuBackend<f32> {
         Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
     }
 
-    /// The same, but it makes every step of every lane as a whole, with all its vehicles; without it, where only verdicts
-    /// are wanted, batches leave out what can change none. The verdicts are the same. For benchmarks and tests.
+    /// Makes every step of every lane with all its vehicles. By default verdict-only batches skip steps that change no
+    /// verdict. The verdicts are the same. For benchmarks and tests.
     pub fn every_step(self) -> Self {
         CpuBackend { every_step: true, ..self }
     }
@@ -93,7 +93,7 @@ impl<R: Real> CpuBackend<R> {
 }
 
 impl Backend for CpuBackend<f32> {
-    /// Steps are left out for verdicts alone.
+    /// Verdict-only batches skip steps.
     fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
         let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
         if wanted == Wanted::Verdicts && !makes_every_step { RecheckBy::Batches } else { RecheckBy::Nothing }
@@ -138,7 +138,7 @@ trait RunUnits<R>: Sync {
     /// Gives each outcome with its position, counted from the first unit on.
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
 
-    /// Verdicts alone.
+    /// Verdicts only.
     fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
 }
 
@@ -258,7 +258,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                         });
                         cells
                     });
-                    // Whole numbers and smallest values: the order of the sum does not matter.
+                    // Integers and minima: the order of the sum does not matter.
                     let sum = of_tasks.reduce(empty, |mut a, b| {
                         a.iter_mut().zip(&b).for_each(|(a, b)| a.add(b));
                         a

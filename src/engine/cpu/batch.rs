@@ -3,9 +3,8 @@
 //!
 //! A burst is [`ROWS`] steps of some batches in turn. One step of a batch needs the step before it, and so does its
 //! next one; the batches need nothing of one another, which keeps the machine busy while results are on their way.
-//! A lane that is over stays as it is until the burst ends; one at ease goes on to its end, which changes no verdict.
-//! Nothing here depends on the instruction set;
-//! [`crate::engine::cpu::simd`] chooses it.
+//! A lane that is over stays as it is until the burst ends. A lane in steady following goes on to its end, which
+//! changes no verdict. [`crate::engine::cpu::simd`] chooses the instruction set; nothing here depends on it.
 
 use crate::model::driver::DriverModel;
 use crate::model::flag::Flag;
@@ -13,7 +12,7 @@ use crate::model::scalar::Real;
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;
-use crate::engine::cpu::pending::{Lanes, ROOM, Waiting};
+use crate::engine::cpu::pending::{Lanes, Pending, ROOM};
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::steady_following::steady_steps;
 use crate::engine::cpu::transpose::Window;
@@ -24,13 +23,13 @@ use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
 /// Batches of a burst.
 pub(in crate::engine) const BATCHES: usize = 3;
 
-/// Steps before a lane is asked again where the answer was no: at least so many. Before calm ones are looked for again,
-/// also a share of those behind.
+/// Minimum number of steps before a lane that did not qualify is examined again. For quiescent steps the wait also
+/// grows with the steps already made.
 const LOOK_AGAIN: u32 = 4 * ROWS as u32;
 const LOOK_AGAIN_SHARE: u32 = 4;
 
-/// Fewer steps at ease are sooner made where the lane is.
-const FEWEST_AT_EASE: u32 = 6 * ROWS as u32;
+/// Fewer steady-following steps are cheaper to make in place.
+const MIN_STEADY_STEPS: u32 = 6 * ROWS as u32;
 
 /// The batches in flight, and the series that their lanes read.
 pub(in crate::engine) struct Fleet<'c> {
@@ -42,7 +41,7 @@ pub(in crate::engine) struct Fleet<'c> {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::engine) struct Batch {
     lanes: LaneArrays<LANES>,
-    /// Where a step that reads the state writes, and the other way round: a vector is never stored in parts.
+    /// The steps alternate between these two buffers (ping-pong), so that a vector is never stored in parts.
     after: StateArrays<LANES>,
     windows: [[Window; 3]; 2],
     /// Steps of the first row.
@@ -51,9 +50,9 @@ pub(in crate::engine) struct Batch {
     pub free: Slots,
     /// Slots whose lane has made its last step in this burst.
     pub finished: Slots,
-    /// Slots whose lane may have come to calm steps: nothing around it changes any more, nor did its speed.
-    pub calm: Slots,
-    /// Slots whose lane may belong into batches of another kind.
+    /// Slots whose lane may be quiescent: the other vehicles' motions have ended and the ego kept its speed.
+    pub quiescent: Slots,
+    /// Slots whose lane may move to another stage.
     pub leaving: Slots,
     /// Speeds of the egos at the first row, and the gaps before it.
     speeds: Floats,
@@ -61,7 +60,7 @@ pub(in crate::engine) struct Batch {
 }
 
 impl<'c> Fleet<'c> {
-    /// At the beginning of a stream: all slots are free. `vehicles` are those that its batches look at.
+    /// All slots are free. `vehicles` are the other vehicles that the batches look at.
     pub fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
         let window = |vehicle: usize, quantity: usize| {
             Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
@@ -75,7 +74,7 @@ impl<'c> Fleet<'c> {
             from: [0; LANES],
             free: !0,
             finished: 0,
-            calm: 0,
+            quiescent: 0,
             leaving: 0,
             speeds: [0.0; LANES],
             gaps: [0.0; LANES],
@@ -99,7 +98,7 @@ impl Batch {
         (self.lanes.fixed.at(k), state, places(&self.windows, row, k))
     }
 
-    /// What is left in a slot that stays free is at no step that holds the others up.
+    /// A free slot keeps values at a step that delays no other slot.
     #[inline(always)]
     fn clear_free(&mut self) {
         let mut left = self.free;
@@ -114,22 +113,23 @@ impl Batch {
     fn find_finished(&mut self, step_cap: u32) {
         let moving = &self.lanes.state.moving;
         let ego = &self.lanes.fixed.ego;
-        let (mut finished, mut calm, mut leaving) = (0, 0, 0);
+        let (mut finished, mut quiescent, mut leaving) = (0, 0, 0);
         for k in 0..LANES {
             let is_finished = Flag::from_bits(moving.over[k]) | Flag::of(moving.index[k] >= step_cap);
             finished |= u16::from(is_finished.holds()) << k;
             let index = moving.index[k];
             let is_worth_a_look = index > ego.eventful_until[k];
             let is_still = index > ego.still_from[k] && moving.gap[k] == self.gaps[k];
-            calm |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
+            quiescent |= u16::from(moving.v_ego[k] == self.speeds[k] && (is_worth_a_look || is_still)) << k;
             leaving |= u16::from(index >= ego.leaves_from[k]) << k;
         }
         self.finished = finished & !self.free;
-        self.calm = calm & !finished & !self.free;
+        self.quiescent = quiescent & !finished & !self.free;
         self.leaving = leaving & !finished & !self.free;
     }
 
-    /// After a burst at ease, which moved only what [`StateArrays::set_steady_following`] says.
+    /// Restores the slots after a steady-following burst, which moved only the fields of
+    /// [`StateArrays::set_steady_following`].
     #[inline(always)]
     fn end_steady_following(&mut self) {
         let LaneArrays { fixed, state } = &mut self.lanes;
@@ -139,27 +139,27 @@ impl Batch {
         for k in 0..LANES {
             let last = moving.index[k] + ROWS as u32 - 1;
             moving.index[k] = last + 1;
-            // The first such step ended the lane, and no verdict has changed since. At rest it is settled as well:
-            // nobody ahead of a lane at ease drives backwards.
+            // The first such step ended the lane, and no verdict has changed since. A lane at standstill is settled as
+            // well, because no leader in steady following drives backwards.
             let settled = !(moving.v_before[k] - self.windows[0][0].rows[ROWS - 1][k]).is_positive();
             moving.over[k] = (Flag::reached(last, fixed.ego.horizon[k]) & settled).to_bits();
         }
     }
 
-    /// Leaves out calm steps of a lane where it pays, else looks again later.
+    /// Skips quiescent steps of a lane where that pays; otherwise examines the lane again later.
     pub fn jump_ahead<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
         let (constants, state, places) = self.last_step(k);
         let LaneArrays { fixed, state: arrays } = &mut self.lanes;
         let eventful_until = &mut fixed.ego.eventful_until[k];
         match quiescent_steps(simulation, &constants, &state, &places) {
-            Some(calm) => {
-                arrays.moving.index[k] += calm.steps;
-                arrays.moving.gap[k] = calm.gaps[0];
-                arrays.ahead.gap[k] = calm.gaps[1];
+            Some(quiescent) => {
+                arrays.moving.index[k] += quiescent.steps;
+                arrays.moving.gap[k] = quiescent.gaps[0];
+                arrays.ahead.gap[k] = quiescent.gaps[1];
                 *eventful_until = arrays.moving.index[k];
             }
             None => {
-                // One that stood still was looked at for that, and may be due later for the other reason.
+                // A lane that stood still was examined for that reason only; the other may be due later.
                 if state.index > *eventful_until {
                     *eventful_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
                 }
@@ -173,32 +173,32 @@ impl Batch {
         self.free |= self.finished;
     }
 
-    /// Lets the lanes go that go on with the second vehicle alone.
-    pub fn set_apart_alone(&mut self, apart: &mut Waiting) {
+    /// Moves lanes out that continue with the second vehicle only.
+    pub fn set_apart_lead_only(&mut self, apart: &mut Pending) {
         while self.leaving != 0 && apart.has_room(1) {
             let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
-            apart.add_alone(&self.lanes, k);
+            apart.add_lead_only(&self.lanes, k);
             self.free |= 1 << k;
         }
     }
 
-    /// Lets lanes go that are at ease for long enough; the others are asked again later.
+    /// Moves lanes out that follow steadily for long enough; the others are examined again later.
     pub fn set_apart_steady_following<M: DriverModel<f32>>(
         &mut self,
         simulation: &Simulation<f32, M>,
-        apart: &mut Waiting,
+        apart: &mut Pending,
     ) {
         while self.leaving != 0 {
             let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
             if self.lanes.state.moving.index[k] - self.from[k] > ROWS as u32 {
-                // It has been set ahead, to a step that this burst has not seen.
+                // The lane jumped ahead to a step that this burst has not seen.
                 continue;
             }
             let (constants, state, places) = self.last_step(k);
             let steps = steady_steps(simulation, &constants, &state, &places[0]);
-            if steps < FEWEST_AT_EASE {
+            if steps < MIN_STEADY_STEPS {
                 self.lanes.fixed.ego.leaves_from[k] = state.index + LOOK_AGAIN;
             } else if apart.has_room(1) {
                 apart.add_lane(&self.lanes, k, state.index + steps - (ROWS as u32 - 1));
@@ -207,8 +207,8 @@ impl Batch {
         }
     }
 
-    /// Lanes whose steps at ease are used up: those no longer at ease go back.
-    pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Waiting) {
+    /// Returns lanes whose steady-following steps are used up.
+    pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Pending) {
         let ego = &self.lanes.fixed.ego;
         let mut used_up = 0;
         for k in 0..LANES {
@@ -230,13 +230,13 @@ impl Batch {
     }
 }
 
-/// The next steps of all lanes; those that wait take the free slots. An instruction set has its own way to `take`: it
-/// gives slots, in their order, the entries of every row from a place on. And to `turn`: that is [`Window::turn`].
+/// Makes the next steps of all lanes; pending lanes take the free slots. Each instruction set has its own `take`, which
+/// gathers the entries of every row from a place on for the free slots, and its own `turn`, which is [`Window::turn`].
 #[inline(always)]
 pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     fleet: &mut Fleet<'_>,
-    waiting: &mut Waiting,
+    pending: &mut Pending,
     take: impl Fn(&mut [[u32; LANES]], &[[u32; ROOM]], usize, Slots),
     turn: impl Fn(&mut Window, &TrackArrays<LANES>, &Words, &[f32]),
 ) {
@@ -248,13 +248,13 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
     let Fleet { batches, entries } = fleet;
     let mut furthest = [0; LANES];
     for batch in batches.iter_mut() {
-        let slots = lowest(batch.free, waiting.count());
+        let slots = lowest(batch.free, pending.count());
         if slots != 0 {
-            let from = waiting.take(slots.count_ones() as usize);
+            let from = pending.take(slots.count_ones() as usize);
             let values = !rules.is_verdict_only;
-            let waiting = waiting.lanes().parts(rules.scene.is_pair, values);
-            for (rows, waiting) in batch.lanes.parts_mut(rules.scene.is_pair, values).into_iter().zip(waiting) {
-                take(rows, waiting, from, slots);
+            let pending = pending.lanes().parts(rules.scene.is_pair, values);
+            for (rows, pending) in batch.lanes.parts_mut(rules.scene.is_pair, values).into_iter().zip(pending) {
+                take(rows, pending, from, slots);
             }
             batch.free &= !slots;
         }
@@ -277,7 +277,7 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
             }
         }
     }
-    // No lane steps beyond the cap, so no step asks for it; one at ease is far from it.
+    // No lane steps beyond the cap, so no step tests it; a steadily following lane is far from it.
     let left = frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize;
     let rows = if rules.scene.is_steady { ROWS } else { left.min(ROWS) };
     for row in 0..rows {

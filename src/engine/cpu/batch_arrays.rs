@@ -15,7 +15,7 @@ use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
 
-/// Where a lane leaves its batch at no step.
+/// Marks a lane that never leaves its batch.
 pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
 
 /// Slots of a batch: one bit each.
@@ -53,11 +53,11 @@ pub(in crate::engine) struct EgoArrays<const N: usize> {
     pub lane: [u32; N],
     width: [f32; N],
     pub horizon: [u32; N],
-    /// Up to this step it is not worth looking for calm ones.
+    /// Quiescent steps are not searched for before this step.
     pub eventful_until: [u32; N],
-    /// From this step on a lane may stand still: the other vehicles keep speed and lateral position.
+    /// From this step on the lane may be quiescent: the other vehicles keep speed and lateral position.
     pub still_from: [u32; N],
-    /// From this step on it may belong into batches of another kind.
+    /// From this step on the lane may move to another stage.
     pub leaves_from: [u32; N],
 }
 
@@ -116,7 +116,7 @@ pub(in crate::engine) struct AheadArrays<const N: usize> {
     pub gap: [f32; N],
 }
 
-/// What a step moves where more than verdicts is wanted.
+/// Moved by every step of a sweep that returns more than verdicts.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct ValueArrays<const N: usize> {
@@ -233,8 +233,7 @@ impl<const N: usize> LaneArrays<N> {
         }
     }
 
-    /// Puts one of these lanes into place `to`, as it goes on with one of its vehicles alone; where only verdicts are
-    /// wanted.
+    /// Copies one of these lanes to place `to`, where it continues with one of its vehicles. For verdicts only.
     #[inline]
     pub fn set_single(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
         let (fixed, state) = (&lanes.fixed, &lanes.state);
@@ -256,7 +255,7 @@ impl<const N: usize> LaneArrays<N> {
         speed.last[k].max(position.last[k]).max(towards.last[k])
     }
 
-    /// Says which lane of the stream stands here, and how far the other vehicles are from it.
+    /// Sets which lane of the stream is in this slot, and its distances to the other vehicles.
     #[inline(always)]
     pub fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
         self.fixed.ego.lane[k] = lane;
@@ -304,7 +303,7 @@ fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
 }
 
 impl<const N: usize> StateArrays<N> {
-    /// Of one lane.
+    /// Sets the state of one lane.
     #[inline(always)]
     pub fn at(&self, k: usize) -> LaneState<f32> {
         let StateArrays { moving, ahead, values } = self;
@@ -332,8 +331,8 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// Of one lane at ease, as far as its steps look at it: they are not the first, the reaction time is over, and
-    /// nothing is judged.
+    /// Sets the state of a steadily following lane: the fields that its steps read. These steps are not the first, the
+    /// reaction time is over, and no criterion is judged.
     #[inline(always)]
     pub fn is_steady(&self, k: usize) -> LaneState<f32> {
         let moving = &self.moving;
@@ -350,7 +349,7 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// What moves in a step at ease.
+    /// Copies the fields that a steady-following step moves.
     #[inline(always)]
     pub fn set_steady_following<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
         self.moving.v_ego[k] = lane.v_ego;
@@ -360,7 +359,7 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// What moves in a step of a model under these rules.
+    /// Rows that a step of a model moves under these rules.
     #[inline(always)]
     pub fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
         let StateArrays { moving, ahead, values } = self;
@@ -442,7 +441,7 @@ mod tests {
         assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
         assert_eq!(lanes.state.at(31), state);
 
-        // One that goes on with the second vehicle alone has it first, and its gap.
+        // A lane that continues with the second vehicle has it first, with its gap.
         let mut batch = LaneArrays::<LANES>::idle();
         let second = Track { first: 31, last: 32 };
         let second = VehicleTracks { speed: second, position: second, towards: second };
@@ -450,22 +449,22 @@ mod tests {
         let pair = LaneConstants { others: [other, ahead], ..constants };
         batch.fill(0, &pair, &[tracks[0], second], &state, 24, false);
         batch.start(5, 23, state.gaps);
-        let mut waiting = LaneArrays::<32>::idle();
-        waiting.set_single(31, &batch, 5, 1, NEVER_LEAVES);
-        let alone = waiting.fixed.at(31);
-        assert_eq!((alone.others[0].half_lengths, alone.others[0].attend_from, alone.horizon), (33.0, 34, 7));
-        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
-        assert!(waiting.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
-        assert_eq!((waiting.fixed.ego.eventful_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[1]));
-        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
+        let mut pending = LaneArrays::<32>::idle();
+        pending.set_single(31, &batch, 5, 1, NEVER_LEAVES);
+        let single = pending.fixed.at(31);
+        assert_eq!((single.others[0].half_lengths, single.others[0].attend_from, single.horizon), (33.0, 34, 7));
+        assert_eq!((pending.fixed.ego.lane[31], pending.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
+        assert!(pending.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
+        assert_eq!((pending.fixed.ego.eventful_until[31], pending.state.at(31).gaps[0]), (32, state.gaps[1]));
+        assert!(pending.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
 
-        // One that goes on with its first vehicle keeps all it has but the step at which it leaves.
-        let mut waiting = LaneArrays::<32>::idle();
-        waiting.set_single(31, &batch, 5, 0, 25);
-        assert_eq!(waiting.fixed.at(31).others[0].half_lengths, 1.0);
-        assert_eq!((waiting.fixed.ego.lane[31], waiting.fixed.ego.leaves_from[31]), (23, 25));
-        assert_eq!((waiting.fixed.ego.eventful_until[31], waiting.state.at(31).gaps[0]), (32, state.gaps[0]));
-        assert!(waiting.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{waiting:?}");
+        // A lane that continues with its first vehicle keeps everything except the step at which it leaves.
+        let mut pending = LaneArrays::<32>::idle();
+        pending.set_single(31, &batch, 5, 0, 25);
+        assert_eq!(pending.fixed.at(31).others[0].half_lengths, 1.0);
+        assert_eq!((pending.fixed.ego.lane[31], pending.fixed.ego.leaves_from[31]), (23, 25));
+        assert_eq!((pending.fixed.ego.eventful_until[31], pending.state.at(31).gaps[0]), (32, state.gaps[0]));
+        assert!(pending.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;
         let everything = Rules::from_bits(1);

@@ -1,12 +1,12 @@
-//! Steps in which nothing can happen, which batches do not make where only verdicts are wanted.
+//! Quiescent steps, which batches skip in verdict-only sweeps.
 //!
-//! Once the other vehicles have ended their manoeuvres and the ego keeps its speed, a lane often goes on for minutes in
-//! which only the gap changes, each step by the same number, until it is small enough for the driver or a criterion.
-//! Those steps are counted instead of made: [`quiescent_gap`] is the gap down to which all is well, [`carried`] tells how many
-//! steps the lane stays above it, and where that leaves the gap to the bit.
+//! Once the other vehicles have ended their manoeuvres and the ego keeps its speed, only the gap changes, by the same
+//! number each step. This often lasts for minutes, until the gap is small enough for the driver or a criterion. The
+//! lane jumps over these steps: [`quiescent_gap`] is the gap down to which no event is possible, and [`carried`] counts
+//! the steps above it and computes the gap after them to the bit.
 //!
-//! That needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Without a promise go
-//! steps that change no bit of a lane: all that follow change none either.
+//! This needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Steps that change
+//! no bit of a lane need no promise: no later step changes a bit either.
 
 use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
@@ -19,27 +19,27 @@ use crate::engine::lane_step::{
     Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, judge, see,
 };
 
-/// Fewer steps are sooner made than counted.
-const FEWEST: u32 = 4 * ROWS as u32;
+/// Fewer steps are cheaper to make than to count.
+const MIN_STEPS: u32 = 4 * ROWS as u32;
 
 /// Steps without an event, and the gaps after them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::engine) struct Calm {
+pub(in crate::engine) struct Quiescent {
     pub steps: u32,
     pub gaps: [f32; 2],
 }
 
-/// How many of a lane's next steps need not be made, if it pays: neither the driver nor a criterion nor the end of the
-/// lane comes before. `state` is between two steps, at `state.index` at least 1; the other vehicles keep speed and
-/// lateral position of `places` for ever.
+/// Number of a lane's next steps that can be skipped, where that pays: no reaction, criterion or end comes before.
+/// `state` is between two steps, at `state.index` at least 1. The other vehicles keep speed and lateral position of
+/// `places` for ever.
 pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
     places: &[OtherState<f32>; 2],
-) -> Option<Calm> {
+) -> Option<Quiescent> {
     let index = state.index;
-    // A burst is left to be made, so that the lane's end is reached as any other's.
+    // One burst remains, so that the lane reaches its end like any other.
     let mut most = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
     let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
     for other in &lane.others[..vehicles] {
@@ -54,9 +54,9 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     }
     if is_still(simulation, lane, state, places) {
         let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
-        return (steps >= FEWEST).then_some(Calm { steps, gaps: state.gaps });
+        return (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps: state.gaps });
     }
-    // A model that does not see its acceleration has no speed before kept.
+    // A model that does not see its acceleration does not keep the previous speed.
     if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
         return None;
     }
@@ -80,10 +80,10 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     let mut gaps = state.gaps;
     let mut steps = most;
     for vehicle in 0..vehicles {
-        // Nobody will ever look at one that is out of the way: its gap stays as it is.
+        // The gap of a vehicle out of the way is never read again.
         let Some(lowest) = lowest[vehicle] else { continue };
         let by = |vehicle: usize| (places[vehicle].speed - state.v_ego) * simulation.frame.dt;
-        if steps < FEWEST || gaps[vehicle] + by(vehicle) * (FEWEST as f32) < lowest {
+        if steps < MIN_STEPS || gaps[vehicle] + by(vehicle) * (MIN_STEPS as f32) < lowest {
             return None;
         }
         let most = steps;
@@ -92,29 +92,29 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
             gaps[0] = carried(state.gaps[0], by(0), steps, 0.0).1;
         }
     }
-    (steps >= FEWEST).then_some(Calm { steps, gaps })
+    (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps })
 }
 
-/// The next step changes nothing: a driver often follows so closely to the speed ahead that what it would brake, and
-/// what the gap would lose, is lost in rounding. Then no step changes anything before an event.
+/// Whether the next step changes nothing. A driver often follows so closely that rounding absorbs both the braking and
+/// the change of the gap. Then no step changes anything before an event.
 fn is_still<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
     state: &LaneState<f32>,
     places: &[OtherState<f32>; 2],
 ) -> bool {
-    // Seldom so: what it is about comes first.
+    // The rare condition first: it decides most calls.
     let change = (places[0].speed - state.v_ego) * simulation.frame.dt;
     if state.gaps[0] + change != state.gaps[0] {
         return false;
     }
-    // All that a lane has, by name: what is new has to be looked at here, or left out as what verdicts do not ask for.
+    // Every field by name, so that a new field must be compared here or excluded because verdicts do not depend on it.
     let bits = |state: &LaneState<f32>| {
         let &LaneState { index: _, v_ego, v_before, gaps, driver, reaction_step: _, record, over } = state;
         let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _ }) = (driver, record);
         let TtcMinimum { failed: ttc_failed, gap: _, closing: _ } = ttc;
         let BrakeThreatMaximum { failed: btn_failed, numerator: _, denominator: _ } = btn;
-        // What a model does not look at is not kept: see `StateArrays::set`.
+        // A field that a model does not read is not kept: see `StateArrays::set`.
         let v_before = if M::SEES_OWN_ACCELERATION { v_before } else { 0.0 };
         let deceleration = if M::KEEPS_DECELERATION { deceleration } else { 0.0 };
         let numbers = [v_ego, v_before, gaps[0], gaps[1], deceleration];
@@ -123,7 +123,7 @@ fn is_still<M: DriverModel<f32>>(
     bits(&advance(simulation, lane, state, places).state) == bits(state)
 }
 
-/// Beside the ego's lane, where it meets no contact, no criterion and no reaction, wherever it is along the road.
+/// The vehicle is beside the ego's lane, where no contact, criterion or reaction is possible at any gap.
 #[inline(always)]
 pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
@@ -136,7 +136,7 @@ pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
     !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards)
 }
 
-/// A gap down to which nothing happens with a vehicle; none where it is not in the ego's lane, or already too near.
+/// The gap down to which no event with a vehicle is possible; none if it is not in the ego's lane or already too near.
 fn quiescent_gap<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -150,29 +150,29 @@ fn quiescent_gap<M: DriverModel<f32>>(
         return None;
     }
     let of_criteria = criteria_safe_gap(criteria, record, state.v_ego - place.speed);
-    // What is no number stays none: the larger of two takes that of its second.
+    // `larger` returns its second operand when unordered, so NaN propagates.
     let safe = of_criteria.larger(simulation.model.safe_gap(state.v_ego, place.speed));
-    // Enough for what rounding does to it; at a gap that does not grow smaller all is well if it is well now.
+    // A margin for rounding. A gap that does not shrink stays safe if it is safe now.
     let lowest = 1.001 * safe + 0.001;
     if lowest.is_nan() || lowest > state.gaps[vehicle] {
         return None;
     }
-    // The safe distances are an advice; what counts is what the step itself would say.
+    // The safe distances only propose a gap; the step's own check decides.
     let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
-    // Every criterion that a record keeps has its say here.
+    // Every criterion that a record keeps is evaluated here.
     let Record { ttc, btn, min_gap: _ } = judge(criteria, record, &seen);
     let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
-    // The driver may not yet attend to it: then less is calm than could be.
+    // The driver may not attend to it yet: then fewer steps count as quiescent than could.
     let reacts = check(simulation, &seen, other, Flag::LATEST_STEP).is_unsafe;
     (!(fails | reacts).holds()).then_some(lowest)
 }
 
-/// Adds `change` to a positive gap again and again, each sum rounded as a step rounds it, at most so many times and as
-/// long as it does not fall below `lowest`: how many times, and what comes out.
+/// Adds `change` repeatedly to a positive gap, each sum rounded as a step rounds it, up to a maximum count and while
+/// the gap is not below `lowest`. Returns the number of sums and the result.
 ///
-/// Between two powers of two the numbers have one distance, so each sum goes on by the same whole number of them; at a
-/// tie the even one is taken, which settles it after one sum. So only a few sums between two powers of two are worked out.
+/// Between two powers of two, binary32 numbers are equally spaced, so every sum advances by the same whole number of
+/// spacings. A tie rounds to even, which settles it after one sum. Hence only a few sums per power of two are computed.
 fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
     const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
     let (mut gap, mut made) = (gap, 0);
@@ -181,10 +181,10 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         if next < lowest || next <= 0.0 {
             break;
         }
-        // This sum settles ties; the one after it tells how far every sum goes on.
+        // This sum settles ties; the next one gives the advance of every later sum.
         let (before, bits, after) = (gap.to_bits(), next.to_bits(), (next + change).to_bits());
         if bits == before || bits == after {
-            // Lost in rounding, for good.
+            // Rounding absorbs the change for good.
             return (most, next);
         }
         (gap, made) = (next, made + 1);
@@ -192,7 +192,7 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         if before / BINADE != binade || after / BINADE != binade {
             continue;
         }
-        // One number short of both powers of two the sum itself lies between them, rounded or not.
+        // One spacing inside both powers of two, the sum lies between them, rounded or not.
         let way = if after > bits {
             (binade + 1) * BINADE - 1 - bits
         } else {
@@ -217,7 +217,7 @@ mod tests {
     use crate::model::profile::Profile;
     use crate::scenario::Category;
 
-    /// The same, sum by sum.
+    /// Reference: the same, sum by sum.
     fn added(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         let mut gap = gap;
         for made in 0..most {
@@ -243,7 +243,7 @@ mod tests {
             let word = mixed(number + 1);
             let unit = |shift: u32| f32::from((word >> shift) as u16) / 65536.0;
             let gap = 2f32.powf(unit(0) * 12.0 - 3.0);
-            // From changes that are lost in rounding to those that leave the gap behind in one step.
+            // From changes that rounding absorbs to changes that consume the gap in one step.
             let size = 2f32.powf(unit(16) * 30.0 - 26.0);
             let change = if word >> 63 == 0 { size } else { -size };
             let lowest = if number % 3 == 0 { 0.0 } else { gap * unit(32) };
@@ -256,7 +256,8 @@ mod tests {
         }
     }
 
-    /// Ties: changes of a whole number and a half of the numbers' distance, from even and odd gaps, across powers of two.
+    /// Ties: changes of a whole number and a half of the numbers' distance, from even and odd gaps, across powers of
+    /// two.
     #[test]
     fn ties_are_settled_as_sums_settle_them() {
         for odd in 0..4_u32 {
@@ -319,55 +320,55 @@ mod tests {
         (lane, state, places)
     }
 
-    /// Steps that are left out: made one by one they change nothing but the gaps, which come out the same to the bit.
+    /// Skipped steps, made one by one, change only the gaps, and the gaps agree to the bit.
     fn nothing_happens<M: DriverModel<f32>>(simulation: &Simulation<f32, M>, name: &str) {
         let (mut found, mut lasting) = (0, 0);
         for number in 0..20_000 {
             let (lane, start, places) = lane(number);
-            let calm = quiescent_steps(simulation, &lane, &start, &places);
+            let quiescent = quiescent_steps(simulation, &lane, &start, &places);
             let slowing = LaneState { v_before: start.v_ego + 0.1, ..start };
             assert!(
                 !M::SEES_OWN_ACCELERATION || quiescent_steps(simulation, &lane, &slowing, &places).is_none(),
                 "{name}"
             );
-            let Some(calm) = calm else { continue };
-            make_one_by_one(simulation, &lane, &start, &places, &calm, &format!("{name}, lane {number}"));
+            let Some(quiescent) = quiescent else { continue };
+            make_one_by_one(simulation, &lane, &start, &places, &quiescent, &format!("{name}, lane {number}"));
             found += 1;
-            lasting += u32::from(calm.steps > 500);
+            lasting += u32::from(quiescent.steps > 500);
         }
         assert!(found > 200 && lasting > 20, "{name}: {found} found, {lasting} of them long");
     }
 
-    /// Makes calm steps; gives the lane after them.
+    /// Makes the skipped steps one by one; returns the lane after them.
     fn make_one_by_one<M: DriverModel<f32>>(
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
         start: &LaneState<f32>,
         places: &[OtherState<f32>; 2],
-        calm: &Calm,
+        quiescent: &Quiescent,
         name: &str,
     ) -> LaneState<f32> {
         let mut state = *start;
-        for _ in 0..calm.steps {
+        for _ in 0..quiescent.steps {
             state = advance(simulation, lane, &state, places).state;
-            assert!(!state.over.holds(), "{name} ends at step {}: {calm:?}", state.index);
+            assert!(!state.over.holds(), "{name} ends at step {}: {quiescent:?}", state.index);
         }
         let failed = |state: &LaneState<f32>| [state.record.ttc.failed, state.record.btn.failed];
-        assert_eq!(state.index, start.index + calm.steps);
-        assert!(state.v_ego == start.v_ego && state.driver == start.driver, "{name}: {calm:?}");
-        assert_eq!(failed(&state), failed(start), "{name}: {calm:?}");
+        assert_eq!(state.index, start.index + quiescent.steps);
+        assert!(state.v_ego == start.v_ego && state.driver == start.driver, "{name}: {quiescent:?}");
+        assert_eq!(failed(&state), failed(start), "{name}: {quiescent:?}");
         let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
         for (vehicle, place) in places.iter().enumerate().take(vehicles) {
             let out_of_the_way = is_out_of_the_way(simulation, lane, &lane.others[vehicle], place).holds();
             let gone = start.index >= lane.others[vehicle].present_until;
-            let gaps = (calm.gaps[vehicle], state.gaps[vehicle]);
-            assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}: {calm:?} {gaps:?}");
+            let gaps = (quiescent.gaps[vehicle], state.gaps[vehicle]);
+            assert!(out_of_the_way || gone || gaps.0 == gaps.1, "{name}: {quiescent:?} {gaps:?}");
         }
         state
     }
 
-    /// FSM comes nearer and nearer to the speed ahead, until rounding lets it brake no more and the gap lose no more:
-    /// from there on one look leaves out all steps to the end, although the driver counts as unsafe at every one.
+    /// FSM approaches the speed ahead until rounding absorbs both braking and gap change. From there on one test skips
+    /// all steps to the end, although the driver counts as unsafe at every one.
     #[test]
     fn one_who_follows_comes_to_stand_still_in_rounding() {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);
@@ -388,16 +389,16 @@ mod tests {
             state.gaps = [state.v_ego * (1.5 + (number % 7) as f32 / 2.0); 2];
             let places = [place, places[1]];
             while !state.over.holds() && state.index < frame.step_cap {
-                let Some(calm) = quiescent_steps(&simulation, &lane, &state, &places) else {
+                let Some(quiescent) = quiescent_steps(&simulation, &lane, &state, &places) else {
                     state = advance(&simulation, &lane, &state, &places).state;
                     continue;
                 };
                 let is_unsafe = advance(&simulation, &lane, &state, &places).hazard.is_unsafe.holds();
                 stood_still += u32::from(is_unsafe);
-                state = make_one_by_one(&simulation, &lane, &state, &places, &calm, &format!("lane {number}"));
+                state = make_one_by_one(&simulation, &lane, &state, &places, &quiescent, &format!("lane {number}"));
                 assert!(
                     !is_unsafe || state.index == frame.step_cap - ROWS as u32,
-                    "lane {number}: {calm:?} is not all"
+                    "lane {number}: {quiescent:?} is not all"
                 );
             }
         }

@@ -1,4 +1,4 @@
-//! What a lane says when it is over: an outcome, or verdicts alone.
+//! The result of a finished lane: an outcome, or only verdicts.
 
 use crate::model::criterion::{BtnContact, Contact, Criterion, contact};
 use crate::model::flag::Flag;
@@ -10,12 +10,12 @@ use crate::engine::lane_step::{
 };
 use crate::engine::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
-/// What is wanted of the end of a lane. An outcome has everything.
+/// The result that a sweep returns per lane. An outcome has everything.
 pub trait Ending: From<Outcome<f32>> {
-    /// It has smallest and largest values, which the steps then have to gather.
+    /// The result has minima and maxima, which the steps must gather.
     const HAS_VALUES: bool;
 
-    /// Of a lane whose last step has just been made, at these places.
+    /// Result of a lane after its last step, with the other vehicles at these places.
     fn of<M>(
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
@@ -58,8 +58,8 @@ impl Ending for Outcome<f32> {
     }
 }
 
-/// The verdicts of a lane whose last step has just been made, at these places. The speed that the ego had then is not
-/// known where only verdicts are wanted: neither it nor a closing speed may decide here.
+/// Verdicts of a lane after its last step. Verdict-only batches do not know the ego's speed there, so neither that
+/// speed nor a closing speed may decide.
 #[inline(always)]
 pub fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,
@@ -75,7 +75,7 @@ pub fn verdicts<R: Real, M>(
     }
     let record = &state.record;
     let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
-    // Over for no other reason: the time cap.
+    // No other reason remains: the time cap.
     let capped = if state.over.holds() { 0 } else { Verdicts::CAPPED };
     let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
     Verdicts(
@@ -86,7 +86,7 @@ pub fn verdicts<R: Real, M>(
     )
 }
 
-/// The outcome of a lane whose last step has just been made, at these places.
+/// Outcome of a lane after its last step.
 #[inline(always)]
 pub fn conclude<R: Real, M>(
     simulation: &Simulation<R, M>,

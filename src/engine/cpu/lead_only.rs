@@ -1,8 +1,8 @@
-//! Two vehicles ahead of which only the second can matter any more: from then on it is alone.
+//! Two vehicles ahead of which only the farther one, the lead, still matters.
 //!
-//! Once a vehicle that cuts out is beside the lane, where it meets no contact, no criterion and no reaction, and stays
-//! there, the lane goes on as one of a single vehicle, the one that was ahead of it. Where only verdicts are wanted,
-//! batches make these steps among lanes of single vehicles, with half of the work.
+//! A vehicle that cuts out may reach a place beside the lane where no contact, criterion or reaction is possible, and
+//! stay there. The lane then continues with the other vehicle only. Verdict-only batches make these steps among lanes
+//! with a single vehicle, at half the cost.
 
 use crate::model::driver::DriverModel;
 use crate::model::flag::Flag;
@@ -14,9 +14,8 @@ use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, OtherState};
 
-/// The first step from which on only the second vehicle matters under this model, and the driver attends to it;
-/// [`NEVER_LEAVES`] where there is none, where the second one may go as well, or where it is not judged. `tracks` lie in
-/// `entries`.
+/// The first step from which only the second vehicle matters under this model, and the driver attends to it.
+/// [`NEVER_LEAVES`] if there is none, or if the second vehicle may leave or is not judged. `tracks` are in `entries`.
 pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -28,12 +27,12 @@ pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
         return NEVER_LEAVES;
     }
     let VehicleTracks { position, towards, .. } = tracks[0];
-    // So many entries of a series from a step on; its last one is repeated.
+    // The number of entries from a step on; the last entry is repeated.
     let at = |track: Track, step: u32, count: usize| {
         let from = (track.first + step.min(track.last)) as usize;
         &entries[from..from + count]
     };
-    // Beside the lane at all of these steps; without a branch, so that a compiler can ask for many at once.
+    // The vehicle is beside the lane at all these steps. Without a branch the compiler tests many at once.
     let is_out = |step: u32, count: usize| {
         let mut is_out = Flag::TRUE;
         for (&position, &towards) in at(position, step, count).iter().zip(at(towards, step, count)) {
@@ -43,7 +42,7 @@ pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
         is_out.holds()
     };
     let gone_from = if principal.present_from == Flag::LATEST_STEP { 0 } else { principal.present_until };
-    // From the end, where it stays: back to the last step at which it is in the way.
+    // Searches backwards for the last step at which the vehicle is in the way.
     let mut from = position.last.max(towards.last).min(gone_from);
     if from < gone_from && !is_out(from, 1) {
         from = gone_from;
@@ -83,8 +82,8 @@ mod tests {
         plan_study(&mined.scenarios, profile, &options).unwrap().plan
     }
 
-    /// Two lanes step side by side, one with both vehicles and, from there on, one with the second alone: ego, gap,
-    /// criteria and end are the same at every step. Gives how many steps it was alone.
+    /// Steps two lanes together: one with both vehicles, and one with only the second from that step on. Ego, gap,
+    /// criteria and end agree at every step. Returns the number of steps with only the second.
     fn steps_side_by_side<M: DriverModel<f32>>(
         pair: &Simulation<f32, M>,
         case: &LaneCase<f32>,
@@ -92,8 +91,8 @@ mod tests {
         name: &str,
     ) -> u32 {
         let cases = std::slice::from_ref(case);
-        let alone = &Simulation { scene: Scene::of_lead_only(cases), ..*pair };
-        assert!(alone.scene.in_lane, "{name}");
+        let lead_only = &Simulation { scene: Scene::of_lead_only(cases), ..*pair };
+        assert!(lead_only.scene.in_lane, "{name}");
         let mut series = Series::default();
         let tracks = series.unroll(case, tables, pair.frame.step_cap);
         let constants = LaneConstants::new(pair, case);
@@ -110,13 +109,13 @@ mod tests {
             }
             state = advance(pair, &constants, &state, &places).state;
             if let Some(other) = &mut other {
-                *other = advance(alone, &on_its_own, other, &[places[1]; 2]).state;
+                *other = advance(lead_only, &on_its_own, other, &[places[1]; 2]).state;
                 let same = LaneState { gaps: [state.gaps[1]; 2], ..state };
                 assert_eq!(LaneState { gaps: [other.gaps[0]; 2], ..*other }, same, "{name}");
                 saved += 1;
             }
         }
-        // The step before it may matter: the first vehicle is in the way, or the second not there or not attended to.
+        // The step before may matter: the first vehicle is in the way, or the second is absent or not attended to.
         if from != NEVER_LEAVES && from > second.present_from.max(second.attend_from) {
             let first = OtherState::of(&case.others[0].motion, tables, from - 1);
             let present = from - 1 < constants.others[0].present_until;
@@ -137,7 +136,7 @@ mod tests {
             let constants = Constants::<f32>::resolve(&profile, Category::CutOut);
             let criteria = &Criteria { keeps_values: false, ..constants.criteria };
             let tables = plan.tables().cast();
-            let (mut saved, mut alone, mut all) = (0, 0, 0);
+            let (mut saved, mut lead_only, mut all) = (0, 0, 0);
             for id in ModelId::ALL {
                 for unit in 0..plan.unit_count() {
                     for variant in 0..plan.blocks[0].variants.len() {
@@ -157,11 +156,11 @@ mod tests {
                             ModelId::Rss => run!(rss),
                             ModelId::Fsm => run!(fsm),
                         };
-                        (saved, alone, all) = (saved + steps, alone + u32::from(steps > 0), all + 1);
+                        (saved, lead_only, all) = (saved + steps, lead_only + u32::from(steps > 0), all + 1);
                     }
                 }
             }
-            assert!(alone * 2 > all && saved > 100 * all, "{name}: {alone} of {all}, {saved}");
+            assert!(lead_only * 2 > all && saved > 100 * all, "{name}: {lead_only} of {all}, {saved}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Lanes on the CPU: single lanes, batches on vector instructions, and what batches leave out where only verdicts are
-//! wanted ([`fast_forward`], [`steady_following`], [`lead_only`]). The step itself is [`lane_step`](super::lane_step)'s.
+//! Lanes on the CPU: single lanes, batches on vector instructions, and the work that verdict-only batches
+//! skip ([`fast_forward`], [`steady_following`], [`lead_only`]). The step itself is [`lane_step`](super::lane_step)'s.
 
 pub(crate) mod backend;
 mod batch;

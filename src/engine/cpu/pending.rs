@@ -1,5 +1,5 @@
-//! Lanes that wait for a slot, side by side already: a case is written once for all its headways, and slots that are
-//! free take what they need row by row.
+//! Pending lanes in the layout of a batch: a case is written once for all its headways, and free slots take their rows
+//! one by one.
 
 use crate::model::driver::DriverModel;
 
@@ -11,11 +11,11 @@ use crate::engine::frame::{Simulation, Start};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState};
 
-/// Lanes that wait at most: 29 KiB with one other vehicle and verdicts alone, 49 KiB with all there is, their room included.
-pub(in crate::engine) const MOST: usize = 256;
+/// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 49 KiB with everything, room included.
+pub(in crate::engine) const MAX_PENDING: usize = 256;
 
 /// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
-pub(in crate::engine) const ROOM: usize = MOST + LANES;
+pub(in crate::engine) const ROOM: usize = MAX_PENDING + LANES;
 
 /// The lanes of a stream: every case with every start, the starts of a case one after the other.
 #[derive(Clone, Copy)]
@@ -26,9 +26,9 @@ pub(in crate::engine) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
-    /// Every case has one start, that of its number, instead of all of them.
+    /// Every case has one start, the one with its number, instead of all of them.
     pub one_start_each: bool,
-    /// Calm steps are made as well, and no lane is set apart.
+    /// Every step is made with all vehicles; no lane moves to another stage.
     pub every_step: bool,
     /// A step of one of its lanes [may cross](crate::engine::scene::may_cross) another vehicle.
     pub may_cross: bool,
@@ -42,28 +42,28 @@ impl<'c> Lanes<'c> {
     }
 }
 
-/// Lanes that wait for slots of one kind of batches: the next ones of a stream, and those set apart.
-pub(in crate::engine) struct Waiting {
+/// Lanes pending for one stage: the next lanes of a stream, and those that moved here.
+pub(in crate::engine) struct Pending {
     lanes: Box<LaneArrays<ROOM>>,
-    /// Continuous values are wanted, not verdicts alone.
+    /// The sweep returns values, not only verdicts.
     values: bool,
-    /// Lanes with a single vehicle are asked whether they are at ease.
+    /// Lanes with a single vehicle are tested for steady following.
     asks_steady: bool,
-    /// The first that waits.
+    /// The first pending lane.
     first: usize,
-    /// The end of them.
+    /// One past the last pending lane.
     end: usize,
-    /// The case to come, and its start to come.
+    /// The next case, and its next start.
     case: usize,
     start: usize,
-    /// The lane to come, counted within the stream.
+    /// The next lane, counted within the stream.
     lane: u32,
 }
 
-impl Waiting {
-    /// At the beginning of a stream.
+impl Pending {
+    /// At the start of a stream.
     pub fn new(values: bool, asks_steady: bool) -> Self {
-        Waiting {
+        Pending {
             lanes: Box::new(LaneArrays::idle()),
             values,
             asks_steady,
@@ -75,13 +75,13 @@ impl Waiting {
         }
     }
 
-    /// How many wait.
+    /// Number of pending lanes.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.end - self.first
     }
 
-    /// Takes the next lanes; gives the place of the first of them.
+    /// Takes the next lanes; returns the place of the first.
     #[inline(always)]
     pub fn take(&mut self, count: usize) -> usize {
         let from = self.first;
@@ -89,15 +89,15 @@ impl Waiting {
         from
     }
 
-    /// All lanes, those that wait among them.
+    /// All lanes, pending lanes included.
     #[inline(always)]
     pub fn lanes(&self) -> &LaneArrays<ROOM> {
         &self.lanes
     }
 
-    /// Sees to it that at least so many lanes wait, if there are more.
+    /// Ensures that at least this many lanes are pending, if there are more.
     ///
-    /// `sets_apart`: the series, where lanes are set apart that go on with the second vehicle alone.
+    /// `sets_apart`: the series, where lanes move out that continue with the second vehicle only.
     #[inline]
     pub fn have<M: DriverModel<f32>>(
         &mut self,
@@ -110,19 +110,19 @@ impl Waiting {
             return;
         }
         self.close_up(simulation.scene.is_pair);
-        while self.end < MOST && self.case < stream.cases.len() {
+        while self.end < MAX_PENDING && self.case < stream.cases.len() {
             self.add(simulation, stream, sets_apart);
         }
     }
 
-    /// So many more may wait.
+    /// Number of lanes that still fit.
     #[inline(always)]
     pub fn has_room(&self, count: usize) -> bool {
-        self.count() + count <= MOST
+        self.count() + count <= MAX_PENDING
     }
 
-    /// Adds a lane that goes on with the second vehicle alone.
-    pub fn add_alone(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
+    /// Adds a lane that continues with the second vehicle only.
+    pub fn add_lead_only(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
         let leaves_from = if self.asks_steady { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
         self.add_single(lanes, k, 1, leaves_from);
     }
@@ -133,14 +133,14 @@ impl Waiting {
     }
 
     fn add_single(&mut self, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
-        if self.end == MOST {
+        if self.end == MAX_PENDING {
             self.close_up(false);
         }
         self.lanes.set_single(self.end, lanes, k, vehicle, leaves_from);
         self.end += 1;
     }
 
-    /// Moves those that wait to the front.
+    /// Moves the pending lanes to the front.
     fn close_up(&mut self, is_pair: bool) {
         for part in self.lanes.parts_mut(is_pair, self.values) {
             for row in part {
@@ -150,7 +150,7 @@ impl Waiting {
         (self.first, self.end) = (0, self.end - self.first);
     }
 
-    /// Adds lanes of the case to come.
+    /// Adds lanes of the next case.
     fn add<M: DriverModel<f32>>(
         &mut self,
         simulation: &Simulation<f32, M>,
@@ -168,7 +168,7 @@ impl Waiting {
         let tracks = &tracks[..if simulation.scene.is_pair { 2 } else { 1 }];
         let all = stream.starts_of(self.case);
         let starts = &all[self.start..];
-        let starts = &starts[..starts.len().min(MOST - self.end)];
+        let starts = &starts[..starts.len().min(MAX_PENDING - self.end)];
         for starts in starts.chunks(LANES) {
             let state = LaneState::new(simulation, case, starts[0]);
             self.lanes.fill(self.end, &constants, tracks, &state, leaves_from, self.values);
@@ -187,11 +187,11 @@ impl Waiting {
 
 /// Gives the slots, in their order, the entries of every row from a place on: one by one, on every machine.
 #[inline(always)]
-pub(in crate::engine) fn take(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
-    for (row, waiting) in rows.iter_mut().zip(waiting) {
+pub(in crate::engine) fn take(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
+    for (row, pending) in rows.iter_mut().zip(pending) {
         let (mut left, mut from) = (slots, from);
         while left != 0 {
-            row[left.trailing_zeros() as usize] = waiting[from];
+            row[left.trailing_zeros() as usize] = pending[from];
             left &= left - 1;
             from += 1;
         }

@@ -1,4 +1,4 @@
-//! What all lanes of a stream share and a loop need not ask: each set of rules has a loop of its own.
+//! Rules that all lanes of a stream share: each set of rules has its own compiled loop, which tests none of them.
 
 use crate::model::criterion::{BtnForm, Criteria, LateralGate};
 
@@ -8,12 +8,12 @@ use crate::engine::scene::Scene;
 /// A set of rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::engine) struct Rules {
-    /// What is known of the other vehicles.
+    /// Common properties of the other vehicles.
     pub scene: Scene,
     is_ratio: bool,
     sees_overlap: bool,
     aborts: bool,
-    /// Only verdicts are wanted: smallest and largest values are not gathered.
+    /// The sweep returns only verdicts: minima and maxima are not gathered.
     pub is_verdict_only: bool,
 }
 
@@ -25,8 +25,8 @@ impl Rules {
     const STEADY_FOLLOWING: u32 = 21;
     const CROSSING: u32 = 22;
 
-    /// Of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
-    /// `values`: continuous ones are wanted, not verdicts alone.
+    /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
+    /// `values`: the sweep returns values, not only verdicts.
     pub(in crate::engine) fn of(
         frame: &Frame<f32>,
         criteria: &Criteria<f32>,
@@ -40,15 +40,15 @@ impl Rules {
         };
         let sees_overlap = criteria.gate == LateralGate::Overlap;
         let aborts = frame.abort_above_ttc > 0.0;
-        // Seldom used rules have no loop of their own for verdicts alone.
+        // Rare rules have no loop of their own for verdicts.
         let is_verdict_only = !values && !is_ratio && !aborts;
-        // Seldom used rules always look for contacts between two steps.
+        // Rare rules always test for contacts between two steps.
         let may_cross = scene.may_cross || is_ratio || aborts;
         let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
         Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
     }
 
-    /// Of the steps at ease of lanes with a single vehicle, where only verdicts are wanted.
+    /// Rules of steady-following steps with a single vehicle, for verdicts only.
     pub(in crate::engine) fn is_steady() -> Rules {
         Rules::from_bits(Rules::STEADY_FOLLOWING)
     }
@@ -69,7 +69,7 @@ impl Rules {
         self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
     }
 
-    /// From that number.
+    /// Inverse of the number above.
     pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
         if bits >= Rules::CROSSING {
             let scene = Scene { is_pair: true, always_there: false, in_lane: false, is_steady: false, may_cross: true };
@@ -98,7 +98,7 @@ impl Rules {
         }
     }
 
-    /// The constants with everything that these rules decide written as constants.
+    /// The constants of the simulation, with those that the rules fix written as constants.
     #[inline(always)]
     pub(in crate::engine) fn applied(
         self,

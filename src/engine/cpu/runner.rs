@@ -1,4 +1,4 @@
-//! Single lanes on the CPU: what the CPU backend is made of, and what any other backend is checked with.
+//! Single lanes on the CPU: the CPU backend consists of them, and other backends are checked against them.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -28,22 +28,22 @@ pub struct LaneRunner<'p, R> {
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
     has_tables: bool,
-    /// Lanes do no more than batches for verdicts.
+    /// Lanes gather no more than batches do for verdicts.
     as_in_batches: bool,
-    /// Batches spare nothing.
+    /// Batches make every step.
     every_step: bool,
-    /// Memory of tasks that are done, for those to come: fresh pages cost more than what is written into them.
+    /// Memory of finished tasks for later ones: fresh pages cost more than writing into them.
     spare: Mutex<Vec<Series>>,
 }
 
 impl<'p, R: Real> LaneRunner<'p, R> {
-    /// Rounds what the plan holds, once.
+    /// Rounds the plan's numbers once.
     pub fn new(plan: &'p LanePlan) -> Self {
         let tables = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
         LaneRunner { tables, has_tables: true, ..LaneRunner::of_few(plan) }
     }
 
-    /// Rounds what each lane needs when it runs: for a few lanes, whose plan's series need not lie in memory twice.
+    /// Rounds the numbers of each lane when it runs: for a few lanes, so that the plan's series are not held twice.
     pub(in crate::engine) fn of_few(plan: &'p LanePlan) -> Self {
         LaneRunner {
             plan,
@@ -57,22 +57,22 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
-    /// The same, but each lane does no more than batches do for verdicts: it gathers no smallest and largest values,
-    /// so that only verdicts and steps of its outcome mean something, and asks for nothing that is known.
+    /// Each lane gathers no more than batches do for verdicts: no minima and maxima. Only verdicts and steps of its
+    /// outcome are valid.
     pub fn verdicts_as_in_batches(mut self) -> Self {
         self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
         self.as_in_batches = true;
         self
     }
 
-    /// The same, but batches make every step as a whole, with all vehicles; without it, where only verdicts are wanted,
-    /// they leave out what can change none. The verdicts are the same.
+    /// Batches make every step with all vehicles. By default verdict-only batches skip steps that change no verdict.
+    /// The verdicts are the same.
     pub fn every_step(mut self, every_step: bool) -> Self {
         self.every_step = every_step;
         self
     }
 
-    /// One lane, of which nothing is known before it runs.
+    /// Runs one lane without rules from its stream.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
         let scene = Scene::unknown(case.pair != 0);
@@ -147,8 +147,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 }
 
 impl LaneRunner<'_, f32> {
-    /// All lanes of some units of a block, in batches: position counted from the first unit on, what is wanted of its
-    /// end. In no particular order.
+    /// All lanes of some units of a block, in batches: position counted from the first unit on, and result. The order
+    /// is unspecified.
     pub fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
@@ -190,7 +190,7 @@ impl LaneRunner<'_, f32> {
         }
     }
 
-    /// Do all lanes run in batches on these instructions? Some criteria iterate and run lane by lane.
+    /// Whether all lanes run in batches on these instructions. Some criteria iterate and run lane by lane.
     pub(in crate::engine) fn runs_in_batches(&self, instructions: Instructions) -> bool {
         self.constants.iter().all(|constants| constants.run_in_batches(instructions))
     }
@@ -220,7 +220,7 @@ impl LaneRunner<'_, f32> {
         constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
     }
 
-    /// All lanes of a model, each for itself.
+    /// All lanes of a model, one by one.
     fn one_by_one<E: Ending>(
         &self,
         block: usize,

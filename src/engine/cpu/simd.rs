@@ -14,7 +14,7 @@ use super::{
 };
 use crate::engine::cpu::batch::{Fleet, burst};
 use crate::engine::cpu::instructions::Instructions;
-use crate::engine::cpu::pending::{Waiting, take};
+use crate::engine::cpu::pending::{Pending, take};
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::transpose::Window;
 use crate::engine::frame::Simulation;
@@ -24,16 +24,16 @@ use crate::model::driver::DriverModel;
 ///
 /// Only [`burst_for`] makes one, and only for instructions that the machine has.
 pub(in crate::engine) struct Burst<M> {
-    run: unsafe fn(&Simulation<f32, M>, &mut Fleet<'_>, &mut Waiting),
+    run: unsafe fn(&Simulation<f32, M>, &mut Fleet<'_>, &mut Pending),
 }
 
 impl<M> Burst<M> {
     /// Runs it.
     #[inline]
-    pub(in crate::engine) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, waiting: &mut Waiting) {
+    pub(in crate::engine) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, pending: &mut Pending) {
         // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
         // asked the machine for them.
-        unsafe { (self.run)(simulation, fleet, waiting) }
+        unsafe { (self.run)(simulation, fleet, pending) }
     }
 }
 
@@ -93,9 +93,9 @@ pub(in crate::engine) fn burst_for<M: DriverModel<f32>>(instructions: Instructio
 fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     fleet: &mut Fleet<'_>,
-    waiting: &mut Waiting,
+    pending: &mut Pending,
 ) {
-    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
+    burst::<M, RULES>(simulation, fleet, pending, take, Window::turn);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -103,13 +103,13 @@ fn burst_avx2<M: DriverModel<f32>, const RULES: u32>(
 fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     fleet: &mut Fleet<'_>,
-    waiting: &mut Waiting,
+    pending: &mut Pending,
 ) {
     burst::<M, RULES>(
         simulation,
         fleet,
-        waiting,
-        |rows, waiting, from, slots| take_avx512(rows, waiting, from, slots),
+        pending,
+        |rows, pending, from, slots| take_avx512(rows, pending, from, slots),
         |window, tracks, steps, entries| turn_avx512(window, tracks, steps, entries),
     );
 }
@@ -118,23 +118,23 @@ fn burst_avx512<M: DriverModel<f32>, const RULES: u32>(
 fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
     fleet: &mut Fleet<'_>,
-    waiting: &mut Waiting,
+    pending: &mut Pending,
 ) {
-    burst::<M, RULES>(simulation, fleet, waiting, take, Window::turn);
+    burst::<M, RULES>(simulation, fleet, pending, take, Window::turn);
 }
 
 /// [`take`] in registers: the entries of a row, expanded into the slots.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 #[inline]
-fn take_avx512(rows: &mut [Words], waiting: &[[u32; ROOM]], from: usize, slots: Slots) {
+fn take_avx512(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: Slots) {
     use std::arch::x86_64::*;
     assert!(from + LANES <= ROOM, "lanes are taken from beyond the room");
-    for (row, waiting) in rows.iter_mut().zip(waiting) {
-        // SAFETY: a row of those that wait has LANES entries from there on, as has just been asserted; a row of a
+    for (row, pending) in rows.iter_mut().zip(pending) {
+        // SAFETY: a row of pending lanes has LANES entries from there on, as just asserted; a row of a
         // batch has LANES.
         unsafe {
-            let next = _mm512_loadu_si512(waiting.as_ptr().add(from).cast());
+            let next = _mm512_loadu_si512(pending.as_ptr().add(from).cast());
             let old = _mm512_loadu_si512(row.as_ptr().cast());
             _mm512_storeu_si512(row.as_mut_ptr().cast(), _mm512_mask_expand_epi32(old, slots, next));
         }

@@ -1,9 +1,10 @@
-//! Lanes in which a driver only follows: at ease.
+//! Lanes in which a driver only follows, in steady state.
 //!
-//! A driver who keeps a comfortable distance from a vehicle that keeps its speed often comes near it ever more slowly, in
-//! hundreds of steps of which each changes the speed. No contact and no criterion comes near, and of the check a part is
-//! left, [`DriverModel::check_steady`], however hard the driver brakes by it. Where only verdicts are wanted, batches make these steps
-//! among lanes at ease, which work out nothing else. [`steady_steps`] says for how long that is the whole step, to the bit.
+//! A driver who keeps a comfortable distance from a vehicle at constant speed often closes in ever more slowly.
+//! Hundreds of steps then change the speed, but no contact and no criterion is possible. Only a part of the driver's
+//! check can trigger, [`DriverModel::check_steady`], however hard it brakes. Verdict-only batches make these steps
+//! among lanes of the same kind, with that part only. [`steady_steps`] says for how long this equals the whole step, to
+//! the bit.
 
 use crate::model::driver::DriverModel;
 use crate::model::scalar::Real;
@@ -12,11 +13,11 @@ use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
 
-/// At most so many steps are foreseen at once: few enough for what rounding does to their gaps.
-const MOST: u32 = 1024;
+/// Maximum number of steps foreseen at once: few enough to bound the rounding of their gaps.
+const MAX_STEPS: u32 = 1024;
 
-/// How many of a lane's next steps are at ease for certain, at most [`MOST`]. `state` is between two steps, at
-/// `state.index` at least 1; the other vehicle, the only one, keeps speed and lateral position of `place` for ever.
+/// Number of a lane's next steps that surely follow steadily, bounded by the constant above. `state` is between two
+/// steps, at `state.index` at least 1. The only other vehicle keeps speed and lateral position of `place` for ever.
 pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -27,21 +28,21 @@ pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
     let (other, index, gap) = (&lane.others[0], state.index, state.gaps[0]);
     let in_lane = scene.in_lane || place.position.abs() - other.half_widths < 0.0 && index >= other.attend_from;
     let there = scene.always_there || index >= other.present_from && other.present_until >= frame.step_cap;
-    // Behind one that drives backwards a lane can end at rest without being settled, which nobody asks at ease.
+    // Behind a vehicle that drives backwards a lane can stop without being settled, which steady steps do not test.
     if !in_lane || !there || state.driver.delay_steps > 0 || place.speed < 0.0 {
         return 0;
     }
-    // From here on the closing speed grows no more, so what is safe at it is safe at every later one.
+    // The closing speed does not grow from here on, so what is safe now is safe at every later closing speed.
     let closing = (state.v_ego - place.speed).max(0.0);
     let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
-    // What is no number stays none: the larger of two takes that of its second.
+    // `larger` returns its second operand when unordered, so NaN propagates.
     let safe = of_criteria.larger(model.steady_gap(state.v_ego, place.speed));
-    // Thousandths and a millimetre for what rounding does to the distances and to the sums.
+    // A thousandth and a millimetre bound the rounding of the distances and sums.
     let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
     let by = 1.001 * closing * frame.dt;
-    let most = MOST.min(frame.step_cap.saturating_sub(index + ROWS as u32));
-    // None where there is no room or no number.
-    ((room / by) as u32).min(most)
+    let max_steps = MAX_STEPS.min(frame.step_cap.saturating_sub(index + ROWS as u32));
+    // No steps if there is no room or the bound is NaN.
+    ((room / by) as u32).min(max_steps)
 }
 
 #[cfg(test)]
@@ -96,7 +97,7 @@ mod tests {
         (lane, state, place)
     }
 
-    /// Steps at ease are those that the lane makes anyway: same speed, gap and deceleration, to the bit, and no verdict
+    /// Steady-following steps equal whole steps: same speed, gap and deceleration, to the bit, and no verdict
     /// changes. A lane that ends among them does so because it is settled, from the first such step past the horizon
     /// on.
     #[test]
@@ -147,8 +148,8 @@ mod tests {
         }
     }
 
-    /// No lane is at ease whose driver does not attend yet or waits, whose leader is beside the lane or drives
-    /// backwards, or that is about to reach the cap.
+    /// A lane does not follow steadily if its driver does not attend yet or is delayed, if its leader is beside the lane
+    /// or drives backwards, or near the step cap.
     #[test]
     fn a_driver_that_does_not_follow_is_not_steady() {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);

@@ -1,7 +1,7 @@
-//! A stream of lanes through the slots of the batches: where a lane is over, its slot takes the next one after the
-//! burst, so no lane waits for another and nothing is allocated per lane. A lane of which less is to be asked is set
-//! apart: one that goes on with the second vehicle alone, and one whose driver is at ease, as long as he is. When many of
-//! them wait, or no others are left, they run in batches of their own.
+//! A stream of lanes through the slots of the batches. After each burst the slot of a finished lane takes the next
+//! lane, so no lane blocks another and nothing is allocated per lane. A lane that needs fewer checks moves to another
+//! stage: one that continues with the second vehicle only, and one that follows steadily, for as long as it does. A
+//! stage runs batches of its own when many lanes are pending there, or no others are left.
 
 use crate::model::driver::DriverModel;
 
@@ -9,7 +9,7 @@ use crate::engine::cpu::LANES;
 use crate::engine::cpu::batch::{BATCHES, Fleet};
 use crate::engine::cpu::instructions::Instructions;
 use crate::engine::cpu::lane_result::Ending;
-use crate::engine::cpu::pending::{Lanes, Waiting};
+use crate::engine::cpu::pending::{Lanes, Pending};
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::simd::{Burst, burst_for};
 use crate::engine::frame::Simulation;
@@ -18,8 +18,8 @@ use crate::engine::scene::Scene;
 /// Lanes of a fleet.
 const FLEET: usize = BATCHES * LANES;
 
-/// Runs a stream of lanes of one model on an instruction set, where they run in batches; `each` takes the lanes after
-/// their last steps, in the order in which they end: the lane, counted within the stream, and what is wanted of its end.
+/// Runs a stream of lanes of one model on an instruction set, where they run in batches. `each` takes every finished
+/// lane, in the order in which they end: the lane, counted within the stream, and its result.
 /// `entries` are the series that the stream's tracks point into.
 pub(in crate::engine) fn run_stream<M: DriverModel<f32>, E: Ending>(
     simulation: &Simulation<'_, f32, M>,
@@ -31,7 +31,7 @@ pub(in crate::engine) fn run_stream<M: DriverModel<f32>, E: Ending>(
     let mut lanes = Stage::new::<E>(*simulation, instructions, stream, entries);
     let sets_apart = (simulation.scene.is_pair && lanes.apart.is_some()).then_some(entries);
     loop {
-        lanes.waiting.have(FLEET, simulation, stream, sets_apart);
+        lanes.pending.have(FLEET, simulation, stream, sets_apart);
         if lanes.is_idle() {
             return;
         }
@@ -39,20 +39,20 @@ pub(in crate::engine) fn run_stream<M: DriverModel<f32>, E: Ending>(
     }
 }
 
-/// Batches of one kind, and the lanes that wait for them.
+/// Batches of one kind, and the lanes pending for them.
 struct Stage<'s, M> {
     simulation: Simulation<'s, f32, M>,
     burst: Burst<M>,
     fleet: Fleet<'s>,
-    waiting: Waiting,
-    /// Steps in which nothing can happen are not made.
+    pending: Pending,
+    /// Quiescent steps are skipped.
     leaves_out: bool,
-    /// Where lanes go of which less is to be asked.
+    /// The stage for lanes that need fewer checks.
     apart: Option<Box<Stage<'s, M>>>,
 }
 
 impl<'s, M: DriverModel<f32>> Stage<'s, M> {
-    /// Without a lane yet, and with the stages that its lanes may need later.
+    /// Without lanes, and with the stages that its lanes may need later.
     fn new<E: Ending>(
         simulation: Simulation<'s, f32, M>,
         instructions: Instructions,
@@ -61,16 +61,16 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
     ) -> Self {
         const RUNS: &str = "these lanes do not run in batches";
         let rules_of = |scene| Rules::of(simulation.frame, simulation.criteria, scene, E::HAS_VALUES).expect(RUNS);
-        // Some rules have no loop for verdicts alone.
+        // Some rules have no loop for verdicts.
         let values = !rules_of(simulation.scene).is_verdict_only;
         let leaves_out = !values && !stream.every_step;
-        let knows_steady = leaves_out && M::KNOWS_EASE;
+        let knows_steady = leaves_out && M::KNOWS_STEADY_FOLLOWING;
         // A stage whose lanes look at these vehicles.
         let stage = |scene: Scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
             simulation: Simulation { scene, ..simulation },
             burst: burst_for(instructions, rules).expect(RUNS),
             fleet: Fleet::new(stream, entries, vehicles),
-            waiting: Waiting::new(values, apart.is_some() && !scene.is_pair),
+            pending: Pending::new(values, apart.is_some() && !scene.is_pair),
             leaves_out,
             apart: apart.map(Box::new),
         };
@@ -82,41 +82,41 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         if !scene.is_pair {
             return single(scene, [0, 0]);
         }
-        // The second vehicle alone may still be crossed, which batches of single vehicles do not look for.
+        // The ego may still pass the second vehicle, which batches of single vehicles do not test.
         let alone = (leaves_out && !scene.may_cross).then(|| single(Scene::of_lead_only(stream.cases), [1, 1]));
         stage(scene, rules_of(scene), [0, 1], alone)
     }
 
-    /// No lane waits or runs here.
+    /// No lane is pending or in flight here.
     fn is_idle(&self) -> bool {
-        has_no_lane(&self.fleet, &self.waiting) && self.apart.as_ref().is_none_or(|apart| apart.is_idle())
+        has_no_lane(&self.fleet, &self.pending) && self.apart.as_ref().is_none_or(|apart| apart.is_idle())
     }
 
-    /// A burst, then some of the lanes that are set apart, and what comes of it.
+    /// Makes a burst, then runs some of the lanes that moved to the next stage.
     fn advance<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
         self.run_burst(each);
-        let Stage { simulation, fleet, waiting, apart: Some(apart), .. } = self else { return };
+        let Stage { simulation, fleet, pending, apart: Some(apart), .. } = self else { return };
         let is_pair = simulation.scene.is_pair;
         for batch in &mut fleet.batches {
             if is_pair {
-                batch.set_apart_alone(&mut apart.waiting);
+                batch.set_apart_lead_only(&mut apart.pending);
             } else {
-                batch.set_apart_steady_following(simulation, &mut apart.waiting);
+                batch.set_apart_steady_following(simulation, &mut apart.pending);
             }
         }
-        // Seldom before the stream's end: this stage has run dry, and is given more lanes when this one returns.
-        let no_others = has_no_lane(fleet, waiting);
-        if !no_others && apart.waiting.has_room(FLEET) {
+        // Rare before the stream's end: this stage has run dry, and gets more lanes when the next one returns.
+        let no_others = has_no_lane(fleet, pending);
+        if !no_others && apart.pending.has_room(FLEET) {
             return;
         }
-        // Many bursts of one kind in a row: what they work with then lies near.
-        while apart.waiting.count() >= FLEET || no_others && !apart.is_idle() {
+        // Many bursts of one kind in a row keep their data in the caches.
+        while apart.pending.count() >= FLEET || no_others && !apart.is_idle() {
             if is_pair {
                 apart.advance(each);
-            } else if waiting.has_room(FLEET) {
+            } else if pending.has_room(FLEET) {
                 apart.run_burst(each);
                 for batch in &mut apart.fleet.batches {
-                    batch.set_back(&apart.simulation, waiting);
+                    batch.set_back(&apart.simulation, pending);
                 }
             } else {
                 return;
@@ -124,10 +124,10 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         }
     }
 
-    /// A burst, and what comes of it for lanes that stay here.
+    /// Makes a burst and updates the lanes that stay here.
     fn run_burst<E: Ending>(&mut self, each: &mut impl FnMut(usize, E)) {
         let Stage { simulation, fleet, .. } = self;
-        self.burst.run(simulation, fleet, &mut self.waiting);
+        self.burst.run(simulation, fleet, &mut self.pending);
         for batch in &mut fleet.batches {
             let mut finished = batch.finished;
             while finished != 0 {
@@ -137,16 +137,16 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
                 each(batch.lane(k) as usize, E::of(simulation, &constants, &state, &places));
             }
             batch.free_finished();
-            let mut calm = if self.leaves_out { batch.calm } else { 0 };
-            while calm != 0 {
-                batch.jump_ahead(simulation, calm.trailing_zeros() as usize);
-                calm &= calm - 1;
+            let mut quiescent = if self.leaves_out { batch.quiescent } else { 0 };
+            while quiescent != 0 {
+                batch.jump_ahead(simulation, quiescent.trailing_zeros() as usize);
+                quiescent &= quiescent - 1;
             }
         }
     }
 }
 
-/// No lane waits or runs here.
-fn has_no_lane(fleet: &Fleet<'_>, waiting: &Waiting) -> bool {
-    waiting.count() == 0 && fleet.batches.iter().all(|batch| batch.free == !0)
+/// No lane is pending or in flight here.
+fn has_no_lane(fleet: &Fleet<'_>, pending: &Pending) -> bool {
+    pending.count() == 0 && fleet.batches.iter().all(|batch| batch.free == !0)
 }

@@ -51,10 +51,10 @@ impl GpuBackend {
 
 impl Drop for GpuBackend {
     fn drop(&mut self) {
-        // A session may outlive it, and holds a sender of its own: waiting for the last one would wait for ever.
+        // A session may outlive it, and holds its own sender: joining after the last sender would never return.
         let _ = self.commands.send(Command::End);
         if let Some(thread) = self.thread.take() {
-            // A panic in it was told to whoever waited.
+            // Callers have already received the panic of that thread.
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! The GPU: every lane an invocation of a WGSL kernel, the same verdict on every device.
+//! The GPU: every lane is an invocation of a WGSL kernel, with the same verdict on every device.
 //!
 //! Here live the list of devices and the choice among them, the way from the shaders' files to a pipeline, the
 //! thread that owns the open device, and the backend that gives it the lanes of a plan. Here lives no physics:

@@ -91,7 +91,7 @@ pub(super) fn start(
             let _ = opened_sender.send(Err(error));
         }
     };
-    // A panic in a driver binding ends the thread; whoever waits for an answer is told so.
+    // A panic in a driver binding ends the thread; every pending call then returns an error.
     let guarded = move || drop(catch_unwind(AssertUnwindSafe(work)));
     let thread = std::thread::Builder::new()
         .name("lanesweep device".to_owned())
@@ -115,7 +115,7 @@ struct Owner {
     flying: VecDeque<(Slot, Flight, Sender<Result<Answer>>)>,
     /// When the last job was done.
     last_done: Option<Instant>,
-    /// Why nothing more is tried.
+    /// Why no further job is tried.
     dead: Option<String>,
 }
 
@@ -244,7 +244,7 @@ impl Owner {
         let _ = reply.send(answer);
     }
 
-    /// After a failure the device's state is unknown: nothing more is asked of it.
+    /// After a failure the device's state is unknown: no further job is submitted.
     fn alive(&self) -> Result<()> {
         match &self.dead {
             None => Ok(()),
@@ -252,7 +252,7 @@ impl Owner {
         }
     }
 
-    /// The fault that a test asked for.
+    /// The fault that a test injects.
     fn inject_fault(&mut self) -> Result<()> {
         let job = self.jobs;
         self.jobs += 1;

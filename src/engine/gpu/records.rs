@@ -1,4 +1,4 @@
-//! The records that cross to the device and back, and their leave to be seen as bytes. `tests/device/shaders.rs`
+//! The records that cross to the device and back, and their casts to bytes. `tests/device/shaders.rs`
 //! compares each with its WGSL twin, size and offsets, through naga.
 
 // A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the
@@ -73,7 +73,7 @@ pub struct Launch {
     pub wanted: u32,
 }
 
-/// What a lane says when it is over.
+/// Result of a finished lane.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct OutcomeRecord {

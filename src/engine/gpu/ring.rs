@@ -11,7 +11,7 @@ use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
 use crate::engine::Wanted;
 use crate::{Error, Result};
 
-/// Jobs under way at most.
+/// Maximum number of jobs in flight.
 pub(super) const RING: usize = 3;
 
 /// The lanes of consecutive units of one block, all models.
@@ -46,7 +46,7 @@ impl Job {
     }
 }
 
-/// What a job gave, model by model.
+/// Results of a job, model by model.
 #[derive(Debug)]
 pub(super) struct Answer {
     /// Verdict words of each model.
@@ -102,7 +102,7 @@ impl Parts {
     }
 }
 
-/// A job on its way.
+/// A job in flight.
 pub(super) struct Flight {
     job: Job,
     parts: Parts,
@@ -162,7 +162,7 @@ impl Slot {
         let (x, y) = device.workgroups(job.lanes());
         let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
-        // What no lane writes must read as nothing.
+        // Words that no lane writes must read as zero.
         if parts.verdicts > 0 {
             encoder.clear_buffer(&buffers.verdicts, 0, Some(parts.verdicts));
         }
@@ -196,7 +196,7 @@ impl Slot {
         }
         let (sender, mapped) = mpsc::channel();
         encoder.map_buffer_on_submit(&buffers.readback, wgpu::MapMode::Read, 0..parts.total(), move |result| {
-            // Nobody listens any more where the job was given up.
+            // Nobody listens if the job was abandoned.
             let _ = sender.send(result);
         });
         let since = Instant::now();
@@ -249,7 +249,7 @@ impl Slot {
         }
         let limits = device.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        // Doubling, so that growing jobs seldom come here, but never beyond what the device takes.
+        // Doubling makes growth rare, but never beyond what the device takes.
         let room = |bytes: u64, most: u64| bytes.next_power_of_two().min(most).max(bytes);
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));

@@ -87,7 +87,7 @@ pub fn assemble_generator() -> String {
 }
 
 /// Values of the `override` constants of a model's pipeline, by name. `paired` says that some case has a
-/// second vehicle; without, the pipeline spares its half of the work.
+/// second vehicle; without, the pipeline skips half of the work.
 pub fn constants(resolved: &Constants<f32>, model: ModelId, paired: bool) -> Vec<(&'static str, f64)> {
     let mut all = resolved.frames[model.index()].shader_constants();
     all.push(("frame_model", model.index() as f64));

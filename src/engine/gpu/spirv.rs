@@ -12,7 +12,7 @@ use crate::{Error, Result};
 pub enum Checks {
     /// Indices are clamped, loops counted, divisors tested: nothing undefined can happen.
     Checked,
-    /// The shaders' own guards alone: every loop is bounded by the step cap or a constant, every index comes
+    /// Only the shaders' own guards: every loop is bounded by the step cap or a constant, every index comes
     /// from a record that the host made, every integer divisor is at least 1.
     Unchecked,
 }

@@ -39,7 +39,7 @@ pub struct Tally {
     pub model: ModelId,
     /// Lanes that the backend under test computed itself.
     pub lanes: u64,
-    /// Of these, on the CPU, failed: in the order of [`Criterion::ALL`].
+    /// Failures among these on the CPU, in the order of [`Criterion::ALL`].
     pub failed: [u64; Criterion::ALL.len()],
     /// Evaluated steps of all lanes.
     pub steps: u64,

@@ -111,7 +111,7 @@ struct Frozen {
 }
 
 /// A case with the places of its series in the pool.
-struct Drawn {
+struct CaseInPool {
     case: Case,
     slices: [Slices; 2],
 }
@@ -166,7 +166,7 @@ impl RandomCases {
         }
     }
 
-    fn encode(&self, draw: &mut Draw, mut drawn: Drawn) -> LaneCase<f64> {
+    fn encode(&self, draw: &mut Draw, mut drawn: CaseInPool) -> LaneCase<f64> {
         let exposed = !self.frozen.is_empty() && drawn.case.category == Category::CutOut;
         let mut scratch = Tables::default();
         let mut lane = LaneCase::encode(&drawn.case, &self.profile, &mut scratch);
@@ -189,7 +189,7 @@ impl RandomCases {
         lane
     }
 
-    fn draw(&self, draw: &mut Draw, category: Category, variant: usize) -> Drawn {
+    fn draw(&self, draw: &mut Draw, category: Category, variant: usize) -> CaseInPool {
         let across = match category {
             Category::CutIn => Across::In,
             Category::CutOut => Across::Out,
@@ -226,7 +226,7 @@ impl RandomCases {
             all[1] = slices;
             case.ahead = Some(Ahead { vehicle, gap_m: draw.between(1.0, 70.0) });
         }
-        Drawn { case, slices: all }
+        CaseInPool { case, slices: all }
     }
 
     /// A vehicle whose motions are sampled (variant 0), kinematic (1) or one of each (others).

@@ -31,7 +31,7 @@ pub(super) struct Scenes {
 
 /// The first step of a lane, with what decides later ones.
 #[derive(Debug, Clone, Copy)]
-struct Scene {
+struct FirstStep {
     v_ego: f32,
     v_other: f32,
     gap: f32,
@@ -77,11 +77,11 @@ impl Scenes {
         exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, Across::Ahead), 10.0))
     }
 
-    fn base(&self, draw: &mut Draw, unit: u64, across: Across) -> Scene {
+    fn base(&self, draw: &mut Draw, unit: u64, across: Across) -> FirstStep {
         let turn = unit / Threshold::ALL.len() as u64;
         let motion = self.series.motion(draw, (turn % 4) as u32, across);
         let v_other = motion.cast::<f32>().speed(&self.series.lane_tables, 0);
-        Scene {
+        FirstStep {
             v_ego: v_other + rounded(draw.between(0.5, 15.0)),
             v_other,
             gap: rounded(draw.between(2.0, 30.0)),
@@ -100,7 +100,7 @@ impl Scenes {
     }
 
     /// The scene on its threshold and its two neighbours; `None` where these numbers have none.
-    fn scenes(&self, draw: &mut Draw, block: usize, unit: u64) -> Option<[Scene; 3]> {
+    fn scenes(&self, draw: &mut Draw, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
         let threshold = Threshold::of_unit(unit);
         let across = match threshold {
             Threshold::Reg157Gate | Threshold::CchdmGate | Threshold::RssLateral => {
@@ -132,7 +132,7 @@ impl Scenes {
     }
 
     /// Thresholds that a gap or the ego's speed meets.
-    fn along_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+    fn along_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
         let constants = &self.constants[block];
         let criteria = &constants.criteria;
         let dv = s.v_ego - s.v_other;
@@ -169,7 +169,7 @@ impl Scenes {
                 if s.half_widths < 0.3 {
                     return None;
                 }
-                let open = |gap: f32| fsm.check(&self.view(&Scene { gap, ..s })).is_unsafe.holds();
+                let open = |gap: f32| fsm.check(&self.view(&FirstStep { gap, ..s })).is_unsafe.holds();
                 turn(nearest, about + 0.5 * (reach - about), open)?.1
             }
             Threshold::Behind => -(s.half_lengths + s.half_lengths),
@@ -184,20 +184,20 @@ impl Scenes {
             Threshold::Gap => {
                 let exact = s.start < 2 && !self.profile.frame.start_shift;
                 let near = if exact { TINY } else { SMALL };
-                return Some([0.0, -near, near].map(|gap| Scene { gap, ..s }));
+                return Some([0.0, -near, near].map(|gap| FirstStep { gap, ..s }));
             }
             Threshold::EqualSpeeds => {
                 s.v_ego = s.v_other;
                 // At gap 0 one ULP of closing speed is a danger; at larger gaps only the FSM looks.
                 s.gap = if draw.chance(0.5) { 0.0 } else { s.gap };
-                let at = |v_ego: f32| Scene { v_ego, ..s };
+                let at = |v_ego: f32| FirstStep { v_ego, ..s };
                 return Some([at(s.v_ego), at(s.v_ego.next_down()), at(s.v_ego.next_up())]);
             }
             Threshold::StandingEgo => {
                 s.gap = if draw.chance(0.5) { 0.0 } else { rounded(draw.between(0.1, 5.0)) };
                 let at = |v_ego: f32, v_other: f32| {
                     let motion = self.series.with_speed(s.motion, v_other, 0.0, 0.0);
-                    Scene { v_ego, v_other, motion, ..s }
+                    FirstStep { v_ego, v_other, motion, ..s }
                 };
                 return Some([at(0.0, 0.0), at(0.0, TINY), at(TINY, 0.0)]);
             }
@@ -205,11 +205,11 @@ impl Scenes {
         };
         let kept = s.gap >= nearest || on == Threshold::Behind;
         (kept && self.products_meet(on, &s))
-            .then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| Scene { gap, ..s }))
+            .then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| FirstStep { gap, ..s }))
     }
 
     /// Where both sides are products, the turn may jump over equality: only scenes that meet it count.
-    fn products_meet(&self, on: Threshold, s: &Scene) -> bool {
+    fn products_meet(&self, on: Threshold, s: &FirstStep) -> bool {
         let dv = s.v_ego - s.v_other;
         let criteria = &self.profile.criteria;
         match on {
@@ -229,7 +229,13 @@ impl Scenes {
     }
 
     /// Thresholds that a width or a lateral speed meets.
-    fn across_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+    fn across_the_road(
+        &self,
+        draw: &mut Draw,
+        block: usize,
+        on: Threshold,
+        mut s: FirstStep,
+    ) -> Option<[FirstStep; 3]> {
         let constants = &self.constants[block];
         let dv = s.v_ego - s.v_other;
         let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
@@ -257,25 +263,25 @@ impl Scenes {
             Threshold::EgoWidth => {
                 (s.gap, s.ego_width) = (soon, y);
                 s.half_widths = rounded(draw.between(0.3, 1.2)) * y;
-                return Some([y, y.next_down(), y.next_up()].map(|ego_width| Scene { ego_width, ..s }));
+                return Some([y, y.next_down(), y.next_up()].map(|ego_width| FirstStep { ego_width, ..s }));
             }
             _ => {
                 // With dv = 0 the FSM's gate hangs on the lateral speed alone.
                 s.v_ego = if draw.chance(0.7) { s.v_other } else { s.v_ego };
                 s.gap = rounded(draw.between(0.5, 5.0));
                 s.half_widths = s.half_widths.min(y - 0.2);
-                return Some([0, 1, 2].map(|side| Scene { motion: self.series.still(s.motion, side), ..s }));
+                return Some([0, 1, 2].map(|side| FirstStep { motion: self.series.still(s.motion, side), ..s }));
             }
         };
         let minus_gap = |width: f32| -(y - width);
         let width = hit(-lateral_gap, f64::from(y) - f64::from(lateral_gap), minus_gap)?;
         // A smaller lateral gap is a larger width.
         let widths = [width, next_other(width, true, minus_gap), next_other(width, false, minus_gap)];
-        (width >= 0.2).then(|| widths.map(|half_widths| Scene { half_widths, ..s }))
+        (width >= 0.2).then(|| widths.map(|half_widths| FirstStep { half_widths, ..s }))
     }
 
     /// Thresholds that a step meets.
-    fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: Scene) -> Option<[Scene; 3]> {
+    fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
         let (dt, dt_s) = (self.constants[block].frames[0].dt, self.profile.frame.dt_s);
         let dv = s.v_ego - s.v_other;
         let step = 1 + draw.below(5) as u32;
@@ -286,21 +292,21 @@ impl Scenes {
                 // Every model is afraid 0.4 s before the contact.
                 s.gap = dv * (0.4 + dt * step as f32);
                 Some(around(step).map(|step| match on {
-                    Threshold::Attention => Scene { attend_from: step, ..s },
-                    _ => Scene { present_from: step, ..s },
+                    Threshold::Attention => FirstStep { attend_from: step, ..s },
+                    _ => FirstStep { present_from: step, ..s },
                 }))
             }
             Threshold::Disappearance => {
                 s.attend_from = NO_STEP;
                 s.gap = rounded(draw.between(0.5, 5.0));
                 let contact = self.contact_step(&s, dt)?;
-                Some(around(contact).map(|present_until| Scene { present_until, ..s }))
+                Some(around(contact).map(|present_until| FirstStep { present_until, ..s }))
             }
             Threshold::SpeedEvent => {
                 let acceleration = draw.between(-9.0, 3.0);
                 Some([0.0, -1e-6, 1e-6].map(|early| {
                     let until_s = (f64::from(step) + early) * dt_s;
-                    Scene { motion: self.series.with_speed(s.motion, s.v_other, acceleration, until_s), ..s }
+                    FirstStep { motion: self.series.with_speed(s.motion, s.v_other, acceleration, until_s), ..s }
                 }))
             }
             Threshold::LateralEvent => {
@@ -318,7 +324,7 @@ impl Scenes {
                     [0.0, -1e-6, 1e-6].map(|early| {
                         let end_m = start - start.signum() * (travel + early * rate * dt_s);
                         let across = Lateral::Kinematic { start_m: start, rate_mps: -start.signum() * rate, end_m };
-                        Scene { motion: self.series.with_lateral(s.motion, &across), ..s }
+                        FirstStep { motion: self.series.with_lateral(s.motion, &across), ..s }
                     })
                 })
             }
@@ -328,13 +334,13 @@ impl Scenes {
                 s.motion = self.series.with_speed(s.motion, s.v_other, 0.0, 0.0);
                 let last = self.profile.step_cap().max(2) - 1;
                 let horizon = if on == Threshold::StepCap { last } else { (1 + draw.below(200) as u32).min(last - 1) };
-                Some(around(horizon).map(|horizon| Scene { horizon, ..s }))
+                Some(around(horizon).map(|horizon| FirstStep { horizon, ..s }))
             }
         }
     }
 
     /// First step at which an ego that keeps its speed touches the vehicle; `None` where it does not soon.
-    fn contact_step(&self, s: &Scene, dt: f32) -> Option<u32> {
+    fn contact_step(&self, s: &FirstStep, dt: f32) -> Option<u32> {
         let motion = s.motion.cast::<f32>();
         let mut gap = s.gap;
         (1..400).find(|&index| {
@@ -347,7 +353,7 @@ impl Scenes {
         rounded(self.profile.cchdm.ttc_s)
     }
 
-    fn view(&self, s: &Scene) -> View<f32> {
+    fn view(&self, s: &FirstStep) -> View<f32> {
         let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
         View {
             v_ego: s.v_ego,
@@ -361,7 +367,7 @@ impl Scenes {
     }
 
     /// What is added to the headway so that the lane's first gap is the scene's.
-    fn gap_offset(&self, s: &Scene, block: usize) -> Option<f32> {
+    fn gap_offset(&self, s: &FirstStep, block: usize) -> Option<f32> {
         let frame = &self.constants[block].frames[0];
         let start = match HEADWAYS[s.start].start::<f32>() {
             Start::Headway(time) => time * s.v_ego,
@@ -373,7 +379,7 @@ impl Scenes {
         hit(s.gap, guess, first)
     }
 
-    fn record(&self, s: &Scene, offset: f32) -> LaneCase<f64> {
+    fn record(&self, s: &FirstStep, offset: f32) -> LaneCase<f64> {
         let deciding = LaneOther {
             motion: s.motion,
             half_lengths: f64::from(s.half_lengths),

@@ -172,7 +172,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         lateral_gap.is_positive() & !lateral_towards.is_positive()
     }
 
-    const KNOWS_EASE: bool = true;
+    const KNOWS_STEADY_FOLLOWING: bool = true;
 
     /// CFS is 0 beyond it at every deceleration of the ego. Without one this is its safe distance, and one after which
     /// v_new is above v_o makes that shorter; a larger one, above dv/τ, stops the closing within half of dv·τ.
@@ -182,7 +182,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         dv * self.tau + dv * dv * self.half_inverse_comf
     }
 
-    /// PFS alone: demand PFS·b_comf.
+    /// PFS only: demand PFS·b_comf.
     #[inline(always)]
     fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);

@@ -144,33 +144,33 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     const KEEPS_DECELERATION: bool = true;
 
     /// Safe distance, m ≥ 0: while both keep their speeds, m/s, a vehicle that overlaps with the ego across the road is
-    /// safe at every larger gap. Rounding may be left to the caller; infinite where nothing is promised.
+    /// safe at every larger gap. The caller may add a margin for rounding; infinite without a promise.
     #[inline(always)]
     fn safe_gap(&self, _v_ego: R, _v_other: R) -> R {
         R::INFINITY
     }
 
-    /// A vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at every gap,
-    /// at all speeds and whatever the ego's acceleration. To be decided by the comparisons of the check itself, which is
-    /// not asked again, and without the lateral speed where the check does not see it.
+    /// Whether a vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at
+    /// every gap, every speed and every acceleration of the ego. Uses the comparisons of the check itself, without the
+    /// lateral speed if the check does not see it.
     #[inline(always)]
     fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
         Flag::FALSE
     }
 
-    /// The two that follow are there, and the reaction neither accelerates the ego nor begins to wait again.
-    const KNOWS_EASE: bool = false;
+    /// The two following functions are implemented, and the reaction neither accelerates the ego nor waits again.
+    const KNOWS_STEADY_FOLLOWING: bool = false;
 
-    /// Distance, m ≥ 0, beyond which the driver is at ease with a vehicle that overlaps with the ego across the road
-    /// and keeps its speed: [`DriverModel::check_steady`] says what the check says, whatever the ego's deceleration.
+    /// Distance, m ≥ 0, beyond which the driver follows steadily a vehicle that overlaps with the ego across the road
+    /// and keeps its speed: [`DriverModel::check_steady`] agrees with the check, whatever the ego's deceleration.
     /// Not larger at a smaller speed of the ego, m/s. Rounding may make it too small by a thousandth and a millimetre.
     #[inline(always)]
     fn steady_gap(&self, _v_ego: R, _v_other: R) -> R {
         R::INFINITY
     }
 
-    /// The part of the check that is left at ease: unsafe exactly where the check is, with the same demand there, and
-    /// with less work. It sees speeds, gap and lengths; all else of the view is not the lane's.
+    /// The part of the check that can trigger in steady following: unsafe exactly where the check is, with the same
+    /// demand. It reads speeds, gap and lengths; the other fields of the view are undefined.
     #[inline(always)]
     fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         self.check(view)
@@ -190,10 +190,10 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
 /// follows `braking`, and the speed stops at 0.
 #[inline(always)]
 fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_ego: R, dt: R) -> (DriverState<R>, R) {
-    let waiting = Flag::reached(state.delay_steps, 1);
-    let applied = waiting.choose(coasting, braking);
-    let deceleration = waiting.choose(state.deceleration, braking);
-    let delay_steps = state.delay_steps - waiting.one();
+    let is_delayed = Flag::reached(state.delay_steps, 1);
+    let applied = is_delayed.choose(coasting, braking);
+    let deceleration = is_delayed.choose(state.deceleration, braking);
+    let delay_steps = state.delay_steps - is_delayed.one();
     let v_next = (v_ego - applied * dt).larger(R::ZERO);
     (DriverState { deceleration, delay_steps }, v_next)
 }
@@ -229,7 +229,7 @@ mod tests {
             least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
         };
         let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
-        let (mut is_steady, mut uneasy_below) = (0, 0);
+        let (mut is_steady, mut unsteady_below) = (0, 0);
         for _ in 0..200_000 {
             let (v_ego, v_other) = (between(0.0, 45.0), between(0.0, 45.0));
             let view = View {
@@ -256,7 +256,7 @@ mod tests {
                 assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");
                 ignored += 1;
             }
-            if !M::KNOWS_EASE {
+            if !M::KNOWS_STEADY_FOLLOWING {
                 assert_eq!(model.steady_gap(v_ego, v_other), f32::INFINITY, "{name}");
                 continue;
             }
@@ -268,7 +268,7 @@ mod tests {
             let seen = View { a_ego: 0.0, lateral_gap: -1.9, lateral_towards: 0.0, ..slowing };
             let is_same = said(hazard) == said(model.check_steady(&seen));
             if view.gap > 1.001 * steady_gap + 0.001 {
-                assert!(is_same, "{name}: {slowing:?} is not all at ease beyond {steady_gap} m");
+                assert!(is_same, "{name}: {slowing:?} does not follow steadily beyond {steady_gap} m");
                 let state = DriverState { deceleration: -slowing.a_ego, delay_steps: 0 };
                 let (reacting, v_next) = model.react(state, &hazard, v_ego);
                 let reacts_well = v_next <= v_ego && reacting.delay_steps == 0;
@@ -279,10 +279,13 @@ mod tests {
                 );
                 is_steady += 1;
             } else if !is_same && view.gap > 0.9 * steady_gap {
-                uneasy_below += 1;
+                unsteady_below += 1;
             }
         }
-        assert!(!M::KNOWS_EASE || is_steady > 1000 && uneasy_below > 100, "{name}: {is_steady}, {uneasy_below}");
+        assert!(
+            !M::KNOWS_STEADY_FOLLOWING || is_steady > 1000 && unsteady_below > 100,
+            "{name}: {is_steady}, {unsteady_below}"
+        );
         assert!(safe > 1000 && ignored > 1000, "{name}: {safe} safe, {ignored} ignored");
         assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
     }

@@ -24,7 +24,7 @@ pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
 pub struct TimeGrid {
     /// Time between two, s.
     pub dt_s: f64,
-    /// So many at most: no lane reads more.
+    /// Maximum number: no lane reads more.
     pub max_steps: usize,
 }
 
@@ -72,7 +72,7 @@ pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid
 }
 
 /// Size of the constant lateral speed, m/s: the displacement over the time. (|y(0)| − |y(T)|)/T, as one may
-/// also read the specification, would shorten the way of a target that ends beyond the lane's middle.
+/// also read the specification, would shorten the path of a target that ends beyond the lane's middle.
 pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
     let y = &scenario.target.y;
     let duration = scenario.duration_s();

@@ -79,7 +79,7 @@ pub struct LeaveOneOut {
 }
 
 impl LeaveOneOut {
-    /// Of points that are already divided by their scales; at least 2.
+    /// Bandwidth of points that are already divided by their scales; at least 2 points.
     pub fn new(scaled: &[Vec<f64>]) -> LeaveOneOut {
         let dimensions = scaled.first().map_or(0, Vec::len);
         let columns = (0..dimensions).map(|j| scaled.iter().map(|p| p[j]).collect()).collect();

@@ -98,7 +98,7 @@ impl<'a> Weighted<'a> {
         Weighted { points, d, covariance, effective }
     }
 
-    /// L of (1 − λ) S + λ (covariance of all points); its diagonal alone where that has no factor.
+    /// L of (1 − λ) S + λ (covariance of all points); only its diagonal if that has no factor.
     fn factor(&self, own: &[f64], effective: f64) -> Vec<f64> {
         let d = self.d;
         let pull = (d as f64 + 1.0) / (d as f64 + 1.0 + effective);

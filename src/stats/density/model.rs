@@ -90,13 +90,13 @@ pub struct DensityModel {
     pub sizes: Sizes,
     /// Events per hour and kilometre, where time or distance is known.
     pub exposure: Option<Exposure>,
-    /// How well it stands for unseen scenarios, where that was asked for and could be told.
+    /// Representativeness for unseen scenarios, if requested and computable.
     pub representativeness: Option<Representativeness>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
 
-/// A density with the scenarios that it had to leave out, and what could not be told.
+/// A density, the scenarios that it excludes, and figures that could not be computed.
 pub struct Fitted {
     /// The density.
     pub model: DensityModel,

@@ -59,7 +59,7 @@ struct File {
     /// Means over the scenarios: sizes are no parameters.
     sizes: Sizes,
     options: ParameterizationOptions,
-    /// Of a parameterization by SVD.
+    /// The decomposition of a parameterization by SVD.
     basis: Option<Basis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,

@@ -47,7 +47,7 @@ impl Draws {
         ((self.word64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
     }
 
-    /// Of 0..n, each equally likely up to n/2⁶⁴.
+    /// An integer in 0..n, each equally likely up to n/2⁶⁴.
     pub fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.word64()) * n as u128) >> 64) as usize
     }

@@ -8,8 +8,8 @@
 //! compared; kinematic parameterizations are compared as points divided by their scales, so their M say
 //! something among runs of the same parameterization only.
 //!
-//! W is exact. Of sets larger than [`MAX_SET`] a random part of that size is taken, which shortens neither
-//! side alone: W of small sets is larger, for all terms of one table alike.
+//! W is exact. Sets larger than [`MAX_SET`] are replaced by random subsets of that size, on both
+//! sides: W of small sets is larger, for all terms of one table alike.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -20,7 +20,7 @@ pub fn from_clusters(draws: u64, size: u64, failed: u64, squares: u64, level: f6
         rule_of_three(draws, level)
     } else {
         let binomial = probability * (1.0 - probability);
-        // More runs than there are would be believing too much, fewer than draws too little.
+        // The effective number lies between the number of draws and the number of runs.
         let effective = if variance > 0.0 { (binomial / variance).clamp(1.0, n * m) } else { n };
         wilson(probability * effective, effective, level)
     };

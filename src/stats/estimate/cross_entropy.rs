@@ -36,11 +36,11 @@ pub struct CrossEntropy {
     pub samples_per_level: u64,
     /// ρ: a level's goal is this quantile of the limit state, 0 at the lowest.
     pub quantile: f64,
-    /// Most components of a level's fit; the number is chosen by the Bayesian information criterion.
+    /// Maximum number of components of a level's fit; the number is chosen by the Bayesian information criterion.
     pub components: usize,
     /// Share of the new fit in the next mixture; the rest is the previous one.
     pub smoothing: f64,
-    /// Most levels.
+    /// Maximum number of levels.
     pub levels: usize,
     /// Share of the density in the final proposal.
     pub defence: f64,

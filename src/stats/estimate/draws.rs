@@ -8,7 +8,7 @@ use super::problem::{Density, Draw, LimitState, judge};
 use crate::Result;
 use crate::stats::random::Stream;
 
-/// Most points drawn and judged at a time: bounds the memory of any sample.
+/// Maximum number of points drawn and judged at a time: bounds the memory of any sample.
 pub(crate) const BATCH: u64 = 1 << 16;
 
 /// The draws of a range of indices, in order.

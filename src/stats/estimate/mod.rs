@@ -1,4 +1,4 @@
-//! Probabilities of rare failures from samples: estimators, their intervals, and what is to be believed of them.
+//! Probabilities of rare failures from samples: estimators, their intervals, and warnings about them.
 //!
 //! Here lives nothing about vehicles: a [`Density`] draws points as pure functions of an index, a [`LimitState`]
 //! gives each point a value that is ≤ 0 where it fails, and every estimator gives one [`Estimate`]. Points go to the

@@ -39,7 +39,7 @@ impl Clusters<'_> {
     }
 }
 
-/// A rate with the interval that its clusters tell.
+/// A rate with its interval over clusters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClusterRate {
     /// Failed runs over runs.
@@ -79,14 +79,14 @@ pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
         let freedom = effective_failing.min(effective_number(passed)) - 1.0;
         let factor = student_factor(freedom, level);
         let effective = rate * (1.0 - rate) / variance * factor * factor;
-        // Without any variance the clusters alone bound the rate.
+        // Without any variance only the number of clusters bounds the rate.
         let effective = if variance > 0.0 { effective.clamp(least, (total as f64).max(least)) } else { least };
         Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
     };
     ClusterRate { rate, variance, interval, effective_failing }
 }
 
-/// What a ratio says of its numerator.
+/// Verdict of a ratio about its numerator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RatioVerdict {
@@ -166,7 +166,7 @@ pub struct Ratio {
     pub high: Option<f64>,
     /// How the interval was made.
     pub method: RatioMethod,
-    /// What it says.
+    /// Its verdict.
     pub verdict: RatioVerdict,
 }
 

@@ -39,7 +39,7 @@ impl Checkpoints {
 /// When to end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
-    /// Most samples, ≥ 1. Always a limit.
+    /// Maximum number of samples, ≥ 1. Always a limit.
     pub samples: u64,
     /// End at the first checkpoint at which half the interval's width over the estimate is at most this, there
     /// being at least [`StopRule::MIN_FAILURES`] failures.
@@ -70,7 +70,7 @@ impl StopReason {
 }
 
 impl StopRule {
-    /// Failures before a narrow interval is believed: fewer make intervals narrow by luck.
+    /// Failures before a narrow interval is believed: fewer can make intervals narrow by chance.
     pub const MIN_FAILURES: u64 = 10;
 
     /// So many samples and no other rule.

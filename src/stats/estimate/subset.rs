@@ -34,7 +34,7 @@ pub struct Subset {
     pub samples_per_level: u64,
     /// p0: share of a level that starts the next, in (0, 1).
     pub share: f64,
-    /// Most levels.
+    /// Maximum number of levels.
     pub levels: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Sums over weighted draws: all that importance sampling needs of a sample, in constant memory.
+//! Sums over weighted draws: everything that importance sampling needs, in constant memory.
 
 use serde::{Deserialize, Serialize};
 
@@ -146,7 +146,7 @@ impl WeightSums {
     }
 }
 
-/// 0 where there is nothing to divide.
+/// 0 if the denominator is 0.
 fn ratio(above: f64, below: f64) -> f64 {
     if below == 0.0 { 0.0 } else { above / below }
 }

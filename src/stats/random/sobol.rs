@@ -1,11 +1,11 @@
 //! Sobol's sequence with nested uniform scrambling (Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995):
-//! points that fill the unit cube evenly, of which each alone is uniformly distributed, by index.
+//! points that fill the unit cube evenly; each single point is uniformly distributed. Points come by index.
 //!
 //! Scrambling walks down the binary digits of a coordinate and flips each by a coin that belongs to the digits above
 //! it. Equal digits above meet the same coin, so that elementary intervals are permuted whole and every net stays one.
 //! Here the coins of four levels, a tree of 15, are bits of one hash of the digits above. Hashes that permute all 32
-//! digits at once (Laine and Karras; Burley, JCGT 2020) are cheaper, but their coins depend on each other from the third
-//! level on; these do not, as far as the tests can tell.
+//! digits at once (Laine and Karras; Burley, JCGT 2020) are cheaper, but their coins depend on each other from the
+//! third level on; these do not, as far as the tests can tell.
 //!
 //! Indices are not shuffled: points k·2^m … (k + 1)·2^m − 1 are a net for every k and m.
 

@@ -28,10 +28,10 @@ pub struct AliasTable {
 /// The whole of a column, in units of 2⁻³².
 const WHOLE: u64 = 1 << 32;
 /// So that sums of quotas stay exact in f64.
-const MOST: usize = 1 << 20;
+const MAX_WEIGHTS: usize = 1 << 20;
 
 impl AliasTable {
-    /// A table for weights, of which only the ratios count. Deterministic: the same weights give the same table.
+    /// A table for weights; only their ratios matter. Deterministic: the same weights give the same table.
     ///
     /// Each weight, relative to the sum, is rounded down to a multiple of 2⁻³²/n, for n components; the largest (the
     /// first of equals) takes what is left over, less than 2⁻³². So in the distribution that
@@ -46,7 +46,7 @@ impl AliasTable {
             Err(Error::usage(Place::item("weights"), problem, "give 1 to 1048576 finite weights, one of them positive"))
         };
         let n = weights.len();
-        if n == 0 || n > MOST {
+        if n == 0 || n > MAX_WEIGHTS {
             return wrong(format!("there are {n} of them"));
         }
         if let Some(at) = weights.iter().position(|w| !w.is_finite() || *w < 0.0) {

@@ -7,7 +7,7 @@ use serde_json::Value;
 /// How the values of a column are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Text of which most rows have their own.
+    /// Text that mostly differs between rows.
     Text,
     /// One of few texts: Parquet keeps each once.
     Name,

@@ -48,7 +48,7 @@ impl CsvRows {
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
         let mut rows =
             CsvRows { path: path.to_path_buf(), reader, ration, record: csv::StringRecord::new(), wanted: Vec::new() };
-        let header = rows.reader.headers().cloned().map_err(|e| told(path, e))?;
+        let header = rows.reader.headers().cloned().map_err(|e| csv_error(path, e))?;
         let columns: Vec<String> =
             header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().to_owned()).collect();
         if let [one] = &columns[..]
@@ -72,7 +72,7 @@ impl CsvRows {
 
     pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
         self.ration.set(MAX_ROW_BYTES);
-        if !self.reader.read_record(&mut self.record).map_err(|e| told(&self.path, e))? {
+        if !self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))? {
             return Ok(None);
         }
         let number = self.record.position().map_or(0, csv::Position::line);
@@ -84,7 +84,7 @@ impl CsvRows {
     }
 }
 
-fn told(path: &Path, error: csv::Error) -> Error {
+fn csv_error(path: &Path, error: csv::Error) -> Error {
     let place = |position: &Option<csv::Position>| {
         position.as_ref().map_or(Place::file(path), |position| Place::file(path).row(position.line()))
     };

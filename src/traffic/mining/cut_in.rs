@@ -9,7 +9,7 @@
 //! change, target no longer leader, ego no longer keeps its lane, end of the data.
 
 use super::data_set::DataSet;
-use super::found::Found;
+use super::found::FoundScenario;
 use super::lateral::LaneChangeKind;
 use super::options::{CutInOptions, TOLERANCE};
 use super::search::{Item, Match};
@@ -34,7 +34,7 @@ pub(super) fn scenario(
 ) -> Option<Scenario> {
     let target = &set.scene.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
-    let found = Found { set, target, category: Category::CutIn, start, end };
+    let found = FoundScenario { set, target, category: Category::CutIn, start, end };
     let change = lane_change_of(&found, target_index)?;
     let side = match change.kind {
         LaneChangeKind::RightIn | LaneChangeKind::LeftOut => Side::Left,
@@ -65,7 +65,10 @@ fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
 }
 
 /// The target's lane change, against the ego's lane, that is going on at t = 0.
-pub(super) fn lane_change_of<'a>(found: &Found<'a>, target_index: usize) -> Option<&'a super::lateral::LaneChange> {
+pub(super) fn lane_change_of<'a>(
+    found: &FoundScenario<'a>,
+    target_index: usize,
+) -> Option<&'a super::lateral::LaneChange> {
     let set: &'a DataSet<'a> = found.set;
     let j = found.sample_of(found.target, found.start)?;
     set.scene.activities[target_index].lane_change(set.ego.lane[found.start], j)
@@ -74,7 +77,7 @@ pub(super) fn lane_change_of<'a>(found: &Found<'a>, target_index: usize) -> Opti
 /// Provenance that cut-in and cut-out share.
 pub(super) fn describe(
     scenario: &mut Scenario,
-    found: &Found,
+    found: &FoundScenario,
     change_start: usize,
     matched: &Match,
     first: usize,

@@ -11,7 +11,7 @@
 
 use super::cut_in::{describe, end_cause, lane_change_of};
 use super::data_set::DataSet;
-use super::found::{Found, micrometres};
+use super::found::{FoundScenario, micrometres};
 use super::lateral::LaneChangeKind;
 use super::options::{CutOutOptions, TOLERANCE};
 use super::search::{Item, Match};
@@ -36,7 +36,7 @@ pub(super) fn scenario(
 ) -> Option<Scenario> {
     let target = &set.scene.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
-    let found = Found { set, target, category: Category::CutOut, start, end };
+    let found = FoundScenario { set, target, category: Category::CutOut, start, end };
     let change = lane_change_of(&found, target_index)?;
     let side = match change.kind {
         LaneChangeKind::LeftOut | LaneChangeKind::RightIn => Side::Left,
@@ -60,7 +60,7 @@ pub(super) fn scenario(
 
 /// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to
 /// the end; else why there is none.
-fn uncovered<'a>(found: &Found<'a>) -> Result<&'a Track, &'static str> {
+fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
     let set: &'a DataSet<'a> = found.set;
     let nobody = "no vehicle ahead of the target in the ego's lane";
     let j = found.sample_of(found.target, found.start).ok_or(nobody)?;

@@ -8,16 +8,16 @@ use super::tags::{Activities, Tags};
 use crate::traffic::trajectory::{Carriageway, EgoView, NO_LANE, Recording, Track};
 
 /// A recording with everything that is computed once for it.
-pub(super) struct Scene<'a> {
+pub(super) struct RecordingTags<'a> {
     pub recording: &'a Recording,
     pub options: &'a MiningOptions,
-    /// Of every track, in the recording's order.
+    /// Activities of every track, in the recording's order.
     pub activities: Vec<Activities>,
-    /// Of every carriageway.
+    /// Neighbours on every carriageway.
     pub neighbours: Vec<Neighbours>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> RecordingTags<'a> {
     pub fn new(recording: &'a Recording, options: &'a MiningOptions) -> Self {
         let activities = recording
             .tracks
@@ -25,13 +25,13 @@ impl<'a> Scene<'a> {
             .map(|t| Activities::of(t, &recording.carriageways[t.carriageway], recording.frame_rate_hz, options))
             .collect();
         let neighbours = (0..recording.carriageways.len()).map(|c| Neighbours::new(recording, c)).collect();
-        Scene { recording, options, activities, neighbours }
+        RecordingTags { recording, options, activities, neighbours }
     }
 }
 
 /// The data set of one ego.
 pub(super) struct DataSet<'a> {
-    pub scene: &'a Scene<'a>,
+    pub scene: &'a RecordingTags<'a>,
     /// Index of the ego's track.
     pub ego_index: usize,
     pub ego: &'a Track,
@@ -52,7 +52,7 @@ pub(super) struct Stretch {
 impl<'a> DataSet<'a> {
     /// The data set of the track with index `ego_index`; `None` where the vehicle travels less than the
     /// end cut.
-    pub fn new(scene: &'a Scene<'a>, ego_index: usize) -> Option<Self> {
+    pub fn new(scene: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
         let ego = &scene.recording.tracks[ego_index];
         let samples = EgoView::of(scene.recording, ego_index, &scene.options.ego_view)?.last_sample() + 1;
         let carriageway = &scene.recording.carriageways[ego.carriageway];

@@ -6,7 +6,7 @@ use crate::scenario::{Category, Ego, Other, Scenario, Side};
 use crate::traffic::trajectory::{Lane, Track};
 
 /// An ego, a target and the interval in which something was found.
-pub(super) struct Found<'a> {
+pub(super) struct FoundScenario<'a> {
     pub set: &'a DataSet<'a>,
     pub target: &'a Track,
     pub category: Category,
@@ -16,7 +16,7 @@ pub(super) struct Found<'a> {
     pub end: usize,
 }
 
-impl Found<'_> {
+impl FoundScenario<'_> {
     /// Sample of `other` at the ego's sample `k`; `None` where it is not in view.
     pub fn sample_of(&self, other: &Track, k: usize) -> Option<usize> {
         other.index_of(self.frame(k))

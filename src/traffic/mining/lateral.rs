@@ -122,7 +122,7 @@ impl<'a> Profile<'a> {
     }
 
     /// Progress over the window that ends at `k` is small. A window that is not complete is not calm.
-    fn calm(&self, k: usize) -> bool {
+    fn is_calm(&self, k: usize) -> bool {
         k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.quiescent_gap_m - TOLERANCE
     }
 
@@ -131,7 +131,7 @@ impl<'a> Profile<'a> {
         let first = free_from.max(k.saturating_sub(self.reach));
         (first..k)
             .rev()
-            .find(|&j| self.s[j] < -self.far_m - TOLERANCE || (self.calm(j) && self.s[j] < -self.near_m - TOLERANCE))
+            .find(|&j| self.s[j] < -self.far_m - TOLERANCE || (self.is_calm(j) && self.s[j] < -self.near_m - TOLERANCE))
     }
 
     /// First sample after the crossing `k` at which the change is over.
@@ -142,7 +142,7 @@ impl<'a> Profile<'a> {
                 LaneChangeEnd::Published => j + self.window,
                 LaneChangeEnd::Observed => j,
             };
-            self.s[j] > self.far_m + TOLERANCE || (self.calm(judged) && self.s[j] > self.near_m + TOLERANCE)
+            self.s[j] > self.far_m + TOLERANCE || (self.is_calm(judged) && self.s[j] > self.near_m + TOLERANCE)
         })
     }
 }

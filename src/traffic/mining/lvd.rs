@@ -5,7 +5,7 @@
 //! so that it holds the whole loss of speed and nothing else.
 
 use super::data_set::DataSet;
-use super::found::Found;
+use super::found::FoundScenario;
 use super::options::{LvdOptions, TOLERANCE};
 use super::search::{Item, Match};
 use super::tags::Tags;
@@ -35,7 +35,7 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, firs
     if end <= start || duration_s < options.lvd.min_duration_s - TOLERANCE {
         return None;
     }
-    let found = Found { set, target, category: Category::Lvd, start, end };
+    let found = FoundScenario { set, target, category: Category::Lvd, start, end };
     let d_m = target.d_m[found.sample_of(target, start)?];
     let side = if d_m < found.lane()?.centre_m() - TOLERANCE { Side::Right } else { Side::Left };
     let mut scenario = found.scenario(side)?;

@@ -1,6 +1,6 @@
 //! The run over a recording: every vehicle once as ego, every category, every target that leads it.
 
-use super::data_set::{DataSet, Scene, Stretch};
+use super::data_set::{DataSet, RecordingTags, Stretch};
 use super::options::{MiningOptions, TOLERANCE, samples};
 use super::search::{self, Item, Match};
 use super::tags::Tags;
@@ -40,7 +40,7 @@ impl Mined {
 /// Finds every cut-in, cut-out and leader deceleration of a recording (method.md §2 and §3). The result
 /// depends on the recording and the options only.
 pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
-    let scene = Scene::new(recording, options);
+    let scene = RecordingTags::new(recording, options);
     let mut mined = Mined::default();
     for ego_index in 0..recording.tracks.len() {
         let Some(set) = DataSet::new(&scene, ego_index) else { continue };

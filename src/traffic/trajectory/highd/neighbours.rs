@@ -41,7 +41,7 @@ struct Here {
     index: u32,
 }
 
-/// Who is around each vehicle at each of its samples. Vehicles in no lane are alone.
+/// The neighbours of each vehicle at each of its samples. Vehicles in no lane have none.
 pub(super) fn neighbours(recording: &Recording) -> Vec<Vec<Around>> {
     let tracks = &recording.tracks;
     let mut around: Vec<Vec<Around>> = tracks.iter().map(|track| vec![ALONE; track.len()]).collect();

@@ -97,7 +97,8 @@ impl TrackColumns {
     }
 }
 
-/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file announces with no sample.
+/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file
+/// announces with no sample.
 fn read_tracks(
     table: &mut Table,
     columns: &TrackColumns,
@@ -130,7 +131,8 @@ fn read_tracks(
     Ok(tracks)
 }
 
-/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any number.
+/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any
+/// number.
 fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
     let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
     let bytes = std::fs::metadata(tracks).map_or(0, |file| file.len());
@@ -197,8 +199,8 @@ fn add_sample(
     let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
     // Everything is parsed before anything is stored: the series keep the same length.
     let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
-    let told = || table.field(columns.velocity_x).to_string();
-    let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), told);
+    let text = || table.field(columns.velocity_x).to_string();
+    let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), text);
     if v_s_mps < 0.0 {
         return Err(table.bad(
             columns.velocity_x,
