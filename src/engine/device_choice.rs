@@ -13,7 +13,7 @@ use crate::{Error, Place, Result};
 pub enum DeviceName {
     /// Position in the list of `lanesweep verify devices`.
     Index(usize),
-    /// Place on the PCI bus, as [`pci_bus_id`] writes it.
+    /// Place on the PCI bus, as `pci_bus_id` writes it.
     Pci(String),
     /// A part of the device's name, in any case.
     Name(String),

@@ -120,7 +120,7 @@ pub struct AdapterCard {
     pub driver: String,
     /// Version of the driver, in its own words; may be empty.
     pub driver_info: String,
-    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case ([`pci_bus_id`]); `None` where the interface does
+    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case (`pci_bus_id`); `None` where the interface does
     /// not tell and for what is on no bus.
     pub pci_bus_id: Option<String>,
     /// Vendor, as a PCI id where the vendor has one.

@@ -43,7 +43,7 @@ pub fn visible_here() -> Result<Option<Vec<String>>> {
     visible(&env, Path::new("/"))
 }
 
-/// PCI bus ids ([`pci_bus_id`]) of the devices that the environment allows, in its order; `None` where it says
+/// PCI bus ids (`pci_bus_id`) of the devices that the environment allows, in its order; `None` where it says
 /// nothing. `env` reads a variable, `root` is the folder above `proc` and `dev`.
 ///
 /// `None` too where the driver lists no NVIDIA GPU: the variables speak of NVIDIA's devices only, and a variable
