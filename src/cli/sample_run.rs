@@ -19,6 +19,7 @@ use crate::run::sampling::crude_plan::CrudePlan;
 use crate::run::sampling::{self, BootstrapRecord, Kind, SampleResult, conditional, proposal_text};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
+use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
 use crate::{Error, Place, Result};
@@ -53,6 +54,9 @@ impl Sample {
             ));
         };
         let density = read_density(density)?;
+        if !self.dry_run {
+            check_folder(&self.out)?;
+        }
         let profile = self.load_profile()?;
         let options = self.options(&density)?;
         let opened = self.backend.open()?;

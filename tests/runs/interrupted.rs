@@ -137,7 +137,7 @@ fn a_study_that_is_interrupted_leaves_no_half_written_file() {
 #[test]
 fn a_resumable_run_notes_the_first_signal_and_ends_at_once_by_the_second() {
     let mut run = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "the_resumable_run", "--nocapture"])
+        .args(["--exact", "interrupted::the_resumable_run", "--nocapture"])
         .env(RESUMABLE_RUN, "1")
         .stdout(Stdio::null())
         .stderr(Stdio::piped())

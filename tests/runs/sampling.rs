@@ -332,7 +332,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "the adaptive estimators are sequential"),
         (&[d, "--shard", "0/2", "--bootstrap", "20"], 2, "no replicates"),
         (&[d, "--plan", "plan.json"], 2, "cannot be used with"),
-        (&[d, "--level", "1"], 2, "no share"),
+        (&[d, "--level", "1"], 2, "no fraction"),
         (&[d, "--points", "sobol", "--samples", "5000000000"], 2, "4294967296"),
         (&["absent.json"], 6, "absent.json"),
         (&["newer.json"], 3, "version 2"),
