@@ -8,7 +8,6 @@ use super::ProfileFlags;
 use super::backend_flags::{BackendFlags, Opened};
 use super::format::FormatFlag;
 use super::lists;
-use super::sample_checks;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
 use crate::Result;
@@ -61,7 +60,7 @@ pub struct Sample {
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: value that is the same in every sample; repeatable
-    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = sample_checks::given)]
+    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given)]
     pub(super) set: Vec<(String, f64)>,
     /// Crude, importance, cross-entropy, subset
     ///
@@ -121,7 +120,7 @@ pub struct Sample {
     #[arg(long, alias = "defence", hide = true, value_name = "FRACTION", default_value_t = 0.1)]
     pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
-    #[arg(long, value_name = "NAME=VALUE", value_parser = sample_checks::given)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
     pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable
     ///
@@ -212,4 +211,11 @@ impl Sample {
             Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `sampled`")?)),
         }
     }
+}
+
+/// `NAME=VALUE`.
+fn given(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
+    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
+    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }

@@ -121,10 +121,3 @@ pub(super) fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'
     super::source::refuse_overwriting(rows, &others, "--rows")?;
     TableFormat::of(rows, &TableFormat::EVERY, "--rows").map(drop)
 }
-
-/// `NAME=VALUE`.
-pub(super) fn given(text: &str) -> std::result::Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
-    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
-}
