@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_steps, latched_braking};
-use crate::scalar::Real;
-use crate::scenario::Category;
+use crate::model::case::Category;
+use crate::model::scalar::Real;
 
 /// Constants of the model as a profile gives them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
