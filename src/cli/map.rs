@@ -434,7 +434,7 @@ fn against(text: &str, dt: Option<f64>) -> Result<Against> {
         return Ok(Against::Model(model));
     }
     let profile = Profile::load(text).map_err(|error| match error {
-        Error::Usage { place, problem: _, help } if place.item.as_deref() == Some("--profile") => {
+        Error::Usage { place, problem: _, help } if *place == Place::option("profile") => {
             let problem = format!("there is neither a driver model nor a profile `{text}`");
             Error::usage(Place::item("--against"), problem, format!("{help}. Models: {}", ModelId::names()))
         }

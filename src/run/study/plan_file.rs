@@ -102,7 +102,8 @@ impl StudyHead {
 
     /// Whether a study can be so.
     pub(super) fn check(&self, place: &Place) -> Result<()> {
-        let wrong = |problem: &str| Err(Error::input(place.clone(), problem, "make the plan again with --plan-only"));
+        let wrong =
+            |problem: &str| Err(Error::input(place.clone(), problem, "make the plan again with option `plan_only`"));
         self.profile.check(place)?;
         self.parameterization.validate()?;
         if self.blocks.is_empty() || self.blocks.iter().any(|block| block.units == 0) {

@@ -69,7 +69,8 @@ impl StudyHead {
         place: &Place,
         wanted: impl FnOnce(u64) -> Range<u64>,
     ) -> Result<StudyCases> {
-        let wrong = |problem: String| Error::input(place.clone(), problem, "make the plan again with --plan-only");
+        let wrong =
+            |problem: String| Error::input(place.clone(), problem, "make the plan again with option `plan_only`");
         let io = |e| Error::io(place.file.clone().unwrap_or_default(), "read", e);
         self.check(place)?;
         let count = self.unit_count();
