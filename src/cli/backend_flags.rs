@@ -14,7 +14,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Clone, Args)]
 pub struct BackendFlags {
     /// What computes; auto: a GPU where there is one
-    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto")]
+    #[arg(long, value_name = "auto|cpu|gpu")]
     backend: BackendChoice,
     /// Device, by a part of its name, its PCI bus id or its index
     ///

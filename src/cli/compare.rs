@@ -61,11 +61,9 @@ pub struct Compare {
     /// Time headways; paper is 2.0, 1.8, … 0.2
     #[arg(long, value_name = "s,s,…|paper", default_value = "paper")]
     thw: String,
-    /// Samples of each density; each runs from every headway
-    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    #[arg(long, value_name = "N")]
     samples: u64,
-    /// Seed of the draws
-    #[arg(long, value_name = "N", default_value_t = 157)]
+    #[arg(long, value_name = "N")]
     seed: u64,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long)]

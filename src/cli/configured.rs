@@ -7,7 +7,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
-use crate::cli::settings::{Assignment, Layers, Origin, Setting, Settings};
+use crate::cli::settings::{Assignment, Key, Layers, Origin, Setting, Settings};
 use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
 use crate::{Error, Place, Result};
@@ -61,7 +61,38 @@ const OF_THE_PLAN: [&str; 7] =
 
 /// The command line, with `--config` for every verb.
 pub(super) fn command() -> Command {
-    super::help::laid_out(with_config(Cli::command()))
+    let keys = Key::all();
+    let flags = FLAGS.iter().filter_map(|(verb, id, name)| Some((*verb, *id, Key::find(&keys, name)?)));
+    let command = flags.fold(Cli::command(), |command, (verb, id, key)| match verb {
+        "" => with_key(command, id, key),
+        verb => command.mut_subcommand(verb, |command| with_key(command, id, key)),
+    });
+    super::help::laid_out(with_config(command))
+}
+
+/// A flag that always has a value takes its default from the key that it sets, and its text where it has none.
+fn with_key(mut command: Command, id: &str, key: &Key) -> Command {
+    let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
+    for name in names {
+        command = command.mut_subcommand(name, |command| with_key(command, id, key));
+    }
+    if command.get_arguments().all(|arg| arg.get_id() != id) {
+        return command;
+    }
+    command.mut_arg(id, |mut arg| {
+        if let (true, Some(default)) = (arg.is_required_set(), &key.default) {
+            arg = arg.required(false).default_value(word(default));
+        }
+        match arg.get_help() {
+            Some(_) => arg,
+            None => arg.help(key.description.trim_end_matches('.').to_owned()),
+        }
+    })
+}
+
+/// A value as a flag takes it.
+fn word(value: &serde_json::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// A flag of each level's own: of a global one, what stands before the verb is lost where it stands after it too.
@@ -239,15 +270,10 @@ fn flags_of(command: &Command, path: &[&str]) -> Vec<(&'static str, &'static str
 
 /// The command with other defaults.
 fn with_defaults(command: Command, path: &[&str], given: &[(&str, Setting)]) -> Command {
-    let word = |setting: &Setting| match setting.value {
-        Some(serde_json::Value::String(text)) => text.clone(),
-        Some(other) => other.to_string(),
-        None => String::new(),
-    };
     let set = |mut command: Command| {
         for (id, setting) in given {
             if command.get_arguments().any(|arg| arg.get_id() == *id) {
-                command = command.mut_arg(id, |arg| arg.default_value(word(setting)));
+                command = command.mut_arg(id, |arg| arg.default_value(setting.value.map_or(String::new(), word)));
             }
         }
         command
@@ -269,10 +295,10 @@ fn broken(error: clap::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::settings::{Key, Kind};
+    use crate::cli::settings::Kind;
 
     #[test]
-    fn every_flag_that_sets_a_key_exists_with_the_same_default_and_the_same_words() {
+    fn every_flag_that_sets_a_key_exists_with_the_keys_default_and_words() {
         let command = command();
         let keys = Key::all();
         for (of, id, name) in FLAGS {

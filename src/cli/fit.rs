@@ -56,14 +56,11 @@ pub struct Fit {
     /// Make the observed time headway one more parameter (thw_s)
     #[arg(long)]
     with_thw: bool,
-    /// Interval that the bandwidth is searched in
-    #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true, default_value_t)]
+    #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true)]
     bandwidth_rule: BandwidthInterval,
-    /// Seed of P_valid and of the splits for M
-    #[arg(long, value_name = "N", default_value_t = FitOptions::default().seed)]
+    #[arg(long, value_name = "N")]
     seed: u64,
-    /// Draws that P_valid is counted on
-    #[arg(long, hide = true, value_name = "N", default_value_t = FitOptions::default().valid_draws)]
+    #[arg(long, hide = true, value_name = "N")]
     valid_draws: u64,
     /// Do not compare drawn with unseen scenarios
     #[arg(long)]

@@ -134,7 +134,7 @@ struct ProfileFlags {
     /// paper, paper-fit, jrc-2021, un-r157
     ///
     /// Or a TOML file of your own.
-    #[arg(long, default_value = "paper", value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE")]
     profile: String,
     /// Time step [default: the profile's]
     #[arg(long, value_name = "s")]

@@ -65,7 +65,7 @@ pub struct Sample {
     /// Crude, importance, cross-entropy, subset
     ///
     /// Crude Monte Carlo, importance sampling, cross-entropy or subset simulation. Importance sampling draws around the worst points of a pilot.
-    #[arg(long, value_name = "mc|is|ce|subset", value_enum, hide_possible_values = true, default_value_t)]
+    #[arg(long, value_name = "mc|is|ce|subset", value_enum, hide_possible_values = true)]
     pub(super) estimator: EstimatorFlag,
     /// Samples at most [default: 100000; subset: 2000 per level]
     ///
@@ -81,14 +81,11 @@ pub struct Sample {
     /// paper is 2.0, 1.8, … 0.2; sampled needs a density fitted with --with-thw. The adaptive estimators take one headway.
     #[arg(long, value_name = "s,s,…|paper|sampled")]
     thw: Option<String>,
-    /// Kind of points of mc
-    #[arg(long, value_name = "random|sobol", value_enum, hide_possible_values = true, default_value_t)]
+    #[arg(long, value_name = "random|sobol", value_enum, hide_possible_values = true)]
     pub(super) points: PointsFlag,
-    /// Kind of interval of mc
-    #[arg(long, value_name = "wilson|clopper-pearson", value_enum, hide_possible_values = true, default_value_t)]
+    #[arg(long, value_name = "wilson|clopper-pearson", value_enum, hide_possible_values = true)]
     pub(super) interval: IntervalFlag,
-    /// Level of the intervals
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.95)]
+    #[arg(long, value_name = "FRACTION")]
     pub(super) level: f64,
     /// End once half-width over estimate is at most this
     ///
@@ -98,8 +95,7 @@ pub struct Sample {
     /// End at the first look after this time: not reproducible
     #[arg(long, value_name = "s")]
     pub(super) time_limit: Option<f64>,
-    /// Worst lanes to list per model; 0 runs faster
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N")]
     worst: usize,
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none")]
@@ -107,17 +103,13 @@ pub struct Sample {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
-    /// Runs of the pilot of is
-    #[arg(long, hide = true, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, hide = true, value_name = "N")]
     pub(super) pilot: u64,
-    /// Elite fraction: worst points of the pilot that the proposal of is is fitted to
-    #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION", default_value_t = 0.02)]
+    #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION")]
     pub(super) elite_fraction: f64,
-    /// Mixture weight of one broad Gaussian over the worst points in the proposal of is; 0 is the published form
-    #[arg(long, alias = "broad", hide = true, value_name = "FRACTION", default_value_t = 0.2)]
+    #[arg(long, alias = "broad", hide = true, value_name = "FRACTION")]
     pub(super) broad_weight: f64,
-    /// Defensive mixture weight: of the density in the proposals of is and ce; 0 is the published form
-    #[arg(long, alias = "defence", hide = true, value_name = "FRACTION", default_value_t = 0.1)]
+    #[arg(long, alias = "defence", hide = true, value_name = "FRACTION")]
     pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
@@ -128,10 +120,9 @@ pub struct Sample {
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N")]
     pub(super) bootstrap: u32,
-    /// Samples of each replicate
-    #[arg(long, hide = true, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, hide = true, value_name = "N")]
     pub(super) bootstrap_samples: u64,
     /// Seed of the draws [default: 157, or the --distribution's]
     #[arg(long, value_name = "N")]

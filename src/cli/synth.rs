@@ -18,13 +18,13 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Clone, Args)]
 pub struct GeneratorFlags {
     /// Seed of the generator
-    #[arg(long, hide = true, value_name = "N", default_value_t = GeneratorOptions::default().seed)]
+    #[arg(long, hide = true, value_name = "N")]
     pub synth_seed: u64,
     /// Number of generated recordings
-    #[arg(long, value_name = "N", default_value_t = GeneratorOptions::default().recordings)]
+    #[arg(long, value_name = "N")]
     pub synth_recordings: usize,
     /// Length of each generated recording
-    #[arg(long, hide = true, value_name = "s", default_value_t = GeneratorOptions::default().duration_s)]
+    #[arg(long, hide = true, value_name = "s")]
     pub synth_duration: f64,
 }
 
