@@ -9,7 +9,7 @@ mod points;
 mod recipe;
 
 pub use points::{ATTEMPTS, Drawn, MAX_PARAMETERS, PointSource, Points};
-pub use recipe::{Lateral, NO_SLOT, Path, Quantity, Recipe, ReducedColumns};
+pub use recipe::{Lateral, NO_SLOT, Path, Recipe, ReducedColumns};
 
 use crate::model::scalar::Real;
 use crate::scenario::Tables;

@@ -10,41 +10,12 @@ use bytemuck::{Pod, Zeroable};
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
-use crate::scenario::Motion;
+use crate::scenario::parameterization::{Family, LaneChange, ParameterizationId, SpeedProfile, Variable};
+use crate::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
 
-/// A quantity that a case is made of; its code is its place in [`Recipe::slots`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Quantity {
-    /// Speed of cutter or cutting-out vehicle at t = 0, m/s; LVD: of the leader.
-    TargetSpeed,
-    /// Size of the lateral speed, m/s.
-    LateralSpeed,
-    /// Speed of the ego, m/s; LVD: that of the leader where it has no slot.
-    EgoSpeed,
-    /// Acceleration of the target over [0, T], m/s².
-    TargetAcceleration,
-    /// Speed of the vehicle ahead at t = 0, m/s.
-    LeadSpeed,
-    /// Its acceleration over [0, T], m/s².
-    LeadAcceleration,
-    /// Gap D, m.
-    LeadGap,
-    /// T, s.
-    Duration,
-    /// LVD: speed of the leader at the end, m/s.
-    FinalSpeed,
-    /// LVD: (v0 − v1)/T, m/s².
-    MeanDeceleration,
-    /// Time headway, s.
-    TimeHeadway,
-}
-
-/// Number of quantities.
-pub const QUANTITIES: usize = 11;
-/// A quantity that no parameter gives.
+/// A variable that no parameter gives.
 pub const NO_SLOT: u32 = u32::MAX;
 
 /// How speeds and lateral positions follow from a point.
@@ -59,6 +30,17 @@ pub enum Path {
     Reduced,
 }
 
+impl Path {
+    /// That of a parameterization.
+    pub fn of(id: &ParameterizationId) -> Path {
+        match id.family {
+            Family::Svd(_) => Path::Reduced,
+            Family::Kinematic(features) if features.speed == SpeedProfile::Sinusoidal => Path::Sinusoid,
+            Family::Kinematic(_) => Path::Kinematic,
+        }
+    }
+}
+
 /// Lateral motion of the principal vehicle on kinematic paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
@@ -71,6 +53,19 @@ pub enum Lateral {
     Leaving,
     /// Beside the ego's lane from the start.
     Gone,
+}
+
+impl Lateral {
+    /// That of a parameterization; unused on reduced paths.
+    pub fn of(id: &ParameterizationId) -> Lateral {
+        let is_gradual = id.features().is_some_and(|features| features.lane_change == LaneChange::Gradual);
+        match (id.category, is_gradual) {
+            (Category::CutIn, true) => Lateral::Entering,
+            (Category::CutOut, true) => Lateral::Leaving,
+            (Category::CutOut, false) => Lateral::Gone,
+            (Category::CutIn | Category::Lvd, _) => Lateral::Centred,
+        }
+    }
 }
 
 /// Columns of a reduction's vector.
@@ -117,8 +112,8 @@ pub struct Recipe {
     pub judged: u32,
     /// Last step of every lane.
     pub step_cap: u32,
-    /// Index of the parameter that gives each [`Quantity`], or [`NO_SLOT`].
-    pub slots: [u32; QUANTITIES],
+    /// Index of the parameter that gives each [`Variable`], or [`NO_SLOT`].
+    pub slots: [u32; Variable::ALL.len()],
     /// Columns of the reduction.
     pub columns: ReducedColumns,
     /// Least valid value of each parameter.

@@ -15,7 +15,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::cases::{Records, StudyCases, parameterizations};
 use crate::run::study::unit_record;
-use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
+use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, Tables, problem_of};
 use crate::support::hex::hex;
 use crate::{Error, Place, Result};
@@ -50,7 +50,7 @@ pub(crate) struct BlockHead {
 impl BlockHead {
     /// Of the decomposition, what cases are made with.
     pub fn new(category: Category, units: u64, reduction: Option<&Reduction>) -> BlockHead {
-        let used = directions_used(category);
+        let used = ParameterizationId::max_coefficients(category);
         let basis = reduction.map(|reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();
             let directions = directions.into_iter().take(used).collect();
@@ -58,12 +58,6 @@ impl BlockHead {
         });
         BlockHead { category, units, basis }
     }
-}
-
-/// Directions of a decomposition that the cases of a category need.
-fn directions_used(category: Category) -> usize {
-    let used = |id: ParameterizationId| if let Kind::Svd(directions) = id.kind { directions } else { 0 };
-    ParameterizationId::of(category).map(used).max().unwrap_or(0)
 }
 
 /// The source of a plan without cases.
@@ -128,11 +122,11 @@ impl StudyHead {
             let (from, end) = (held.first.clamp(first, first + block.units), first + block.units);
             let names: Vec<String> =
                 records.by_ref().take((held.units().end.clamp(from, end) - from) as usize).collect();
-            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key);
+            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
             blocks.push(Block {
                 category: block.category,
                 units: Units::Held(block.units, from - first, names.into()),
-                variants: std::iter::once("S").chain(variants).map(str::to_owned).collect(),
+                variants: std::iter::once("S".to_owned()).chain(variants).collect(),
                 first_unit: 0,
                 first_lane: 0,
             });
@@ -229,7 +223,7 @@ impl StudyHead {
             return wrong("a headway is out of range (0 to 1e6)");
         }
         for block in &self.blocks {
-            let used = directions_used(block.category);
+            let used = ParameterizationId::max_coefficients(block.category);
             if block.basis.as_ref().is_some_and(|basis| basis.directions.len() != used) {
                 return wrong("a decomposition does not have the directions of its parameterizations");
             }
