@@ -159,11 +159,11 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MEAN_DECELERATION", Variable::MeanDeceleration as u32),
         ("TIME_HEADWAY", Variable::TimeHeadway as u32),
         ("QUANTITIES", Variable::ALL.len() as u32),
-        ("PATH_SINUSOID", generated::Path::Sinusoid as u32),
-        ("PATH_REDUCED", generated::Path::Reduced as u32),
-        ("LATERAL_ENTERING", generated::Lateral::Entering as u32),
-        ("LATERAL_LEAVING", generated::Lateral::Leaving as u32),
-        ("LATERAL_GONE", generated::Lateral::Gone as u32),
+        ("PATH_SINUSOID", generated::CasePath::Sinusoid as u32),
+        ("PATH_REDUCED", generated::CasePath::Reduced as u32),
+        ("LATERAL_ENTERING", generated::LateralPath::Entering as u32),
+        ("LATERAL_LEAVING", generated::LateralPath::Leaving as u32),
+        ("LATERAL_GONE", generated::LateralPath::Gone as u32),
         ("NEVER", NEVER),
     ] {
         assert_eq!(constant(&module, name), value, "{name}");

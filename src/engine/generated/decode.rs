@@ -6,7 +6,7 @@ use crate::model::scalar::Real;
 use crate::scenario::parameterization::Variable;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
-use super::recipe::{Lateral, NO_SLOT, Path, Recipe};
+use super::recipe::{CasePath, LateralPath, NO_SLOT, Recipe};
 
 /// An event this close behind a step, in steps, counts as at the step.
 const STEP_TOLERANCE: f64 = 1e-4;
@@ -30,7 +30,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
             return false;
         }
     }
-    if recipe.path() == Path::Reduced {
+    if recipe.path() == CasePath::Reduced {
         let columns = &recipe.columns;
         let duration = column::<f32>(recipe, basis, point, columns.duration);
         let ego_speed = column::<f32>(recipe, basis, point, columns.ego_speed);
@@ -54,7 +54,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
 /// The case of a valid point; series go to the end of `tables`.
 pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
     let number = |value: f32| R::from_f64(value.into());
-    let is_reduced = recipe.path() == Path::Reduced;
+    let is_reduced = recipe.path() == CasePath::Reduced;
     let (mut principal, mut ahead) = (Motion::resting(), Motion::resting());
     let (ego_speed, lead_gap, horizon);
     if is_reduced {
@@ -77,7 +77,7 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
         if recipe.decelerates != 0 {
             let (end, deceleration) = (value(Variable::FinalSpeed), value(Variable::MeanDeceleration));
             duration = (initial - end).exact_div(deceleration);
-            if recipe.path() == Path::Sinusoid {
+            if recipe.path() == CasePath::Sinusoid {
                 sinusoidal_speed(recipe, initial, end, duration, &mut principal, tables);
             } else {
                 kinematic_speed(recipe, initial, -deceleration, duration, &mut principal);
@@ -169,15 +169,15 @@ fn kinematic_speed<R: Real>(recipe: &Recipe, initial: R, acceleration: R, durati
 /// Lateral motion at constant speed; gives the time of the lane change, s.
 fn kinematic_lateral<R: Real>(recipe: &Recipe, lateral_speed: R, motion: &mut Motion<R>) -> R {
     let (dt, way) = (R::from_f64(recipe.dt.into()), R::from_f64(recipe.lane_change.into()));
-    if recipe.lateral == Lateral::Gone as u32 {
+    if recipe.lateral == LateralPath::Gone as u32 {
         motion.lateral_initial = way;
         motion.lateral_end = way;
     }
-    if recipe.lateral == Lateral::Gone as u32 || recipe.lateral == Lateral::Centred as u32 {
+    if recipe.lateral == LateralPath::Gone as u32 || recipe.lateral == LateralPath::Centred as u32 {
         return R::ZERO;
     }
     let change = way.exact_div(lateral_speed);
-    let enters = recipe.lateral == Lateral::Entering as u32;
+    let enters = recipe.lateral == LateralPath::Entering as u32;
     let per_step = lateral_speed * dt;
     motion.lateral_until = steps_up(change * R::from_f64(recipe.inverse_dt.into())).saturating_sub(1);
     motion.lateral_initial = if enters { way } else { R::ZERO };

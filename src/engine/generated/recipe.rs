@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
-use crate::scenario::parameterization::{Family, LaneChange, ParameterizationId, SpeedProfile, Variable};
+use crate::scenario::parameterization::{LaneChange, ParameterizationId, SpeedProfile, Variable};
 use crate::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
@@ -21,7 +21,7 @@ pub const NO_SLOT: u32 = u32::MAX;
 /// How speeds and lateral positions follow from a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Path {
+pub enum CasePath {
     /// Constant speeds and accelerations.
     Kinematic,
     /// LVD ii: half a cosine.
@@ -30,13 +30,13 @@ pub enum Path {
     Reduced,
 }
 
-impl Path {
+impl CasePath {
     /// That of a parameterization.
-    pub fn of(id: &ParameterizationId) -> Path {
-        match id.family {
-            Family::Svd(_) => Path::Reduced,
-            Family::Kinematic(features) if features.speed == SpeedProfile::Sinusoidal => Path::Sinusoid,
-            Family::Kinematic(_) => Path::Kinematic,
+    pub fn of(id: &ParameterizationId) -> CasePath {
+        match id.features().map(|features| features.speed) {
+            None => CasePath::Reduced,
+            Some(SpeedProfile::Sinusoidal) => CasePath::Sinusoid,
+            Some(SpeedProfile::Constant | SpeedProfile::ConstantAcceleration) => CasePath::Kinematic,
         }
     }
 }
@@ -44,7 +44,7 @@ impl Path {
 /// Lateral motion of the principal vehicle on kinematic paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Lateral {
+pub enum LateralPath {
     /// In the middle of the ego's lane.
     Centred,
     /// From the side into the ego's lane at constant lateral speed.
@@ -55,15 +55,15 @@ pub enum Lateral {
     Gone,
 }
 
-impl Lateral {
+impl LateralPath {
     /// That of a parameterization; unused on reduced paths.
-    pub fn of(id: &ParameterizationId) -> Lateral {
+    pub fn of(id: &ParameterizationId) -> LateralPath {
         let is_gradual = id.features().is_some_and(|features| features.lane_change == LaneChange::Gradual);
         match (id.category, is_gradual) {
-            (Category::CutIn, true) => Lateral::Entering,
-            (Category::CutOut, true) => Lateral::Leaving,
-            (Category::CutOut, false) => Lateral::Gone,
-            (Category::CutIn | Category::Lvd, _) => Lateral::Centred,
+            (Category::CutIn, true) => LateralPath::Entering,
+            (Category::CutOut, true) => LateralPath::Leaving,
+            (Category::CutOut, false) => LateralPath::Gone,
+            (Category::CutIn | Category::Lvd, _) => LateralPath::Centred,
         }
     }
 }
@@ -96,9 +96,9 @@ pub struct ReducedColumns {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recipe {
-    /// [`Path`] as a number.
+    /// [`CasePath`] as a number.
     pub path: u32,
-    /// [`Lateral`] as a number.
+    /// [`LateralPath`] as a number.
     pub lateral: u32,
     /// Parameters of a point.
     pub dimensions: u32,
@@ -153,11 +153,11 @@ unsafe impl Pod for Recipe {}
 
 impl Recipe {
     /// How motions follow from a point.
-    pub fn path(&self) -> Path {
+    pub fn path(&self) -> CasePath {
         match self.path {
-            0 => Path::Kinematic,
-            1 => Path::Sinusoid,
-            _ => Path::Reduced,
+            0 => CasePath::Kinematic,
+            1 => CasePath::Sinusoid,
+            _ => CasePath::Reduced,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::engine::attention_rules;
 use crate::engine::generated::{
-    Generator, Lateral, MAX_PARAMETERS, NO_SLOT, Path, PointSource, Points, Recipe, ReducedColumns,
+    CasePath, Generator, LateralPath, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe, ReducedColumns,
 };
 use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::model::scalar::Real;
@@ -136,8 +136,8 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
     let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
     Ok(Recipe {
-        path: Path::of(id) as u32,
-        lateral: Lateral::of(id) as u32,
+        path: CasePath::of(id) as u32,
+        lateral: LateralPath::of(id) as u32,
         dimensions: space.dimensions() as u32,
         pair: u32::from(pair),
         decelerates: u32::from(space.dimension_of(Variable::MeanDeceleration).is_some()),

@@ -62,6 +62,16 @@ impl Values {
 }
 
 impl Kinematic {
+    /// Whether scenarios of the category can have these features.
+    pub(super) fn exists_in(self, category: Category) -> bool {
+        match category {
+            Category::CutIn | Category::CutOut => {
+                self.lane_change != LaneChange::None && self.speed != SpeedProfile::Sinusoidal
+            }
+            Category::Lvd => self.lane_change == LaneChange::None && self.speed != SpeedProfile::Constant,
+        }
+    }
+
     /// The variables in the order of a point's numbers.
     pub(super) fn variables(self, category: Category) -> Vec<Variable> {
         let decelerates = category == Category::Lvd;

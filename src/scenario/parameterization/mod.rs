@@ -30,7 +30,7 @@ pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
 use crate::scenario::{Case, Category, Scenario};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// How a parameterization describes a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -173,6 +173,21 @@ impl ParameterizationId {
         self.features().is_none_or(|features| features.speed == SpeedProfile::Sinusoidal)
     }
 
+    /// Refuses features that the category does not have.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn validate(&self) -> Result<()> {
+        if self.features().is_none_or(|features| features.exists_in(self.category)) {
+            return Ok(());
+        }
+        Err(Error::usage(
+            Place::item(self.name()),
+            format!("{} has no {}", self.category.label(), self.description()),
+            "an LVD changes its speed and stays in its lane; a sinusoid belongs to an LVD",
+        ))
+    }
+
     /// A mined scenario as a point; one by SVD needs its decomposition.
     ///
     /// # Errors
@@ -184,7 +199,7 @@ impl ParameterizationId {
         options: &ParameterizationOptions,
         reduction: Option<&Reduction>,
     ) -> Result<Vec<f64>> {
-        self.check_category(scenario)?;
+        self.check_scenario(scenario)?;
         match self.family {
             Family::Kinematic(_) => self.variables().into_iter().map(|v| v.of(scenario, options)).collect(),
             Family::Svd(d) => self.fitted(reduction)?.coefficients(scenario, d),
@@ -204,6 +219,7 @@ impl ParameterizationId {
         options: &ParameterizationOptions,
         reduction: Option<&Reduction>,
     ) -> Result<Case> {
+        self.validate()?;
         match self.family {
             Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
             // A point has no side: its lateral series stays as it is.
@@ -225,14 +241,15 @@ impl ParameterizationId {
         options: &ParameterizationOptions,
         reduction: Option<&Reduction>,
     ) -> Result<Case> {
-        self.check_category(scenario)?;
+        self.check_scenario(scenario)?;
         match self.family {
             Family::Kinematic(features) => features.replay(scenario, grid.into(), options),
             Family::Svd(d) => self.fitted(reduction)?.case(scenario, d, grid),
         }
     }
 
-    fn check_category(&self, scenario: &Scenario) -> Result<()> {
+    fn check_scenario(&self, scenario: &Scenario) -> Result<()> {
+        self.validate()?;
         if scenario.category == self.category {
             return Ok(());
         }
@@ -241,5 +258,64 @@ impl ParameterizationId {
 
     fn fitted<'a>(&self, reduction: Option<&'a Reduction>) -> Result<&'a Reduction> {
         reduction.ok_or_else(|| Error::Internal(format!("{} needs a decomposition", self.name())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    #[test]
+    fn counts_names_and_descriptions_follow_from_the_features() {
+        let told = |category, key| {
+            let id = ParameterizationId::find(category, key).unwrap();
+            let parameters = id.parameters(&ParameterizationOptions::default());
+            let names: Vec<String> = parameters.into_iter().map(|p| p.name).collect();
+            format!("{}: {}: {}", id.parameter_count(), id.description(), names.join(" "))
+        };
+        let accelerations = "constant accelerations, instantaneous lane change";
+        for (category, key, expected) in [
+            (
+                Category::CutIn,
+                "2",
+                "4: constant acceleration, constant lateral speed: \
+                 v_target_mps lateral_speed_mps v_ego_mps acceleration_target_mps2 duration_s",
+            ),
+            (Category::CutIn, "3", "2: constant speed, instantaneous lane change: v_target_mps v_ego_mps"),
+            (Category::CutIn, "5", "3: SVD, 3 coefficients: c1 c2 c3"),
+            (
+                Category::CutOut,
+                "d",
+                &format!(
+                    "6: {accelerations}: v_target_mps v_ego_mps v_lead_mps gap_lead_m acceleration_target_mps2 \
+                     acceleration_lead_mps2 duration_s"
+                ),
+            ),
+            (Category::Lvd, "i", "3: constant deceleration: v0_mps v1_mps mean_deceleration_mps2"),
+            (Category::Lvd, "ii", "3: sinusoidal deceleration: v0_mps v1_mps mean_deceleration_mps2"),
+        ] {
+            assert_eq!(told(category, key), expected);
+        }
+    }
+
+    #[test]
+    fn an_instance_that_no_registry_lists_encodes_and_decodes() {
+        let options = ParameterizationOptions::default();
+        let traffic = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
+        let scenarios = mine_generated(&traffic, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let kept: Vec<&Scenario> = scenarios.iter().filter(|s| s.kept && s.category == Category::Lvd).collect();
+        let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
+        let six =
+            ParameterizationId { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
+        let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
+        assert_eq!(point.len(), six.parameters(&options).len());
+        let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();
+        assert_eq!(decoded, six.case(kept[0], 0.04, &options, Some(&reduction)).unwrap());
+        assert!(six.encode(kept[0], &options, None).is_err(), "without a decomposition");
+        let features = Kinematic { speed: SpeedProfile::Constant, lane_change: LaneChange::None };
+        let steady = ParameterizationId { family: Family::Kinematic(features), ..six };
+        assert!(steady.encode(kept[0], &options, None).is_err(), "an LVD that does not decelerate");
     }
 }
