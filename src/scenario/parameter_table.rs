@@ -5,9 +5,8 @@ use serde_json::{Map, Value};
 
 use super::case_parameters::{CaseParameters, at_least};
 use super::check::name;
-use super::columns::{Chosen, HELP, choose};
+use super::columns::{Chosen, HELP, choose, number};
 use super::found::{ScenarioFile, ScenariosRead};
-use super::leaves::number;
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
