@@ -4,8 +4,8 @@ use super::options::{AfterDuration, LateralStart, ParameterizationOptions};
 use super::parameter::Variable;
 use super::series::{TimeGrid, accelerated, at, steps_of};
 use super::sizes::Sizes;
+use crate::Result;
 use crate::scenario::{Case, Category, Lateral, Scenario, Speed};
-use crate::{Error, Result};
 
 /// How the speeds of the vehicles other than the ego change over [0, T].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -131,11 +131,7 @@ impl Kinematic {
         grid: TimeGrid,
         options: &ParameterizationOptions,
     ) -> Result<Case> {
-        let variables = self.variables(category);
-        if point.len() != variables.len() {
-            return Err(Error::Internal(format!("{} numbers for {} variables", point.len(), variables.len())));
-        }
-        let values = Values::of_point(&variables, point);
+        let values = Values::of_point(&self.variables(category), point);
         self.case(category, &values, options.lane_change_m, sizes, grid, options)
     }
 

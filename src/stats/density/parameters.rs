@@ -31,8 +31,8 @@ pub struct ParameterSpace {
     variables: Vec<Variable>,
     parameters: Vec<Parameter>,
     has_thw: bool,
-    /// Values that follow from several parameters and are bounded too.
-    derived: Vec<(Variable, Parameter)>,
+    /// Bounded values that follow from several parameters: a column of the decomposition, or T of a deceleration.
+    derived: Vec<(Option<usize>, Parameter)>,
 }
 
 /// Why a point is outside the valid region.
@@ -110,12 +110,15 @@ impl ParameterSpace {
         let parameter = |variable: Variable| variable.parameter(id.category, options);
         let mut parameters = id.parameters(options);
         parameters.extend(with_thw.then(|| parameter(Variable::TimeHeadway)));
-        let is_derived = |variable: &Variable| match &reduction {
-            Some(reduction) => reduction.column(*variable).is_some(),
-            None => *variable == Variable::Duration && variables.contains(&Variable::MeanDeceleration),
+        let derived = match &reduction {
+            Some(reduction) => {
+                let bounded = [Variable::Duration, Variable::EgoSpeed, Variable::LeadGap];
+                let column = |variable| Some((Some(reduction.column(variable)?), parameter(variable)));
+                bounded.into_iter().filter_map(column).collect()
+            }
+            None if variables.contains(&Variable::MeanDeceleration) => vec![(None, parameter(Variable::Duration))],
+            None => Vec::new(),
         };
-        let bounded = [Variable::Duration, Variable::EgoSpeed, Variable::LeadGap];
-        let derived = bounded.into_iter().filter(is_derived).map(|v| (v, parameter(v))).collect();
         let options = options.clone();
         Ok(ParameterSpace { id, options, reduction, variables, parameters, has_thw: with_thw, derived })
     }
@@ -209,13 +212,10 @@ impl ParameterSpace {
             });
         }
         self.parameters.iter().zip(point).try_for_each(|(parameter, value)| in_bounds(parameter, *value))?;
-        for (variable, parameter) in &self.derived {
-            let value = match &self.reduction {
-                Some(reduction) => {
-                    let column = reduction.column(*variable);
-                    column.map_or(f64::NAN, |column| reduction.rebuilt_column(self.without_thw(point), column))
-                }
-                None => self.deceleration_time(point)?,
+        for (column, parameter) in &self.derived {
+            let value = match (&self.reduction, column) {
+                (Some(reduction), Some(column)) => reduction.rebuilt_column(self.without_thw(point), *column),
+                _ => self.deceleration_time(point)?,
             };
             in_bounds(parameter, value)?;
         }
