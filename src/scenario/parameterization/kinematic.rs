@@ -66,9 +66,13 @@ impl Kinematic {
     pub(super) fn exists_in(self, category: Category) -> bool {
         match category {
             Category::CutIn | Category::CutOut => {
-                self.lane_change != LaneChange::None && self.speed != SpeedProfile::Sinusoidal
+                self.lane_change != LaneChange::None
+                    && matches!(self.speed, SpeedProfile::Constant | SpeedProfile::ConstantAcceleration)
             }
-            Category::Lvd => self.lane_change == LaneChange::None && self.speed != SpeedProfile::Constant,
+            Category::Lvd => {
+                self.lane_change == LaneChange::None
+                    && matches!(self.speed, SpeedProfile::ConstantAcceleration | SpeedProfile::Sinusoidal)
+            }
         }
     }
 
