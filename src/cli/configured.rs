@@ -157,7 +157,7 @@ impl Configured {
             return Ok(());
         }
         match Profile::load(&self.settings.run.profile) {
-            Err(Error::Usage { place, problem, help }) if place.item.as_deref() == Some("--profile") => {
+            Err(Error::Usage { place, problem, help }) if *place == Place::option("profile") => {
                 Err(Error::usage(setting.origin.place(&setting.key.name), problem, help))
             }
             other => other.map(drop),

@@ -35,7 +35,7 @@ pub fn start_log(verbosity: Verbosity) {
         .log_internal_errors(false)
         // One message is one line, whatever a file is called.
         .fmt_fields(debug_fn(|out, field, value| match field.name() {
-            "message" => write!(out, "{}", shown_in_line(&format!("{value:?}"))),
+            "message" => write!(out, "{}", shown_in_line(&with_flags(&format!("{value:?}")))),
             name => write!(out, "{name}={}", shown_in_line(&format!("{value:?}"))),
         }))
         .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
@@ -82,10 +82,36 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar
 }
 
+/// A text of the library with flags for its options: `--dt` for option `dt`, `--backend cpu` for option `backend = cpu`.
+fn with_flags(text: &str) -> String {
+    let (mut out, mut rest) = (String::with_capacity(text.len()), text);
+    while let Some((before, after)) = rest.split_once("option `") {
+        let flag = after.split_once('`').map(|(option, rest)| {
+            let (name, value) = option.split_once(" = ").map_or((option, None), |(name, value)| (name, Some(value)));
+            (name, value, rest)
+        });
+        let is_field = |name: &str| !name.is_empty() && name.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
+        out += before;
+        rest = match flag {
+            Some((name, value, rest)) if is_field(name) => {
+                out += "--";
+                out += &name.replace('_', "-");
+                value.iter().for_each(|value| out.extend([" ", value]));
+                rest
+            }
+            _ => {
+                out += "option `";
+                after
+            }
+        };
+    }
+    out + rest
+}
+
 /// Draws an error with its help on stderr.
 pub fn complain(error: &Error) {
-    let help = error.help().map(|help| shown(&help).into_owned());
-    let report = miette::Report::new(Drawn { text: shown(&error.to_string()).into_owned(), help });
+    let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
+    let report = miette::Report::new(Drawn { text: shown(&with_flags(&error.to_string())).into_owned(), help });
     let mut stderr = io::stderr().lock();
     // Where stderr is gone there is nobody to tell.
     let _ = writeln!(stderr, "{report:?}");
@@ -94,12 +120,9 @@ pub fn complain(error: &Error) {
 /// Tells what is wrong with the command line, or the help that was asked for.
 pub fn refuse(error: &clap::Error) {
     let text = error.to_string();
-    let safe = shown(&text);
+    let safe = shown(&with_flags(&text)).into_owned();
     // A closed pipe on `--help | head` is success.
-    let _ = match &safe {
-        std::borrow::Cow::Borrowed(_) => error.print(),
-        std::borrow::Cow::Owned(safe) => write!(io::stderr().lock(), "{safe}"),
-    };
+    let _ = if safe == text { error.print() } else { write!(io::stderr().lock(), "{safe}") };
 }
 
 /// A library error as miette draws it.
@@ -113,5 +136,22 @@ struct Drawn {
 impl miette::Diagnostic for Drawn {
     fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
         self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_flags;
+
+    #[test]
+    fn an_option_of_the_library_is_a_flag_on_the_command_line() {
+        for (text, shown) in [
+            ("option `accept_implausible` uses it", "--accept-implausible uses it"),
+            ("use option `backend = cpu`, or split", "use --backend cpu, or split"),
+            ("option `x`, option `y`", "--x, --y"),
+            ("there is no option `Ünknown`, nor option `open", "there is no option `Ünknown`, nor option `open"),
+        ] {
+            assert_eq!(with_flags(text), shown);
+        }
     }
 }

@@ -11,15 +11,16 @@ use super::dry_run::{BUDGET, DryRun, Part};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::engine::{Backend, CpuBackend, Executor, Forecast, SweepSummary, Verdicts, Wanted, forecast};
+use crate::engine::{Backend, CpuBackend, Executor, Forecast, Verdicts, Wanted, forecast};
 use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
-use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::report::map::{Against, MapHost, MapReport, MappedGrid};
+use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
-use crate::run::grid::presets::{self, Preset};
-use crate::run::grid::{CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MAX_PANELS, PARAMETERS, Parameter};
+use crate::run::grid::{
+    self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapResult,
+    PARAMETERS, Parameter, presets,
+};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
@@ -129,24 +130,15 @@ impl Map {
         })?;
         let criterion = self.criterion.get()?;
         let profile = self.profile()?;
-        let against = self.against.as_deref().map(|text| against(text, self.dt)).transpose()?;
-        let is_itself = match &against {
-            Some(Against::Profile(other)) => **other == profile,
-            Some(Against::Model(model)) => matches!(&self.models.list()?[..], [one] if one == model),
-            None => false,
+        let options = MapOptions {
+            grids: self.grids(category)?,
+            models: self.models.named()?,
+            criterion,
+            against: self.against.as_deref().map(|text| against(text, self.dt)).transpose()?,
         };
-        if is_itself {
-            let problem = format!(
-                "`{}` is what is run anyway: there is nothing to compare",
-                self.against.as_deref().unwrap_or("")
-            );
-            return Err(Error::usage(Place::item("--against"), problem, "name another model or profile"));
-        }
         let started = Instant::now();
-        let mut planned = Vec::new();
-        for preset in self.grids(category, &profile)? {
-            planned.push(self.plan(preset, &profile, against.as_ref())?);
-        }
+        let against = options.against.clone();
+        let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let wide = self.reference.then(CpuBackend::reference);
@@ -155,33 +147,13 @@ impl Map {
             None => opened.backend(),
         };
         if self.dry_run {
-            return forecast_maps(&planned, backend, self.format);
+            return forecast_map(&map, backend, self.format);
         }
         let folder = RunFolder::open(&self.out, MAP_RECORD)?;
         let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
-        let is_jrc = self.preset.is_some()
-            && criterion == Criterion::Collision
-            && profile == Profile::load(presets::JRC_PROFILE)?;
-        let cells: u64 = planned.iter().map(|(_, plan, _)| plan.grid.cell_count() as u64).sum();
-        let bar = console::progress(verbosity, cells, "sweeping");
+        let bar = console::progress(verbosity, map.cell_count(), "sweeping");
         let started = Instant::now();
-        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        let mut grids = Vec::new();
-        for (preset, plan, other) in planned {
-            let map = swept(&plan, &executor, &mut summary)?;
-            let other = match other {
-                Some((name, plan)) => {
-                    let map = swept(&plan, &executor, &mut summary)?;
-                    Some((name, plan, map))
-                }
-                None => None,
-            };
-            bar.inc(plan.grid.cell_count() as u64);
-            let known = |model: &ModelId| if is_jrc { preset.known(*model) } else { None };
-            let known_percent = plan.models.iter().map(known).collect();
-            let is_chosen_to_match = preset.is_chosen_to_match && is_jrc;
-            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other });
-        }
+        let MapResult { grids, summary } = map.run(&executor, |cells| bar.inc(cells))?;
         bar.finish_and_clear();
         let host = MapHost {
             backend: backend.describe(),
@@ -210,17 +182,14 @@ impl Map {
         with_dt(Profile::load(self.profile.as_deref().unwrap_or(otherwise))?, self.dt)
     }
 
-    /// The grids that the flags name, with their models.
-    fn grids(&self, category: Category, profile: &Profile) -> Result<Vec<Preset>> {
-        let mut grids = match self.preset.as_deref() {
-            Some("jrc") => presets::jrc(category, profile)?,
+    /// The grids that the flags name.
+    fn grids(&self, category: Category) -> Result<MapGrids> {
+        match self.preset.as_deref() {
+            Some("jrc") => Ok(MapGrids::Jrc(category)),
             Some(unknown) => {
                 let problem = format!("there is no preset `{unknown}`");
-                return Err(Error::usage(
-                    Place::item("--preset"),
-                    problem,
-                    format!("presets: {}", presets::NAMES.join(", ")),
-                ));
+                let help = format!("presets: {}", presets::NAMES.join(", "));
+                Err(Error::usage(Place::item("--preset"), problem, help))
             }
             None => {
                 let parts = match &self.distribution {
@@ -228,14 +197,9 @@ impl Map {
                     None => self.own_grid(category)?,
                 };
                 self.judge(&parts)?;
-                let (grid, known_percent) = (Grid::new(parts)?, Vec::new());
-                vec![Preset { grid, models: ModelId::ALL.to_vec(), known_percent, is_chosen_to_match: false }]
+                Grid::new(parts).map(MapGrids::Own)
             }
-        };
-        if let Some(models) = self.models.named()? {
-            grids.iter_mut().for_each(|preset| preset.models = models.clone());
         }
-        Ok(grids)
     }
 
     /// Looks at every value, and tells what is doubtful.
@@ -353,51 +317,23 @@ impl Map {
             panel_rows: Some(rows),
         })
     }
-
-    /// The plan of a grid, with the model it is compared with, and the plan under the other profile.
-    fn plan(&self, mut preset: Preset, profile: &Profile, against: Option<&Against>) -> Result<Planned> {
-        if let Some(Against::Model(model)) = against
-            && !preset.models.contains(model)
-        {
-            preset.models.push(*model);
-            preset.models.sort();
-        }
-        let other = match against {
-            Some(Against::Profile(other)) => {
-                // The same cells: a preset's cases follow the other profile's way of making them.
-                let category = preset.grid.category();
-                let same = self.grids(category, other)?.into_iter().find(|p| p.grid.name() == preset.grid.name());
-                let grid = same.map_or_else(|| preset.grid.clone(), |p| p.grid);
-                Some((other.name.clone(), GridPlan::new(grid, other, &preset.models)?))
-            }
-            _ => None,
-        };
-        let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
-        Ok((preset, plan, other))
-    }
 }
 
-/// A grid, its plan, and its name and plan under another profile.
-type Planned = (Preset, GridPlan, Option<(String, GridPlan)>);
-
 /// What the maps would be.
-fn forecast_maps(planned: &[Planned], backend: &dyn Backend, format: FormatFlag) -> Result<Exit> {
-    let plans = || {
-        planned.iter().flat_map(|(_, plan, other)| {
-            let other = other.iter().map(|(name, plan)| (format!("under {name}"), plan));
-            std::iter::once((String::new(), plan)).chain(other)
-        })
-    };
-    let all: u64 = plans().map(|(_, plan)| plan.lane_count()).sum();
-    let (mut whole, mut parts) = (Forecast::default(), Vec::new());
-    for (what, plan) in plans() {
-        for part in &plan.parts {
-            let budget = BUDGET.mul_f64(part.plan.lane_count() as f64 / all.max(1) as f64);
-            whole.add(&forecast(&part.plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
-        }
-        let (of, units, lanes) = (plan.grid.name().to_owned(), plan.grid.cell_count() as u64, plan.lane_count());
-        parts.push(Part { of, what, units, lanes });
+fn forecast_map(map: &grid::Map, backend: &dyn Backend, format: FormatFlag) -> Result<Exit> {
+    let all = map.lane_count();
+    let mut whole = Forecast::default();
+    for plan in map.lane_plans() {
+        let budget = BUDGET.mul_f64(plan.lane_count() as f64 / all.max(1) as f64);
+        whole.add(&forecast(plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
     }
+    let part = |(other, plan): (Option<&str>, &GridPlan)| Part {
+        of: plan.grid.name().to_owned(),
+        what: other.map_or(String::new(), |name| format!("under {name}")),
+        units: plan.grid.cell_count() as u64,
+        lanes: plan.lane_count(),
+    };
+    let parts = map.plans().map(part).collect();
     DryRun {
         data: "the grids' own cases".to_owned(),
         parts,
@@ -415,12 +351,6 @@ fn forecast_maps(planned: &[Planned], backend: &dyn Backend, format: FormatFlag)
     Ok(Exit::Ok)
 }
 
-fn swept(plan: &GridPlan, executor: &Executor, summary: &mut SweepSummary) -> Result<GridMap> {
-    let (map, of_map) = GridMap::sweep(plan, executor)?;
-    summary.add(&of_map);
-    Ok(map)
-}
-
 fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {
     match dt {
         Some(dt) => profile.with_dt(dt),
@@ -434,7 +364,7 @@ fn against(text: &str, dt: Option<f64>) -> Result<Against> {
         return Ok(Against::Model(model));
     }
     let profile = Profile::load(text).map_err(|error| match error {
-        Error::Usage { place, problem: _, help } if place.item.as_deref() == Some("--profile") => {
+        Error::Usage { place, problem: _, help } if *place == Place::option("profile") => {
             let problem = format!("there is neither a driver model nor a profile `{text}`");
             Error::usage(Place::item("--against"), problem, format!("{help}. Models: {}", ModelId::names()))
         }

@@ -28,18 +28,18 @@ impl FromStr for DeviceName {
         let text = text.trim();
         let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep verify devices` lists them";
         if text.is_empty() {
-            return Err(Error::usage(Place::item("--device"), "no device is named", help));
+            return Err(Error::usage(Place::option("device"), "no device is named", help));
         }
         if text.bytes().all(|b| b.is_ascii_digit()) {
             let index = text.parse().map_err(|_| {
-                Error::usage(Place::item("--device"), format!("`{text}` is larger than any index"), help)
+                Error::usage(Place::option("device"), format!("`{text}` is larger than any index"), help)
             })?;
             return Ok(DeviceName::Index(index));
         }
         if text.get(..4).is_some_and(|prefix| prefix.eq_ignore_ascii_case("pci:")) {
             let bus = pci_bus_id(text).ok_or_else(|| {
                 let problem = format!("`{text}` is no PCI bus id such as pci:0000:65:00.0");
-                Error::usage(Place::item("--device"), problem, help)
+                Error::usage(Place::option("device"), problem, help)
             })?;
             return Ok(DeviceName::Pci(bus));
         }
@@ -81,9 +81,9 @@ impl FromStr for BackendChoice {
             "cpu" => Ok(BackendChoice::Cpu),
             "gpu" => Ok(BackendChoice::Gpu),
             _ => Err(Error::usage(
-                Place::item("--backend"),
+                Place::option("backend"),
                 format!("there is no backend `{text}`"),
-                "write auto, cpu or gpu; a certain device: --device, see `lanesweep verify devices`",
+                "write auto, cpu or gpu; a certain device: option `device`, see `lanesweep verify devices`",
             )),
         }
     }
@@ -97,8 +97,8 @@ impl BackendChoice {
     pub fn check(self, device: Option<&DeviceName>) -> Result<()> {
         match (self, device) {
             (BackendChoice::Cpu, Some(device)) => Err(Error::usage(
-                Place::item("--device"),
-                format!("`{device}` is named, but --backend cpu uses no device"),
+                Place::option("device"),
+                format!("`{device}` is named, but option `backend = cpu` uses no device"),
                 "leave out one of the two",
             )),
             _ => Ok(()),

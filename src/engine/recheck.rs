@@ -166,7 +166,7 @@ impl<'p> Recheck<'p> {
             ),
             RecheckBy::Nothing | RecheckBy::Lanes => format!(
                 "lane {lane}: {backend} says {found}, the CPU {expected}. Nothing that this device computed can be \
-                 trusted; `lanesweep verify` tells how often it errs, --backend cpu computes without it"
+                 trusted; `lanesweep verify` tells how often it errs, option `backend = cpu` computes without it"
             ),
         })
     }

@@ -194,9 +194,9 @@ mod tests {
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
     use crate::run::sampling::{SampleSource, generator_of};
-    use crate::run::study::Records;
     use crate::run::study::plan_file::{BlockHead, StudyHead};
     use crate::run::study::unit_record;
+    use crate::run::study::unit_record::UnitRecords;
     use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
     use crate::scenario::{Category, Scenario};
     use crate::stats::density::{Mixture, ParameterSpace};
@@ -247,7 +247,7 @@ mod tests {
     /// Two scenarios of every category with every parameterization.
     fn study(profile: &Profile) -> LanePlan {
         let options = ParameterizationOptions::default();
-        let (mut held, mut blocks, mut record) = (Records::default(), Vec::new(), Vec::new());
+        let (mut held, mut blocks, mut record) = (UnitRecords::default(), Vec::new(), Vec::new());
         for category in Category::ALL {
             for number in 0..2 {
                 record.clear();

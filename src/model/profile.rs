@@ -142,7 +142,7 @@ impl Profile {
         if !path.exists() && !name_or_path.ends_with(".toml") {
             let near = nearest(name_or_path, Profile::names(), 0.0).unwrap_or("paper");
             return Err(Error::usage(
-                Place::item("--profile"),
+                Place::option("profile"),
                 format!("there is no profile `{name_or_path}`"),
                 format!(
                     "did you mean `{near}`? Profiles: {}; or give the path of a TOML file",
@@ -215,7 +215,9 @@ impl Profile {
         Err(Error::usage(
             Place::item("`frame.dt_s`"),
             format!("a time step of {} s is too long: `{key}` allows {longest_s} s", self.frame.dt_s),
-            format!("use a time step (--dt) of at most {longest_s} s, or leave out the driver model that needs it"),
+            format!(
+                "use a time step (option `dt`) of at most {longest_s} s, or leave out the driver model that needs it"
+            ),
         ))
     }
 
@@ -223,10 +225,10 @@ impl Profile {
     pub fn with_dt(mut self, dt_s: f64) -> Result<Profile> {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             let problem = format!("{dt_s} s is no time step");
-            return Err(Error::usage(Place::item("--dt"), problem, "give seconds above 0, such as 0.04 or 0.1"));
+            return Err(Error::usage(Place::option("dt"), problem, "give seconds above 0, such as 0.04 or 0.1"));
         }
         self.frame.dt_s = dt_s;
-        self.check(&Place::item("--dt"))?;
+        self.check(&Place::option("dt"))?;
         Ok(self)
     }
 
@@ -358,7 +360,7 @@ mod tests {
         assert!(error.to_string().contains("frame.dt_s"), "{error}");
         for dt_s in [0.0, -0.1, f64::NAN, f64::INFINITY] {
             let error = Profile::load("paper").unwrap().with_dt(dt_s).unwrap_err();
-            assert!(error.to_string().contains("--dt"), "{error}");
+            assert!(error.to_string().contains("option `dt`"), "{error}");
         }
     }
 

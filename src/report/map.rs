@@ -11,34 +11,11 @@ use super::tables::{aligned, table};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Agreement, CaseStyle, Grid, GridAxis, GridMap, GridPlan, Parameter, count};
+use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MappedGrid, Parameter, count};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::quoted;
 use crate::{Error, Result};
-
-/// A swept grid with what is known of it.
-pub struct MappedGrid {
-    /// Grid and plans.
-    pub plan: GridPlan,
-    /// The verdicts.
-    pub map: GridMap,
-    /// Known shares, per cent, by model of the map.
-    pub known_percent: Vec<Option<f64>>,
-    /// The grid was chosen so that a known share comes out: that it does confirms nothing.
-    pub is_chosen_to_match: bool,
-    /// The same grid under another profile, with the profile's name.
-    pub other: Option<(String, GridPlan, GridMap)>,
-}
-
-/// What the maps are compared with.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Against {
-    /// Another model of the same map.
-    Model(ModelId),
-    /// The same model under another profile.
-    Profile(Box<Profile>),
-}
 
 /// A whole run.
 pub struct MapReport {

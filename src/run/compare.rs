@@ -102,7 +102,7 @@ impl<'a> Compare<'a> {
             return Err(Error::input(
                 Place::item(&facts.data),
                 format!("no scenario to simulate ({})", counts_text(scenarios)),
-                "use more recordings, or relax the filters ([mining] in --config)",
+                "use more recordings, or relax the filters ([mining] in option `config`)",
             ));
         }
         Ok(Compare { scenarios, facts, profile, options, plan })

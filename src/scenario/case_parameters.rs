@@ -141,8 +141,11 @@ impl CaseParameters {
 /// What a user has to give.
 fn needed<'a, T>(value: Option<&'a T>, key: &str, what: &str) -> Result<&'a T> {
     value.ok_or_else(|| {
-        let flag = key.replace('_', "-");
-        Error::usage(Place::item(key), "it is missing", format!("give {what} with --{flag} or as `{key}` in the file"))
+        Error::usage(
+            Place::item(key),
+            "it is missing",
+            format!("give {what} with option `{key}` or as `{key}` in the file"),
+        )
     })
 }
 

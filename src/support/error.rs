@@ -1,5 +1,6 @@
 //! The library's one error type. Every variant says *where* (file, row, column, scenario or lane),
-//! *what* was found or expected, and *what to do about it*; the command line adds only the drawing.
+//! *what* was found or expected, and *what to do about it*. Texts name an option by its field: option `dt`, or
+//! option `backend = cpu`. The command line shows these as flags.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,11 @@ impl Place {
     /// Something that is in no file: a scenario, a lane, a flag.
     pub fn item(item: impl Into<String>) -> Self {
         Place { item: Some(item.into()), ..Place::default() }
+    }
+
+    /// An option of the library, by its field. The command line shows it as its flag.
+    pub fn option(name: &str) -> Self {
+        Place::item(format!("option `{name}`"))
     }
 
     /// Adds the line, counted from 1 and including the header.
@@ -181,7 +187,7 @@ impl Error {
                 }
                 std::io::ErrorKind::WouldBlock | std::io::ErrorKind::OutOfMemory => {
                     "the limit of processes or of memory \
-                     is reached: use fewer --threads (more threads than cores do not help), or raise the limit \
+                     is reached: use fewer threads (option `threads`; more threads than cores do not help), or raise the limit \
                      (`ulimit -u`, `ulimit -v`)"
                         .to_owned()
                 }
@@ -191,7 +197,7 @@ impl Error {
                 _ => "check that the disk is present and has space, then run again".to_owned(),
             }),
             Error::Verification(_) => None,
-            Error::Busy { .. } => Some("wait for it and run this again, or choose another --out".to_owned()),
+            Error::Busy { .. } => Some("wait for it and run this again, or choose another option `out`".to_owned()),
             Error::Internal(_) => {
                 Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
             }

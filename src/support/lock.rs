@@ -126,7 +126,7 @@ mod tests {
         if cfg!(unix) {
             assert!(error.to_string().contains(&format!("(pid {})", std::process::id())), "{error}");
         }
-        assert!(error.help().unwrap().contains("--out"));
+        assert!(error.help().unwrap().contains("option `out`"));
         drop(lock);
         assert!(!path.exists(), "a lock that was given back leaves no file");
         drop(FolderLock::acquire(&path).unwrap());

@@ -72,7 +72,7 @@ pub const LIMITS: [Limits; 10] = [
 pub const NOISE_MPS: f64 = -0.5;
 
 /// What a user can do about a value that is refused here.
-pub const HELP: &str = "correct the value or its unit; --accept-implausible uses it as it is";
+pub const HELP: &str = "correct the value or its unit; option `accept_implausible` uses it as it is";
 
 /// What is done about values beyond the physical range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -115,7 +115,7 @@ impl RunFolder {
         for other in others {
             if Listed::read(&self.dir.join(other)).program.starts_with("lanesweep ") {
                 let problem = format!("it holds the results of another verb, those of {other}");
-                let help = "give another --out: both would write files of the same names";
+                let help = "give another option `out`: both would write files of the same names";
                 return Err(Error::usage(Place::file(&self.dir), problem, help));
             }
         }

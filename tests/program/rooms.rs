@@ -53,6 +53,28 @@ fn every_room_imports_only_those_before_it() {
     assert!(imports > 1000, "only {imports} imports were found");
 }
 
+/// Messages of the library name options; the command line makes flags of them. Scripts, commands to paste and the
+/// reports of a run hold flags on purpose.
+#[test]
+fn the_library_names_no_flag() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut texts = 0;
+    for room in ROOMS.iter().filter(|room| !["report", "cli"].contains(room)) {
+        let mut found = Vec::new();
+        files(&src.join(room), &mut found);
+        for path in found.iter().filter(|path| !path.components().any(|part| part.as_os_str() == "cluster")) {
+            let code = code(path);
+            for text in code.split('"').skip(1).step_by(2).filter(|text| !text.contains("lanesweep ")) {
+                texts += 1;
+                let mut words = text.split([' ', '(', '`', '=', ',']);
+                let flag = words.find(|word| word.len() > 3 && word.starts_with("--"));
+                assert!(flag.is_none() || text.contains("cargo build"), "{}: `{text}` names a flag", path.display());
+            }
+        }
+    }
+    assert!(texts > 1000, "only {texts} texts were found");
+}
+
 #[test]
 fn the_rooms_are_the_folders_of_the_source() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -341,7 +341,7 @@ fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check
     };
     let error = sweep(beside(), &profile("jrc-2021")).unwrap_err();
     let says = format!("{error} {}", error.help().unwrap());
-    for word in ["all 2 lanes", "34.9 s", "no vehicle comes into the ego's lane", "--dt", "lateral speeds"] {
+    for word in ["all 2 lanes", "34.9 s", "no vehicle comes into the ego's lane", "option `dt`", "lateral speeds"] {
         assert!(says.contains(word), "{says}");
     }
     assert!(sweep(beside(), &profile("paper")).is_ok(), "settled: the ego has passed it");

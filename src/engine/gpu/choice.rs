@@ -50,7 +50,7 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[St
     let all = matching(cards, device);
     let Some(&any) = all.first() else {
         let problem = format!("no device of this machine is meant by `{device}`");
-        return Err(Error::usage(Place::item("--device"), problem, list(cards.iter())));
+        return Err(Error::usage(Place::option("device"), problem, list(cards.iter())));
     };
     let usable: Vec<&AdapterCard> = all.iter().copied().filter(|card| !card.is_hidden_by(visible)).collect();
     let Some(&first) = usable.first() else {
@@ -66,7 +66,7 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[St
     };
     if usable.iter().any(|card| !same_device(first, card)) {
         let problem = format!("`{device}` means more than one device");
-        return Err(Error::usage(Place::item("--device"), problem, list(usable.into_iter())));
+        return Err(Error::usage(Place::option("device"), problem, list(usable.into_iter())));
     }
     Ok(first)
 }
@@ -110,17 +110,17 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
     let real: Vec<&AdapterCard> = cards.iter().filter(|card| card.is_real()).collect();
     if real.is_empty() {
         let named = match cards.first() {
-            Some(card) => format!(", or name a device: --device {}", card.index),
+            Some(card) => format!(", or name a device: option `device = {}`", card.index),
             None => String::new(),
         };
         return Error::device(
-            "--backend gpu",
+            "option `backend = gpu`",
             "this machine has no GPU that its drivers show",
-            format!("`lanesweep verify devices` shows what there is; use --backend cpu{named}"),
+            format!("`lanesweep verify devices` shows what there is; use option `backend = cpu`{named}"),
         );
     }
     Error::device(
-        "--backend gpu",
+        "option `backend = gpu`",
         format!(
             "the environment (CUDA_VISIBLE_DEVICES or Slurm's GPU list) hides {}",
             if real.len() == 1 { "the only GPU" } else { "every GPU" }
@@ -128,10 +128,10 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
         match visible {
             Some(visible) if !visible.is_empty() => format!(
                 "it allows pci:{}, which the graphics driver does not show: see `lanesweep verify devices`, or use \
-                 --backend cpu",
+                 option `backend = cpu`",
                 visible.join(", pci:")
             ),
-            _ => "ask the cluster for a GPU, or use --backend cpu".to_owned(),
+            _ => "ask the cluster for a GPU, or use option `backend = cpu`".to_owned(),
         },
     )
 }

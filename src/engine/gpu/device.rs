@@ -106,7 +106,11 @@ impl Device {
             trace: wgpu::Trace::Off,
         });
         let (device, queue) = pollster::block_on(asked).map_err(|e| {
-            Error::device(&card.name, format!("it cannot be opened: {e}"), "choose another device, or --backend cpu")
+            Error::device(
+                &card.name,
+                format!("it cannot be opened: {e}"),
+                "choose another device, or option `backend = cpu`",
+            )
         })?;
         // Without these handlers an error of the device would be a panic.
         let trouble = Arc::new(Mutex::new(None));
@@ -258,7 +262,7 @@ impl Device {
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes.len() as u64 > most {
             let problem = format!("the {label} take {} bytes, and it can hold {most} at once", bytes.len());
-            return Err(Error::device(&self.name, problem, "use --backend cpu, or split the data"));
+            return Err(Error::device(&self.name, problem, "use option `backend = cpu`, or split the data"));
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let buffer = self.buffer(label, bytes.len() as u64, usage);
@@ -296,7 +300,7 @@ impl Device {
 
     /// The error of this device.
     pub fn failed(&self, what: impl Into<String>) -> Error {
-        Error::device(&self.name, what, "the CPU backend computes the same: --backend cpu")
+        Error::device(&self.name, what, "the CPU backend computes the same: option `backend = cpu`")
     }
 }
 

@@ -103,7 +103,7 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
+    Error::device(device, "it is closed, or its driver failed and took its thread along", "use option `backend = cpu`")
 }
 
 struct Owner {

@@ -294,7 +294,7 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
         let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
         let problem = format!("it computed {} of {lanes} lanes of {name} to their end", done[model]);
-        let help = "use --backend cpu; where lanes have very many steps, a larger time step (--dt) may do as well";
+        let help = "use option `backend = cpu`; where lanes have very many steps, a larger time step (option `dt`) may do as well";
         return Err(Error::device(&device.name, problem, help));
     }
     let per_model = |part: &[u8], model: usize| {

@@ -84,7 +84,7 @@ impl<'p> GpuSession<'p> {
         let most = self.max_lanes(wanted);
         if per_unit > most || variants > self.prepared.max_cases {
             let problem = format!("one scenario has {per_unit} lanes per model, and it can hold {most} at once");
-            return Err(Error::device(&self.device, problem, "use --backend cpu, or fewer headways"));
+            return Err(Error::device(&self.device, problem, "use option `backend = cpu`, or fewer headways"));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
         let mut cases = None;
@@ -152,8 +152,9 @@ impl<'p> GpuSession<'p> {
                     .into_par_iter()
                     .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
                     .collect();
-                let outcomes = outcomes
-                    .ok_or_else(|| Error::device(&self.device, "it left a lane unwritten", "use --backend cpu"))?;
+                let outcomes = outcomes.ok_or_else(|| {
+                    Error::device(&self.device, "it left a lane unwritten", "use option `backend = cpu`")
+                })?;
                 // Pieces come in the plan's order.
                 chunk.outcomes.extend(outcomes);
             }

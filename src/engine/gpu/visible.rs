@@ -91,7 +91,7 @@ fn resolve<'a>(variable: &str, entry: &str, gpus: &'a [NvidiaGpu]) -> Result<&'a
         return Err(Error::usage(
             Place::item(variable),
             format!("`{entry}` is a part of a GPU (MIG), which Vulkan cannot select"),
-            "ask the cluster for a whole GPU, or use the processor: --backend cpu",
+            "ask the cluster for a whole GPU, or use the processor: option `backend = cpu`",
         ));
     }
     if entry.starts_with("GPU-") {
@@ -260,7 +260,7 @@ mod tests {
     #[test]
     fn a_part_of_a_gpu_is_refused_with_what_to_do_instead() {
         let problem = problem(cuda("MIG-41b2e1f0-0000"));
-        assert!(problem.contains("Vulkan cannot select") && problem.contains("--backend cpu"), "{problem}");
+        assert!(problem.contains("Vulkan cannot select") && problem.contains("option `backend = cpu`"), "{problem}");
     }
 
     #[test]

@@ -117,7 +117,7 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         }
     }
     if result.lanes == 0 {
-        return Err(Error::input(Place::item("--golden-lanes"), "no lane to compare", "give a table with rows"));
+        return Err(Error::input(Place::option("golden_lanes"), "no lane to compare", "give a table with rows"));
     }
     Ok(result)
 }

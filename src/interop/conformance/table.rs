@@ -66,7 +66,7 @@ impl Table {
                 Place::file(&self.path).row(1),
                 "this is no conformance table: neither `scenario` and `model` nor `fn` are among its columns",
                 "expected the columns of a JRC case table or of the function table; lanes of the `paper` \
-                 profile go with `--scenarios S.jsonl --golden-lanes L.csv`",
+                 profile go with option `scenarios` and option `golden_lanes`",
             ))
         }
     }

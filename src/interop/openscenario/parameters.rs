@@ -55,12 +55,12 @@ impl Names<'_> {
     /// is none.
     pub fn find(&self, name: &str, line: u64) -> Result<(&'static Parameter, f64)> {
         if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
-            return Ok((Parameter::find(self.category, &rename.ours, "--rename")?, rename.factor));
+            return Ok((Parameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
         }
         Parameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
             let help = error.help().unwrap_or_default();
             let problem = format!("a {} has no parameter `{name}`", self.category.label());
-            let help = format!("name it by --rename {name}=OURS or --rename {name}=OURS*FACTOR; {help}");
+            let help = format!("name it by option `rename` {name}=OURS or option `rename` {name}=OURS*FACTOR; {help}");
             Error::input(Place::file(self.path).row(line).of(format!("parameter `{name}`")), problem, help)
         })
     }
@@ -86,11 +86,11 @@ impl Names<'_> {
             if !names.iter().any(|(name, _)| *name == rename.theirs) {
                 let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
                 let problem = format!("the file has no parameter `{}`", rename.theirs);
-                return Err(Error::usage(Place::item("--rename"), problem, format!("it has {}", known.join(", "))));
+                return Err(Error::usage(Place::option("rename"), problem, format!("it has {}", known.join(", "))));
             }
             if self.renames[..at].iter().any(|before| before.theirs == rename.theirs) {
                 let problem = format!("`{}` is renamed twice", rename.theirs);
-                return Err(Error::usage(Place::item("--rename"), problem, "keep one of the two"));
+                return Err(Error::usage(Place::option("rename"), problem, "keep one of the two"));
             }
         }
         Ok(())

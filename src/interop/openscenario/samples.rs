@@ -95,7 +95,7 @@ impl DistributionSamples {
         let Distributions::Stochastic(Stochastic { runs, seed, parameters: of_file }) = &file.distributions else {
             let problem = format!("{} lists values, and has no probabilities", file.path.display());
             let help = "map them: lanesweep map CATEGORY --distribution FILE";
-            return Err(Error::usage(Place::item("--distribution"), problem, help));
+            return Err(Error::usage(Place::option("distribution"), problem, help));
         };
         let mut parameters: Vec<SampledParameter> = Vec::new();
         for (name, line, distribution) in of_file {
@@ -105,7 +105,7 @@ impl DistributionSamples {
                 let place = Place::file(names.path).row(*line).of(format!("parameter `{name}`"));
                 let problem =
                     format!("none of its values lies in {} … {} {}", parameter.least, parameter.most, parameter.unit);
-                Error::input(place, problem, "correct the distribution, or its unit with --rename")
+                Error::input(place, problem, "correct the distribution, or its unit with option `rename`")
             })?;
             parameters.push(SampledParameter { parameter, draw, factor, kept_share });
         }
@@ -122,7 +122,12 @@ impl DistributionSamples {
             let is_given = given.iter().any(|p| p.quantity == quantity);
             is_given || (quantity == Quantity::Thw && !given.iter().any(|p| p.quantity == Quantity::Gap))
         };
-        check_complete(names.category, false, &has, ("a sample", "give it a distribution, or a value by --set"))?;
+        check_complete(
+            names.category,
+            false,
+            &has,
+            ("a sample", "give it a distribution, or a value by option `set`"),
+        )?;
         Ok(DistributionSamples { category: names.category, parameters, fixed, runs: *runs, seed: *seed })
     }
 
@@ -158,7 +163,7 @@ impl DistributionSamples {
         let why = reason.map_or(String::new(), |error| format!(", the last because {error}"));
         let problem = format!("sample {index}: none of {ATTEMPTS} draws is a case{why}");
         Err(Error::usage(
-            Place::item("--distribution"),
+            Place::option("distribution"),
             problem,
             "change the distributions so that most draws are cases",
         ))
@@ -178,8 +183,8 @@ impl DistributionSamples {
     ) -> Result<(LanePlan, u64)> {
         if !(1..=MAX_SAMPLES).contains(&samples) {
             let problem = format!("{samples} samples of a distribution file cannot be run");
-            let help = format!("give --samples from 1 to {MAX_SAMPLES}: their cases are kept in memory");
-            return Err(Error::usage(Place::item("--samples"), problem, help));
+            let help = format!("give option `samples` from 1 to {MAX_SAMPLES}: their cases are kept in memory");
+            return Err(Error::usage(Place::option("samples"), problem, help));
         }
         let own = [Headway::GapM(0.0)];
         let headways = if self.has_distance() { &own[..] } else { headways };

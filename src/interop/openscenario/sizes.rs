@@ -46,11 +46,12 @@ pub fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego
     }
     if let Some((what, told, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
         let problem = format!("the {what} is {told} m by the scenarios and {lane_has} m in the run");
-        let help = "give the scenario file of the run (--scenarios), or leave it out: every gap and contact stays";
+        let help =
+            "give the scenario file of the run (option `scenarios`), or leave it out: every gap and contact stays";
         return Err(Error::input(Place::item(format!("lane {lane}")), problem, help));
     }
     if is_pair && told.lead.is_none() {
-        let help = "give the scenario file of the run (--scenarios), or leave it out";
+        let help = "give the scenario file of the run (option `scenarios`), or leave it out";
         return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
     }
     Ok(KnownSizes { sizes: *told, are_lengths_known: true })

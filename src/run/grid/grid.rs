@@ -107,8 +107,8 @@ impl Grid {
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
                 let problem = "the speeds of both vehicles must be the panel's or fixed".to_owned();
-                let help = "give both by --panel or --set, or leave --closing out";
-                return Err(Error::usage(Place::item("--closing"), problem, help));
+                let help = "give both by option `panel` or option `set`, or leave option `closing` out";
+                return Err(Error::usage(Place::option("closing"), problem, help));
             };
             if ego_mps > other_mps {
                 kept.push(panel.clone());
@@ -116,7 +116,11 @@ impl Grid {
         }
         if kept.is_empty() {
             let problem = "in no panel is the ego faster than the other vehicle".to_owned();
-            return Err(Error::usage(Place::item("--closing"), problem, "give other speeds, or leave --closing out"));
+            return Err(Error::usage(
+                Place::option("closing"),
+                problem,
+                "give other speeds, or leave option `closing` out",
+            ));
         }
         self.panels = kept;
         Ok(())
@@ -282,7 +286,7 @@ fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
 
 /// What needs the parameters, and how they are given.
 pub(crate) type Needing = (&'static str, &'static str);
-const FOR_A_MAP: Needing = ("a map", "give it by --x, --y, --panel or --set");
+const FOR_A_MAP: Needing = ("a map", "give it by option `x`, option `y`, option `panel` or option `set`");
 
 /// Panels that are given one by one, each value within its parameter's range.
 fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
@@ -326,11 +330,11 @@ pub(crate) fn check_complete(
     }
     if has(Quantity::Gap) && has(Quantity::Thw) || native_gap && has_gap {
         let problem = "the initial distance is given twice".to_owned();
-        let help = "keep one of gap_m, thw_s and --native-gap";
+        let help = "keep one of gap_m, thw_s and option `native_gap`";
         return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));
     }
     if !native_gap && !has_gap {
-        return missing("the initial distance", "thw_s=2 (or --native-gap)");
+        return missing("the initial distance", "thw_s=2 (or option `native_gap`)");
     }
     Ok(())
 }
@@ -341,7 +345,7 @@ fn combinations(axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     if count > MAX_PANELS {
         let problem = format!("they make {count} panels");
         let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
-        return Err(Error::usage(Place::item("--panel"), problem, help));
+        return Err(Error::usage(Place::option("panel"), problem, help));
     }
     let mut panels = vec![Vec::new()];
     for axis in axes {

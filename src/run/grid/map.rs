@@ -103,7 +103,7 @@ impl GridMap {
         let problem =
             format!("all {lanes} lanes end at the time cap of {} s{alone}: the map is empty", frame.time_cap_s);
         let help = format!(
-            "check the time step ({} s, --dt), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
+            "check the time step ({} s, option `dt`), `frame.time_cap_s` of the profile, and the grid's speeds, lateral speeds \
              and gaps",
             frame.dt_s
         );

@@ -12,6 +12,7 @@ mod map;
 mod parameter;
 mod plan;
 pub mod presets;
+mod run;
 
 pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
@@ -19,5 +20,6 @@ pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, boundary, count, runs};
 pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
 pub use plan::{GridPart, GridPlan};
+pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};

@@ -46,7 +46,7 @@ pub fn read_part<T: Countable>(path: &Path, run_sha256: &str, units: &Range<u64>
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
     if part.run_sha256 != run_sha256 {
-        let help = "use one folder per run: move it away, or give another --out";
+        let help = "use one folder per run: move it away, or give another option `out`";
         return Err(wrong("it is foreign: it belongs to another run than plan.json in this folder".to_owned(), help));
     }
     if part.units != *units {

@@ -165,8 +165,7 @@ pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
         Ok(Ok(())) if there == line => Ok(()),
         Ok(_) => {
             let problem = "this folder holds the plan of another run";
-            let help =
-                "give another --out, or the flags that the plan was made with; or move the plan and its parts away";
+            let help = "give another option `out`, or the flags that the plan was made with; or move the plan and its parts away";
             Err(Error::input(Place::file(path), problem, help))
         }
         Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {

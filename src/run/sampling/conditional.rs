@@ -27,17 +27,17 @@ pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Co
         let parameter = &density.space.parameters()[at];
         if !parameter.holds(*value) {
             let problem = format!("`{name}` = {value} is not valid: {}", parameter.bounds_text());
-            return Err(Error::usage(Place::item("--given"), problem, "give a value inside the bounds"));
+            return Err(Error::usage(Place::option("given"), problem, "give a value inside the bounds"));
         }
         if places.iter().any(|(known, _)| *known == at) {
             let problem = format!("`{name}` is given twice");
-            return Err(Error::usage(Place::item("--given"), problem, "give every parameter once"));
+            return Err(Error::usage(Place::option("given"), problem, "give every parameter once"));
         }
         places.push((at, *value));
     }
     if places.len() >= density.space.dimensions() {
         let problem = "nothing is left to draw";
-        return Err(Error::usage(Place::item("--given"), problem, "leave a parameter open, or use `simulate`"));
+        return Err(Error::usage(Place::option("given"), problem, "leave a parameter open, or use `simulate`"));
     }
     let constrained = density.kde.conditional(&places)?;
     let weights = constrained.component_probabilities().to_vec();

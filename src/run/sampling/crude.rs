@@ -108,7 +108,7 @@ pub fn sample_into(
     if range.start >= range.end || range.end > plan.unit_count() {
         let problem = format!("samples {}..{} are not among the run's {}", range.start, range.end, plan.unit_count());
         return Err(Error::usage(
-            Place::item("--shard"),
+            Place::option("shard"),
             problem,
             "give an interval that is not empty, counted from 0",
         ));
@@ -116,7 +116,7 @@ pub fn sample_into(
     let is_whole = range == (0..plan.unit_count());
     if !is_whole && (options.stop.relative_half_width.is_some() || options.stop.time_limit.is_some()) {
         let problem = "a part of a run cannot tell when the whole is good enough";
-        return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
+        return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
     }
     let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
     let mut tally = SampleTally::empty(plan, counting);

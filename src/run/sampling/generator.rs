@@ -104,7 +104,7 @@ fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Pr
         return Err(Error::usage(
             Place::item(format!("profile {}", profile.name)),
             "its cut-outs begin at the exposure of the vehicle ahead, which sampled lanes do not follow",
-            "use a profile with cut_out_target = \"nearest-unsafe\", for instance --profile paper",
+            "use a profile with cut_out_target = \"nearest-unsafe\", for instance option `profile = paper`",
         ));
     }
     let recipe = recipe(space, sizes, profile)?;

@@ -78,7 +78,7 @@ impl MapAxes {
         let axes = MapAxes { x: MapAxis::of(density, x)?, y: MapAxis::of(density, y)? };
         if axes.x.parameter == axes.y.parameter {
             let problem = format!("a map over `{x}` twice shows nothing");
-            return Err(Error::usage(Place::item("--map"), problem, "name two parameters"));
+            return Err(Error::usage(Place::option("map"), problem, "name two parameters"));
         }
         Ok(axes)
     }

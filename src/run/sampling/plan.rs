@@ -64,7 +64,7 @@ pub fn plan_samples(
     profile: &Profile,
     options: &SamplePlanOptions,
 ) -> Result<LanePlan> {
-    let place = || Place::item("--samples");
+    let place = || Place::option("samples");
     if options.samples == 0 {
         return Err(Error::usage(place(), "0 samples estimate nothing", "give 1000000, for instance"));
     }
@@ -103,16 +103,16 @@ fn plan(
         (SampleHeadways::Sampled, true) => vec![Headway::GapM(0.0)],
         (SampleHeadways::Sampled, false) => {
             return Err(Error::usage(
-                Place::item("--thw"),
+                Place::option("thw"),
                 "this density has no parameter `thw_s`, so headways cannot be drawn from it",
-                "fit it with --with-thw, or give a headway in seconds",
+                "fit it with option `with_thw`, or give a headway in seconds",
             ));
         }
         (SampleHeadways::Each(_), true) => {
             return Err(Error::usage(
-                Place::item("--thw"),
+                Place::option("thw"),
                 "this density draws the headway itself (parameter `thw_s`)",
-                "use --thw sampled, or fit it without --with-thw",
+                "use option `thw = sampled`, or fit it without option `with_thw`",
             ));
         }
         (SampleHeadways::Each(list), false) => list.clone(),

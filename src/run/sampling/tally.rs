@@ -220,7 +220,7 @@ impl SampleTally {
             return Err(Error::input(place(), "the parts have other models or headways", "make the part again"));
         }
         if self.worst_limit != other.worst_limit || axes(&self) != axes(&other) {
-            let help = "make all parts with the same --worst, --criterion and --map";
+            let help = "make all parts with the same option `worst`, option `criterion` and option `map`";
             return Err(Error::input(place(), "the parts counted different things", help));
         }
         let mut covered = std::mem::take(&mut self.covered);

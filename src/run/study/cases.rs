@@ -12,7 +12,7 @@ use crate::engine::plan::{Block, CaseSource, LanePlan};
 use crate::engine::units::Units;
 use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
-use crate::run::study::unit_record;
+use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{
     ParameterizationId, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
 };
@@ -26,36 +26,7 @@ pub struct StudyCases {
     pub(crate) outline: LanePlan,
     /// One per block.
     pub(crate) reductions: Vec<Option<Reduction>>,
-    pub(crate) held: Records,
-}
-
-/// Records of consecutive units.
-#[derive(Default)]
-pub(crate) struct Records {
-    /// Unit of the first one.
-    pub first: u64,
-    pub bytes: Vec<u8>,
-    /// Where each one ends.
-    pub ends: Vec<usize>,
-}
-
-impl Records {
-    /// Appends the record of the next unit.
-    pub fn push(&mut self, record: &[u8]) {
-        self.bytes.extend_from_slice(record);
-        self.ends.push(self.bytes.len());
-    }
-
-    pub fn get(&self, unit: u64) -> Option<&[u8]> {
-        let at = usize::try_from(unit.checked_sub(self.first)?).ok()?;
-        let end = *self.ends.get(at)?;
-        Some(&self.bytes[at.checked_sub(1).map_or(0, |before| self.ends[before])..end])
-    }
-
-    /// The units.
-    pub fn units(&self) -> Range<u64> {
-        self.first..self.first + self.ends.len() as u64
-    }
+    pub(crate) held: UnitRecords,
 }
 
 /// Cases of a window of units.
@@ -240,8 +211,6 @@ fn cases_of(
 
 #[cfg(test)]
 mod tests {
-    use std::io::{Cursor, Read, Seek, SeekFrom};
-
     use super::*;
     use crate::model::profile::Profile;
     use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
@@ -279,64 +248,5 @@ mod tests {
                 assert_eq!(*window.tables(), tables, "{}", scenario.id);
             }
         }
-    }
-
-    /// Counts what is read.
-    struct Counted(Cursor<Vec<u8>>, usize);
-
-    impl Read for Counted {
-        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-            let count = self.0.read(buffer)?;
-            self.1 += count;
-            Ok(count)
-        }
-    }
-
-    impl Seek for Counted {
-        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-            self.0.seek(to)
-        }
-    }
-
-    #[test]
-    fn an_interval_is_read_alone_and_damage_in_it_is_found() {
-        // Enough for several pages.
-        let mut many = Vec::new();
-        for copy in 0..4 {
-            let renamed = scenarios().into_iter().map(|s| Scenario { id: format!("{}~{copy}", s.id), ..s });
-            many.extend(renamed);
-        }
-        let StudyOutline { cases: study, .. } = outlined(&many);
-        let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
-        assert!(units > 400, "{units}");
-        let read = |records: Vec<u8>, wanted: Range<u64>| {
-            let mut file = Counted(Cursor::new(records), 0);
-            let study = study.head().clone().read(&mut file, &Place::item("plan"), |_| wanted);
-            (study, file.1)
-        };
-        let (part, bytes) = read(records.clone(), 150..170);
-        let part = part.unwrap();
-        assert!(bytes < records.len() / 4, "{bytes} of {} bytes were read", records.len());
-        let ours = study.window(150..170).unwrap();
-        let theirs = part.window(150..170).unwrap();
-        assert_eq!((ours.hash(), ours.tables()), (theirs.hash(), theirs.tables()));
-        assert_eq!(
-            ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
-            theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
-        );
-        assert!(part.window(149..151).is_err() && part.records().is_err());
-        let told = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
-            Ok(_) => "read".to_owned(),
-            Err(error) => error.to_string(),
-        };
-        for at in [0, records.len() / 2, records.len() - 1] {
-            let mut damaged = records.clone();
-            damaged[at] ^= 1;
-            assert!(told(damaged.clone(), 0..units).contains("are damaged"), "byte {at}");
-            let elsewhere = if at == 0 { units - 1..units } else { 0..1 };
-            assert_eq!(told(damaged, elsewhere), "read", "byte {at}");
-        }
-        assert!(told(records[1..].to_vec(), 0..1).contains("cut off"));
-        assert!(told([&records[..], b"x"].concat(), 0..1).contains("added to"));
     }
 }

@@ -7,11 +7,10 @@ mod histogram;
 mod plan;
 pub(crate) mod plan_file;
 mod planned;
+mod read;
 mod run;
 pub(crate) mod unit_record;
 
-#[cfg(test)]
-pub(crate) use cases::Records;
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
 pub use facts::{CategoryFacts, StudyFacts};

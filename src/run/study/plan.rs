@@ -3,9 +3,9 @@
 use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::study::cases::{Records, StudyCases, entries_per_step, parameterizations};
+use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
 use crate::run::study::plan_file::{BlockHead, StudyHead};
-use crate::run::study::unit_record;
+use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{
     ParameterizationOptions, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
@@ -74,7 +74,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
     let parameterization = &options.parameterization;
     let grid = TimeGrid::of(profile);
     let (mut entries, mut values) = (0.0, 0.0);
-    let mut held = Records::default();
+    let mut held = UnitRecords::default();
     let mut record = Vec::new();
     let (mut blocks, mut reductions, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for &category in &options.categories {

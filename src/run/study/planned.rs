@@ -140,7 +140,7 @@ impl StudyBuilder<'_> {
             return Err(Error::input(
                 Place::item(data),
                 format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
-                "use more recordings, or relax the filters ([mining] in --config)",
+                "use more recordings, or relax the filters ([mining] in option `config`)",
             ));
         }
         let facts = StudyFacts {

@@ -1,6 +1,8 @@
 //! One scenario of a study as bytes: what its cases follow from, and nothing else. A plan is made of such records, and
 //! its hash is that of their bytes; `docs/src/reference/files.md` describes them.
 
+use std::ops::Range;
+
 use crate::scenario::{Category, Ego, Other, Scenario, Side};
 
 /// Bits of the byte of flags.
@@ -129,6 +131,40 @@ pub(crate) fn read(record: &[u8], category: Category) -> Option<Scenario> {
     })
 }
 
+/// UnitRecords of consecutive units.
+#[derive(Default)]
+pub(crate) struct UnitRecords {
+    /// Unit of the first one.
+    pub first: u64,
+    pub bytes: Vec<u8>,
+    /// Where each one ends.
+    pub ends: Vec<usize>,
+}
+
+impl UnitRecords {
+    /// Appends the record of the next unit.
+    pub fn push(&mut self, record: &[u8]) {
+        self.bytes.extend_from_slice(record);
+        self.ends.push(self.bytes.len());
+    }
+
+    pub fn get(&self, unit: u64) -> Option<&[u8]> {
+        let at = usize::try_from(unit.checked_sub(self.first)?).ok()?;
+        let end = *self.ends.get(at)?;
+        Some(&self.bytes[at.checked_sub(1).map_or(0, |before| self.ends[before])..end])
+    }
+
+    /// The units.
+    pub fn units(&self) -> Range<u64> {
+        self.first..self.first + self.ends.len() as u64
+    }
+}
+
+/// The ids of the scenarios held.
+pub(super) fn unit_ids(held: &UnitRecords) -> Vec<String> {
+    let ids = held.units().map(|unit| held.get(unit).and_then(id).unwrap_or_default().to_owned());
+    ids.collect()
+}
 #[cfg(test)]
 mod tests {
     use super::*;

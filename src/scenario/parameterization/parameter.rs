@@ -125,7 +125,7 @@ impl Variable {
                 Error::input(
                     Place::item(format!("scenario {}", scenario.id)).column("thw0"),
                     "no observed headway, which the dimension `thw_s` needs (the ego may have stood)",
-                    "leave the scenario out or fit without --with-thw",
+                    "leave the scenario out or fit without option `with_thw`",
                 )
             })?,
         })

@@ -32,12 +32,12 @@ impl Driven {
     /// Checks the ranges.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the flag of a number that is not above 0 and finite.
+    /// [`Error::Usage`] naming the option of a number that is not above 0 and finite.
     pub fn validate(&self) -> Result<()> {
-        for (flag, value) in [("--hours", self.hours), ("--km", self.kilometres)] {
+        for (option, value) in [("hours", self.hours), ("km", self.kilometres)] {
             if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
                 let problem = format!("{value} cannot be driven");
-                return Err(Error::usage(Place::item(flag), problem, "give a number above 0"));
+                return Err(Error::usage(Place::option(option), problem, "give a number above 0"));
             }
         }
         Ok(())

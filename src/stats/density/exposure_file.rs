@@ -87,7 +87,7 @@ impl ExposureFile {
             read => read?,
         };
         let wrong = |place: Place, problem: String| {
-            let help = "mine the recordings again, or remove this file and give --hours and --km";
+            let help = "mine the recordings again, or remove this file and give option `hours` and option `km`";
             Err(Error::input(place, problem, help))
         };
         let content: Content = match serde_json::from_slice(&text) {

@@ -125,7 +125,7 @@ impl DensityModel {
             return Err(Error::input(
                 Place::item(name()),
                 format!("none of {} {} scenarios passed the filters", of_category().count(), id.category.label()),
-                "use more recordings, or relax the filters in the study file (--config)",
+                "use more recordings, or relax the filters in the study file (option `config`)",
             ));
         }
         let reduction = reduction(&id, scenarios, &kept, options)?;

@@ -1,0 +1,222 @@
+//! Maps: the grids of a category under a profile, and what they are compared with; planned, then swept.
+
+use super::grid::Grid;
+use super::map::GridMap;
+use super::plan::GridPlan;
+use super::presets::{self, Preset};
+use crate::engine::{Executor, LanePlan, SweepSummary};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::Category;
+use crate::{Error, Place, Result};
+
+/// Which cells are mapped.
+#[derive(Debug, Clone)]
+pub enum MapGrids {
+    /// The grids of the JRC's evidence for a category, with models of their own.
+    Jrc(Category),
+    /// One grid.
+    Own(Grid),
+}
+
+/// What the maps are compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Against {
+    /// Another model of the same map.
+    Model(ModelId),
+    /// The same model under another profile.
+    Profile(Box<Profile>),
+}
+
+/// What is mapped.
+#[derive(Debug, Clone)]
+pub struct MapOptions {
+    /// Cells.
+    pub grids: MapGrids,
+    /// Models; `None`: those of the grids, which are all of them for a grid of one's own.
+    pub models: Option<Vec<ModelId>>,
+    /// Criterion of shares and differences.
+    pub criterion: Criterion,
+    /// What the maps are compared with.
+    pub against: Option<Against>,
+}
+
+/// Planned maps.
+///
+/// ```
+/// use lanesweep::engine::{CpuBackend, Executor};
+/// use lanesweep::model::criterion::Criterion;
+/// use lanesweep::model::driver::ModelId;
+/// use lanesweep::model::profile::Profile;
+/// use lanesweep::run::grid::{Map, MapGrids, MapOptions};
+/// use lanesweep::scenario::Category;
+///
+/// # fn main() -> lanesweep::Result<()> {
+/// let options = MapOptions {
+///     grids: MapGrids::Jrc(Category::Lvd),
+///     models: Some(vec![ModelId::Rss]),
+///     criterion: Criterion::Collision,
+///     against: None,
+/// };
+/// let map = Map::plan(options, &Profile::load("jrc-2021")?)?;
+/// assert_eq!(map.lane_count(), 209);
+/// let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic()), |_| ())?;
+/// assert_eq!(result.grids[0].map.failures(0, Criterion::Collision), 4);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Map {
+    grids: Vec<PlannedGrid>,
+}
+
+struct PlannedGrid {
+    plan: GridPlan,
+    known_percent: Vec<Option<f64>>,
+    is_chosen_to_match: bool,
+    other: Option<(String, GridPlan)>,
+}
+
+/// A swept grid with what is known of it.
+pub struct MappedGrid {
+    /// Grid and plans.
+    pub plan: GridPlan,
+    /// The verdicts.
+    pub map: GridMap,
+    /// Known shares, per cent, by model of the map.
+    pub known_percent: Vec<Option<f64>>,
+    /// The grid was chosen to give a known share, so agreement confirms nothing.
+    pub is_chosen_to_match: bool,
+    /// The same grid under another profile, with the profile's name.
+    pub other: Option<(String, GridPlan, GridMap)>,
+}
+
+/// Swept maps.
+pub struct MapResult {
+    /// One per grid.
+    pub grids: Vec<MappedGrid>,
+    /// How the sweeps went.
+    pub summary: SweepSummary,
+}
+
+impl MapOptions {
+    /// The grids under a profile, with their models.
+    fn presets(&self, profile: &Profile) -> Result<Vec<Preset>> {
+        let mut presets = match &self.grids {
+            MapGrids::Jrc(category) => presets::jrc(*category, profile)?,
+            MapGrids::Own(grid) => vec![Preset {
+                grid: grid.clone(),
+                models: ModelId::ALL.to_vec(),
+                known_percent: Vec::new(),
+                is_chosen_to_match: false,
+            }],
+        };
+        for preset in &mut presets {
+            if let Some(models) = &self.models {
+                preset.models.clone_from(models);
+            }
+            if let Some(Against::Model(model)) = self.against
+                && !preset.models.contains(&model)
+            {
+                preset.models.push(model);
+                preset.models.sort();
+            }
+        }
+        Ok(presets)
+    }
+}
+
+impl Map {
+    /// Plans every cell of every grid with every model.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without a model, for a case that cannot be, and where a map would be compared with itself.
+    pub fn plan(options: MapOptions, profile: &Profile) -> Result<Map> {
+        let itself = match (&options.against, options.models.as_deref()) {
+            (Some(Against::Profile(other)), _) if **other == *profile => Some(other.name.as_str()),
+            (Some(Against::Model(model)), Some([one])) if one == model => Some(model.name()),
+            _ => None,
+        };
+        if let Some(name) = itself {
+            let problem = format!("`{name}` is what is run anyway: there is nothing to compare");
+            return Err(Error::usage(Place::option("against"), problem, "name another model or profile"));
+        }
+        let is_published = matches!(options.grids, MapGrids::Jrc(_))
+            && options.criterion == Criterion::Collision
+            && *profile == Profile::load(presets::JRC_PROFILE)?;
+        let others = match &options.against {
+            // The same cells: a preset's cases follow the other profile's way of making them.
+            Some(Against::Profile(other)) => Some((&**other, options.presets(other)?)),
+            _ => None,
+        };
+        let mut grids = Vec::new();
+        for preset in options.presets(profile)? {
+            let other = match &others {
+                Some((other, presets)) => {
+                    let same = presets.iter().find(|p| p.grid.name() == preset.grid.name()).unwrap_or(&preset);
+                    let plan = GridPlan::new(same.grid.clone(), other, &preset.models)?;
+                    Some((other.name.clone(), plan))
+                }
+                None => None,
+            };
+            let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
+            grids.push(PlannedGrid {
+                known_percent: preset.models.iter().map(known).collect(),
+                is_chosen_to_match: preset.is_chosen_to_match && is_published,
+                plan: GridPlan::new(preset.grid, profile, &preset.models)?,
+                other,
+            });
+        }
+        Ok(Map { grids })
+    }
+
+    /// Every grid's plan, with the name of the other profile where it is under that.
+    pub fn plans(&self) -> impl Iterator<Item = (Option<&str>, &GridPlan)> {
+        self.grids.iter().flat_map(|grid| {
+            let other = grid.other.iter().map(|(name, plan)| (Some(name.as_str()), plan));
+            std::iter::once((None, &grid.plan)).chain(other)
+        })
+    }
+
+    /// The lanes of all plans.
+    pub fn lane_plans(&self) -> impl Iterator<Item = &LanePlan> {
+        self.plans().flat_map(|(_, plan)| plan.parts.iter().map(|part| &part.plan))
+    }
+
+    /// Cells of all grids.
+    pub fn cell_count(&self) -> u64 {
+        self.grids.iter().map(|grid| grid.plan.grid.cell_count() as u64).sum()
+    }
+
+    /// Lanes of all plans.
+    pub fn lane_count(&self) -> u64 {
+        self.plans().map(|(_, plan)| plan.lane_count()).sum()
+    }
+
+    /// Sweeps every grid; `progress` receives the number of cells of each.
+    ///
+    /// # Errors
+    /// As [`GridMap::sweep`].
+    pub fn run(self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<MapResult> {
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        let mut swept = |plan: &GridPlan| -> Result<GridMap> {
+            let (map, of_map) = GridMap::sweep(plan, executor)?;
+            summary.add(&of_map);
+            Ok(map)
+        };
+        let mut grids = Vec::new();
+        for PlannedGrid { plan, known_percent, is_chosen_to_match, other } in self.grids {
+            let map = swept(&plan)?;
+            let other = match other {
+                Some((name, plan)) => {
+                    let map = swept(&plan)?;
+                    Some((name, plan, map))
+                }
+                None => None,
+            };
+            progress(plan.grid.cell_count() as u64);
+            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other });
+        }
+        Ok(MapResult { grids, summary })
+    }
+}

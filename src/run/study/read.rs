@@ -1,0 +1,231 @@
+//! Reads a study from its file: head and checksums first, then the pages of the scenarios that are wanted.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
+
+use sha2::{Digest, Sha256};
+
+use super::cases::{StudyCases, parameterizations};
+use super::plan_file::{BlockHead, PAGE, StudyHead};
+use super::unit_record::{self, UnitRecords, unit_ids};
+use crate::engine::lane_case::LaneCase;
+use crate::engine::plan::{Block, CaseSource, LanePlan};
+use crate::engine::units::Units;
+use crate::scenario::Tables;
+use crate::scenario::parameterization::Reduction;
+use crate::support::hex::hex;
+use crate::{Error, Place, Result};
+
+/// The source of a plan without cases.
+struct NoCases;
+
+impl CaseSource for NoCases {
+    fn case(&self, _block: usize, _unit: u64, _variant: usize) -> LaneCase<f64> {
+        unreachable!("an outline is asked for counts and keys; lanes are run on its windows")
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
+        &NONE
+    }
+}
+
+impl StudyHead {
+    /// The study with these of its scenarios.
+    pub(crate) fn with_records(self, held: UnitRecords) -> Result<StudyCases> {
+        let mut records = unit_ids(&held).into_iter();
+        let (mut first, mut blocks, mut reductions) = (0, Vec::new(), Vec::new());
+        for block in &self.blocks {
+            let (from, end) = (held.first.clamp(first, first + block.units), first + block.units);
+            let names: Vec<String> =
+                records.by_ref().take((held.units().end.clamp(from, end) - from) as usize).collect();
+            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
+            blocks.push(Block {
+                category: block.category,
+                units: Units::Held(block.units, from - first, names.into()),
+                variants: std::iter::once("S".to_owned()).chain(variants).collect(),
+                first_unit: 0,
+                first_lane: 0,
+            });
+            let basis = block.basis.clone();
+            let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization);
+            reductions.push(basis.map(of_basis).transpose()?);
+            first = end;
+        }
+        let (profile, models, headways) = (self.profile.clone(), self.models.clone(), self.headways.clone());
+        let hash = self.plan_sha256.clone();
+        let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Box::new(NoCases))?;
+        Ok(StudyCases { head: self, outline, reductions, held })
+    }
+
+    /// The study with some of its scenarios, whose records begin where the file stands. `wanted` says which, of so many.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] at `place` where head or records contradict themselves or the hash, or where a
+    /// page that is read is damaged.
+    pub fn read(
+        self,
+        file: &mut (impl Read + Seek),
+        place: &Place,
+        wanted: impl FnOnce(u64) -> Range<u64>,
+    ) -> Result<StudyCases> {
+        let wrong =
+            |problem: String| Error::input(place.clone(), problem, "make the plan again with option `plan_only`");
+        let io = |e| Error::io(place.file.clone().unwrap_or_default(), "read", e);
+        self.check(place)?;
+        let count = self.unit_count();
+        let wanted = wanted(count);
+        let begin = file.stream_position().map_err(io)?;
+        let end = file.seek(SeekFrom::End(0)).map_err(io)?;
+        let told = self.pages.iter().map(|(bytes, _)| *bytes).fold(0, u64::saturating_add);
+        if end - begin != told {
+            let problem = format!("it holds {} bytes of scenarios, where its head tells of {told}", end - begin);
+            return Err(wrong(format!("{problem}: it was cut off or added to")));
+        }
+        let mut held = UnitRecords { first: wanted.start.min(count), ..UnitRecords::default() };
+        let mut at = begin;
+        for (page, (bytes, sha256)) in self.pages.iter().enumerate() {
+            let units = page as u64 * PAGE..count.min((page as u64 + 1) * PAGE);
+            let from = at;
+            at += bytes;
+            if units.end <= wanted.start || wanted.end <= units.start {
+                continue;
+            }
+            file.seek(SeekFrom::Start(from)).map_err(io)?;
+            let mut content = vec![0; *bytes as usize];
+            file.read_exact(&mut content).map_err(io)?;
+            if hex(&Sha256::digest(&content)) != *sha256 {
+                let problem = format!("scenarios {} to {} are damaged", units.start, units.end - 1);
+                return Err(wrong(format!("{problem}: their checksum does not match")));
+            }
+            let mut rest = &content[..];
+            for unit in units.clone() {
+                let whole = unit_record::length(rest).map(|length| rest.split_at(length));
+                let (record, after) = whole.ok_or_else(|| wrong(format!("scenario {unit} is not whole")))?;
+                rest = after;
+                if wanted.contains(&unit) {
+                    self.check_record(unit, record).map_err(wrong)?;
+                    held.push(record);
+                }
+            }
+            if !rest.is_empty() {
+                return Err(wrong(format!(
+                    "there is more than scenarios {} to {} in a page",
+                    units.start,
+                    units.end - 1
+                )));
+            }
+        }
+        self.with_records(held)
+    }
+}
+
+impl StudyCases {
+    /// What stands before the records in a file.
+    pub fn head(&self) -> &StudyHead {
+        &self.head
+    }
+
+    /// A plan of its own over some of the scenarios held, evenly taken from all of them, at most about so many: for
+    /// what may be concluded from them on the whole.
+    ///
+    /// # Errors
+    /// None for what this program makes.
+    pub(crate) fn thinned(&self, most: u64) -> Result<LanePlan> {
+        let step = (self.held.ends.len() as u64).div_ceil(most.max(1)).max(1);
+        let (mut held, mut blocks) = (UnitRecords::default(), Vec::new());
+        for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {
+            let units = block.units.held().map(|unit| block.first_unit + unit).step_by(step as usize);
+            let before = held.ends.len();
+            units.filter_map(|unit| self.held.get(unit)).for_each(|record| held.push(record));
+            blocks.push(BlockHead { units: (held.ends.len() - before) as u64, ..head.clone() });
+        }
+        let head = StudyHead { blocks, ..self.head.clone() };
+        let study = head.with_records(held)?;
+        study.window(0..study.outline.unit_count())
+    }
+
+    /// The records of the file.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where an interval of the study is held.
+    pub fn records(&self) -> Result<&[u8]> {
+        if self.held.units() == (0..self.outline.unit_count()) {
+            Ok(&self.held.bytes)
+        } else {
+            Err(Error::Internal("a part of a study cannot be written as the study".to_owned()))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, SeekFrom};
+
+    use super::*;
+    use crate::model::profile::Profile;
+    use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
+    use crate::scenario::Scenario;
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    /// Counts what is read.
+    struct Counted(Cursor<Vec<u8>>, usize);
+
+    impl Read for Counted {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            let count = self.0.read(buffer)?;
+            self.1 += count;
+            Ok(count)
+        }
+    }
+
+    impl Seek for Counted {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.0.seek(to)
+        }
+    }
+
+    #[test]
+    fn an_interval_is_read_alone_and_damage_in_it_is_found() {
+        // Enough for several pages.
+        let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        let scenarios = mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let copies =
+            |copy: usize| scenarios.iter().map(move |s| Scenario { id: format!("{}~{copy}", s.id), ..s.clone() });
+        let many: Vec<Scenario> = (0..4).flat_map(copies).collect();
+        let profile = Profile::load("paper").unwrap();
+        let StudyOutline { cases: study, .. } = outline_study(&many, &profile, &StudyOptions::default()).unwrap();
+        let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
+        assert!(units > 400, "{units}");
+        let read = |records: Vec<u8>, wanted: Range<u64>| {
+            let mut file = Counted(Cursor::new(records), 0);
+            let study = study.head().clone().read(&mut file, &Place::item("plan"), |_| wanted);
+            (study, file.1)
+        };
+        let (part, bytes) = read(records.clone(), 150..170);
+        let part = part.unwrap();
+        assert!(bytes < records.len() / 4, "{bytes} of {} bytes were read", records.len());
+        let ours = study.window(150..170).unwrap();
+        let theirs = part.window(150..170).unwrap();
+        assert_eq!((ours.hash(), ours.tables()), (theirs.hash(), theirs.tables()));
+        assert_eq!(
+            ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
+            theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
+        );
+        assert!(part.window(149..151).is_err() && part.records().is_err());
+        let outcome = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
+            Ok(_) => "read".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        for at in [0, records.len() / 2, records.len() - 1] {
+            let mut damaged = records.clone();
+            damaged[at] ^= 1;
+            assert!(outcome(damaged.clone(), 0..units).contains("are damaged"), "byte {at}");
+            let elsewhere = if at == 0 { units - 1..units } else { 0..1 };
+            assert_eq!(outcome(damaged, elsewhere), "read", "byte {at}");
+        }
+        assert!(outcome(records[1..].to_vec(), 0..1).contains("cut off"));
+        assert!(outcome([&records[..], b"x"].concat(), 0..1).contains("added to"));
+    }
+}
