@@ -118,7 +118,7 @@ impl Fit {
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
         for (id, file) in ids.iter().zip(files) {
-            let result = DensityModel::fit(*id, &collection.scenarios, &facts, &options);
+            let result = DensityModel::fit(id.clone(), &collection.scenarios, &facts, &options);
             bar.inc(1);
             let result = match result {
                 Ok(result) => result,

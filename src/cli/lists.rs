@@ -187,7 +187,7 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
     }
     if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
         let of = |c: &Category| {
-            let keys: Vec<&str> = ParameterizationId::of(*c).map(|p| p.key).collect();
+            let keys: Vec<_> = ParameterizationId::of(*c).map(|p| p.key).collect();
             format!("{}: {}", c.label(), keys.join(" "))
         };
         let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();
@@ -197,5 +197,5 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
             format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
         ));
     }
-    Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
+    Ok(of_categories().filter(|p| wanted.contains(&p.key.as_ref())).collect())
 }

@@ -197,9 +197,7 @@ mod tests {
     use crate::run::study::plan_file::{BlockHead, StudyHead};
     use crate::run::study::unit_record;
     use crate::run::study::unit_record::UnitRecords;
-    use crate::scenario::parameterization::{
-        Kind, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis,
-    };
+    use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
     use crate::scenario::{Category, Scenario};
     use crate::stats::density::{Mixture, ParameterSpace};
 
@@ -282,7 +280,7 @@ mod tests {
             [(Category::CutIn, "2"), (Category::CutOut, "a"), (Category::Lvd, "ii"), (Category::CutIn, "6")]
         {
             let id = ParameterizationId::find(category, key).unwrap();
-            let reduction = matches!(id.kind, Kind::Svd(_)).then(|| reduction(category, &options));
+            let reduction = id.coefficients().is_some().then(|| reduction(category, &options));
             let space = ParameterSpace::new(id, &options, reduction.as_ref(), false).unwrap();
             let d = space.dimensions();
             let mean = |k: usize| (0..d).map(|at| 1.0 + ((at * 5 + k * 3) % 7) as f64).collect::<Vec<f64>>();

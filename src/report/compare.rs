@@ -138,7 +138,7 @@ impl CompareFile {
         let ratio = |r: &Ratio| [number(r.ratio), number(r.low), number(r.high), r.verdict.text().to_owned()];
         let risk = |r: Option<RiskRate>| [number(r.map(|r| r.estimate)), number(r.map(|r| r.standard_deviation))];
         let (replayed, sampled) = (&cell.replayed, &cell.sampled);
-        let mut row: Vec<String> = [category.category.key(), of.key].map(str::to_owned).to_vec();
+        let mut row: Vec<String> = [category.category.key(), &of.key].map(str::to_owned).to_vec();
         row.extend([of.parameters.to_string(), s.model.name().to_owned(), s.criterion.key().to_owned()]);
         row.extend(rate(&s.rate));
         row.extend([s.rate.failures, s.rate.lanes, s.failing_scenarios].map(|n| n.to_string()));

@@ -74,8 +74,8 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
     for category in &scores.categories {
         for cell in category.cells.iter().filter(|c| c.variant > 0) {
             let name = &category.variants[cell.variant];
-            let parameters =
-                ParameterizationId::find(category.category, name).map_or(String::new(), |p| p.parameters.to_string());
+            let parameters = ParameterizationId::find(category.category, name)
+                .map_or(String::new(), |p| p.parameter_count().to_string());
             let c = &cell.counts;
             let end = |pick: fn(Interval) -> f64| number(cell.f1_interval.map(pick));
             rows.push(vec![

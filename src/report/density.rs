@@ -14,7 +14,7 @@ pub fn text(model: &DensityModel) -> String {
         "{} {} ({}): density over {} scenarios; {} found, {} kept, {} left out\n",
         id.category.label(),
         id.key,
-        id.description,
+        id.description(),
         count_of(model.kde.points().len()),
         count(provenance.found),
         count(provenance.kept),
@@ -82,7 +82,7 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
     serde_json::json!({
         "category": id.category.key(),
         "parameterization": id.key,
-        "description": id.description,
+        "description": id.description(),
         "scenarios": model.kde.points().len(),
         "found": provenance.found,
         "kept": provenance.kept,

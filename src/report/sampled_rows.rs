@@ -67,7 +67,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, density: &DensityMo
             let mut row = vec![
                 Cell::Whole(unit as i64),
                 Cell::text(density.category().key()),
-                Cell::text(density.space.id().key),
+                Cell::text(density.space.id().key.as_ref()),
                 Cell::text(headway),
                 Cell::text(plan.models[at % models].name()),
                 collision,

@@ -44,7 +44,7 @@ impl DensityRecord {
         Ok(DensityRecord {
             sha256: density.content_sha256()?,
             category: density.category().key(),
-            parameterization: density.space.id().key.to_owned(),
+            parameterization: density.space.id().key.to_string(),
             parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
             kernels: density.kde.points().len(),
             provenance: density.provenance.clone(),

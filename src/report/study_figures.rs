@@ -6,7 +6,7 @@ use crate::engine::{Confusion, Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::score::{CategoryScores, f1, precision, recall};
-use crate::scenario::parameterization::{Kind, ModeShape, ParameterizationId};
+use crate::scenario::parameterization::{ModeShape, ParameterizationId};
 use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.
@@ -156,16 +156,16 @@ fn equal_f1(f: f64) -> Guide {
 pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> PanelFigure {
     let panel = |heading: &str, criteria: &[Criterion]| {
         let means = mean_f1(scores, criteria);
-        let of = |kind: fn(&Kind) -> bool, name: &str| {
-            let own: Vec<_> = means.iter().filter(|(id, _)| kind(&id.kind)).collect();
+        let of = |name: &str| {
+            let own: Vec<_> = means.iter().filter(|(id, _)| id.family.name() == name).collect();
             PanelSeries {
                 name: name.to_owned(),
                 mark: Mark::Points,
-                values: own.iter().map(|(id, mean)| (id.parameters as f64, *mean)).collect(),
-                labels: own.iter().map(|(id, _)| id.key.to_owned()).collect(),
+                values: own.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect(),
+                labels: own.iter().map(|(id, _)| id.key.to_string()).collect(),
             }
         };
-        let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameters as f64, *mean)).collect();
+        let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect();
         let front = PanelSeries {
             name: "no other is better with as few parameters".to_owned(),
             mark: Mark::Line,
@@ -178,11 +178,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> PanelFigure {
             y: "mean F1".to_owned(),
             x_range: Some((1.0, 8.0)),
             y_range: Some((0.0, 1.05)),
-            series: vec![
-                of(|kind| *kind == Kind::Kinematic, "kinematic"),
-                of(|kind| *kind != Kind::Kinematic, "SVD"),
-                front,
-            ],
+            series: vec![of("kinematic"), of("SVD"), front],
             guides: Vec::new(),
         }
     };
@@ -276,7 +272,7 @@ pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], d
 /// `2: constant acceleration, constant lateral speed`.
 pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
     let key = &scores.variants[variant];
-    ParameterizationId::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description))
+    ParameterizationId::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description()))
 }
 
 #[cfg(test)]

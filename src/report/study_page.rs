@@ -8,7 +8,7 @@ use super::tables;
 use crate::model::criterion::Criterion;
 use crate::run::score::{CategoryScores, ClaimVerdict, precision, recall};
 use crate::scenario::Category;
-use crate::scenario::parameterization::{Kind, ParameterizationId};
+use crate::scenario::parameterization::ParameterizationId;
 use crate::support::readable::{count, value};
 use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
@@ -257,8 +257,7 @@ fn shares_table(scores: &CategoryScores) -> PageTable {
 fn variants_table(scores: &CategoryScores) -> PageTable {
     let known = scores.variants.iter().skip(1).filter_map(|key| ParameterizationId::find(scores.category, key));
     let rows = known.map(|id| {
-        let kind = if id.kind == Kind::Kinematic { "kinematic" } else { "SVD" };
-        vec![id.key.to_owned(), id.description.to_owned(), kind.to_owned(), id.parameters.to_string()]
+        vec![id.key.to_string(), id.description(), id.family.name().to_owned(), id.parameter_count().to_string()]
     });
     let header = ["parameterization", "what is kept", "kind", "parameters beside the headway"];
     table("Parameterizations", &header, 3, rows.collect())

@@ -154,7 +154,7 @@ impl<'a> Compare<'a> {
         let mut result =
             CompareResult { categories: recorded.collect::<Result<_>>()?, summary, ..CompareResult::default() };
         for id in &self.options.parameterizations {
-            match self.parameterization(*id, counts, executor, &mut result.summary, &mut progress) {
+            match self.parameterization(id.clone(), counts, executor, &mut result.summary, &mut progress) {
                 Ok((cells, left_out)) => {
                     result.left_out.extend(left_out);
                     let of = result.categories.iter_mut().find(|c| c.category == id.category);
@@ -202,10 +202,10 @@ impl<'a> Compare<'a> {
             representativeness: false,
             ..FitOptions::default()
         };
-        let fitted = DensityModel::fit(id, self.scenarios, self.facts, &fit)?;
+        let fitted = DensityModel::fit(id.clone(), self.scenarios, self.facts, &fit)?;
         let density = fitted.model;
         let find = |(at, block): (usize, &Block)| {
-            let variant = block.variants.iter().position(|v| v == id.key)?;
+            let variant = block.variants.iter().position(|v| *v == id.key)?;
             (block.category == id.category).then_some((at, variant))
         };
         let Some((block, variant)) = self.plan.blocks.iter().enumerate().find_map(find) else {
@@ -225,8 +225,8 @@ impl<'a> Compare<'a> {
         let sampled = sample_by_scenario(&plan, &kernels, scenarios, executor, exposure, Self::LEVEL, progress)?;
         summary.add(&sampled.summary);
         let compared = ComparedParameterization {
-            key: id.key,
-            parameters: id.parameters,
+            key: id.key.to_string(),
+            parameters: id.parameter_count(),
             density_sha256: density.content_sha256()?,
             kernels: kernels.len(),
             plan_sha256: plan.hash().to_owned(),

@@ -150,10 +150,10 @@ fn needed<'a, T>(value: Option<&'a T>, key: &str, what: &str) -> Result<&'a T> {
 }
 
 /// Beyond this no speed, length or acceleration is physical.
-const LARGEST: f64 = 1e6;
+const MAX_MAGNITUDE: f64 = 1e6;
 
 pub(crate) fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
-    if value.abs() <= LARGEST && value >= least {
+    if value.abs() <= MAX_MAGNITUDE && value >= least {
         return Ok(value);
     }
     let expected = if least.is_finite() {
@@ -165,7 +165,7 @@ pub(crate) fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
 }
 
 fn above_zero(value: f64, key: &str) -> Result<f64> {
-    if value > 0.0 && value <= LARGEST {
+    if value > 0.0 && value <= MAX_MAGNITUDE {
         return Ok(value);
     }
     Err(Error::usage(Place::item(key), format!("{value} cannot be used"), "give a number above 0 and at most 1e6"))

@@ -34,7 +34,7 @@ pub(super) struct Problem {
 /// What no type says: lengths, signs and what a category needs.
 pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
-    expect((MIN_RATE_HZ..=LARGEST).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
+    expect((MIN_RATE_HZ..=MAX_MAGNITUDE).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
     above_zero("lane_width", s.lane_width)?;
     at_least_zero("ego.v0", s.ego.v0)?;
     above_zero("ego.length", s.ego.length)?;
@@ -89,15 +89,15 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
 const MIN_RATE_HZ: f64 = 0.1;
 
 /// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
-const LARGEST: f64 = 1e6;
+const MAX_MAGNITUDE: f64 = 1e6;
 
 fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value.abs() <= LARGEST, field, value, "a number between -1e6 and 1e6")
+    expect(value.abs() <= MAX_MAGNITUDE, field, value, "a number between -1e6 and 1e6")
 }
 
 fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
     expect(
-        (0.0..=LARGEST).contains(&value),
+        (0.0..=MAX_MAGNITUDE).contains(&value),
         field,
         value,
         "a number of at least 0 and at most 1e6 (a speed above -0.5 counts as 0)",
@@ -105,7 +105,7 @@ fn at_least_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
 }
 
 fn above_zero(field: &str, value: f64) -> std::result::Result<(), Problem> {
-    expect(value > 0.0 && value <= LARGEST, field, value, "a number above 0 and at most 1e6")
+    expect(value > 0.0 && value <= MAX_MAGNITUDE, field, value, "a number above 0 and at most 1e6")
 }
 
 fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Result<(), Problem> {

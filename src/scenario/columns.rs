@@ -1,7 +1,197 @@
-//! Which fields of a scenario the columns of a user's table are.
+//! The fields of a scenario laid out flat, as the columns of a table (`ego_v0`, `target_v`, `lead_y`), and which of them
+//! the columns of a user's table are.
 
+use serde_json::{Map, Value};
+
+use super::Category;
+use super::schema::{Content, FIELDS, Field, Presence};
 use crate::support::error::{Error, Result};
-use crate::support::table::{Named, Resolved, TableReader, nearest, resolve};
+use crate::support::table::{Column, Kind, Named, Resolved, TableReader, nearest, resolve};
+
+/// A field that is no record.
+pub(super) struct Leaf {
+    /// Name of the column.
+    pub flat: String,
+    /// Record that it is in.
+    pub record: Option<&'static str>,
+    pub field: &'static Field,
+    /// No scenario can do without it.
+    pub is_required: bool,
+}
+
+/// Other names under which columns are understood, the field each stands for, and whether it may change from instant
+/// to instant although the field is that of the start.
+const OTHER_NAMES: [(&str, &str, bool); 8] = [
+    ("ego_speed", "ego_v0", true),
+    ("target_speed", "target_v", false),
+    ("target_lateral", "target_y", false),
+    ("lead_speed", "lead_v", false),
+    ("lead_lateral", "lead_y", false),
+    ("thw", "thw0", true),
+    ("gap", "gap0", true),
+    ("lead_gap", "D", true),
+];
+
+/// All leaves, in the order of the scenario's fields.
+pub(super) fn leaves() -> Vec<Leaf> {
+    let mut leaves = Vec::new();
+    for field in FIELDS {
+        let is_required = field.presence == Presence::Required;
+        match field.content {
+            Content::Object(inner) => leaves.extend(inner.iter().map(|of| Leaf {
+                flat: format!("{}_{}", field.name, of.name),
+                record: Some(field.name),
+                field: of,
+                is_required: is_required && of.presence == Presence::Required,
+            })),
+            _ => leaves.push(Leaf { flat: field.name.to_owned(), record: None, field, is_required }),
+        }
+    }
+    leaves
+}
+
+/// What a column can be called: the leaves, then other names; with the leaf, and whether it may change.
+pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
+    let own = leaves.iter().enumerate().map(|(at, leaf)| (leaf.flat.clone(), leaf.field.unit, at, false));
+    let other = OTHER_NAMES.iter().filter_map(|(name, of, may_change)| {
+        let at = leaves.iter().position(|leaf| leaf.flat == *of)?;
+        Some(((*name).to_owned(), leaves[at].field.unit, at, *may_change))
+    });
+    own.chain(other).map(|(name, unit, at, may_change)| (Named { name, unit }, at, may_change)).collect()
+}
+
+impl Leaf {
+    /// The column that is written.
+    pub fn column(&self) -> Column {
+        let kind = match self.field.content {
+            Content::Text if self.flat == "id" => Kind::Text,
+            Content::Text | Content::OneOf(_) => Kind::Name,
+            Content::Number => Kind::Binary64,
+            Content::VehicleId | Content::Frame => Kind::Whole,
+            Content::TwoFrames => Kind::Wholes,
+            Content::YesNo => Kind::Flag,
+            Content::Series | Content::Object(_) => Kind::Series,
+        };
+        let about = self.field.about;
+        let description = match self.record {
+            Some("target") => format!("Target: {}", uncapitalized(about)),
+            Some("lead") => format!("Cut-out, vehicle ahead of the target: {}", uncapitalized(about)),
+            _ => about.to_owned(),
+        };
+        Column { name: self.flat.clone().into(), kind, unit: self.field.unit.into(), description: description.into() }
+    }
+
+    /// The leaf's value in a scenario as JSON.
+    pub fn of<'a>(&self, scenario: &'a Value) -> &'a Value {
+        let object = self.record.map_or(Some(scenario), |record| scenario.get(record));
+        object.and_then(|object| object.get(self.field.name)).unwrap_or(&Value::Null)
+    }
+
+    /// Puts a value where it belongs in a scenario as JSON; null stays out.
+    pub fn put(&self, scenario: &mut Map<String, Value>, value: Value) {
+        if value.is_null() {
+            return;
+        }
+        let Some(record) = self.record else {
+            scenario.insert(self.field.name.to_owned(), value);
+            return;
+        };
+        let record = scenario.entry(record).or_insert_with(|| Value::Object(Map::new()));
+        if let Value::Object(record) = record {
+            record.insert(self.field.name.to_owned(), value);
+        }
+    }
+
+    /// Is there one value per sample?
+    pub fn is_series(&self) -> bool {
+        matches!(self.field.content, Content::Series)
+    }
+
+    /// A value of a table as the JSON of a scenario has it. Texts of CSV become what the field holds; what does not
+    /// stays, so that the check of the field can show it.
+    pub fn typed(&self, value: Value, divisor: f64) -> Value {
+        match self.field.content {
+            Content::Number => number(value, divisor),
+            // One value of the series, at an instant.
+            Content::Series => match value {
+                Value::Array(values) => values.into_iter().map(|value| number(value, divisor)).collect(),
+                one => number(one, divisor),
+            },
+            Content::VehicleId | Content::Frame => whole(value),
+            Content::TwoFrames => match value {
+                Value::String(text) => text.split_whitespace().map(|word| whole(Value::from(word))).collect(),
+                Value::Array(values) => values.into_iter().map(whole).collect(),
+                other => other,
+            },
+            Content::YesNo => yes_or_no(value),
+            Content::OneOf(names) => match value {
+                Value::String(text) => {
+                    let lower = text.to_ascii_lowercase();
+                    let category = Category::parse(&text).map(Category::key).filter(|key| names.contains(key));
+                    Value::from(category.or(names.iter().copied().find(|name| *name == lower)).unwrap_or(&text))
+                }
+                other => other,
+            },
+            Content::Text => match value {
+                // An id that a program took for a number.
+                Value::Number(number) => Value::from(number.to_string()),
+                other => other,
+            },
+            Content::Object(_) => value,
+        }
+    }
+}
+
+fn uncapitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// A number in the field's unit.
+pub(super) fn number(value: Value, divisor: f64) -> Value {
+    let parsed = match &value {
+        Value::String(text) => text.trim().parse::<f64>().ok().filter(|number| number.is_finite()),
+        Value::Number(number) => number.as_f64(),
+        _ => None,
+    };
+    match parsed {
+        // Not divided by 1: what is written comes back as it is.
+        Some(number) if divisor == 1.0 => Value::from(number),
+        Some(number) => Value::from(number / divisor),
+        None => value,
+    }
+}
+
+/// A whole number; programs keep columns with gaps as floating-point numbers.
+fn whole(value: Value) -> Value {
+    let parsed = match &value {
+        Value::String(text) => text.trim().parse::<i64>().ok().or_else(|| text.trim().parse().ok().and_then(exactly)),
+        Value::Number(number) => number.as_i64().or_else(|| number.as_f64().and_then(exactly)),
+        _ => None,
+    };
+    parsed.map_or(value, Value::from)
+}
+
+fn exactly(number: f64) -> Option<i64> {
+    (number.fract() == 0.0 && number.abs() < 9e15).then_some(number as i64)
+}
+
+fn yes_or_no(value: Value) -> Value {
+    let known = match &value {
+        Value::String(text) => match text.to_ascii_lowercase().as_str() {
+            "true" | "yes" | "1" => Some(true),
+            "false" | "no" | "0" => Some(false),
+            _ => None,
+        },
+        Value::Number(number) => match number.as_f64() {
+            Some(1.0) => Some(true),
+            Some(0.0) => Some(false),
+            _ => None,
+        },
+        _ => None,
+    };
+    known.map_or(value, Value::from)
+}
 
 /// Where users read about the columns.
 pub(super) const HELP: &str = "the columns are told in the chapter on tables (docs/src/tables.md)";

@@ -8,11 +8,11 @@ use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
 
 /// One scenario in so many may be left out; where more cannot be used, the file is not what it is taken for.
-const ONE_IN: u64 = 10;
+const MAX_BAD_ONE_IN: u64 = 10;
 /// Number of errors that are listed one by one.
-const TOLD: usize = 20;
+const MAX_LISTED: usize = 20;
 /// Number of errors that are kept.
-const KEPT: usize = 1000;
+const MAX_KEPT: usize = 1000;
 
 /// What a file of scenarios holds.
 #[derive(Debug)]
@@ -95,7 +95,7 @@ impl ScenariosRead {
 
     /// Leaves a scenario out.
     pub fn refuse(&mut self, error: Error) {
-        if self.problems.len() < KEPT { self.problems.push(error) } else { self.more += 1 }
+        if self.problems.len() < MAX_KEPT { self.problems.push(error) } else { self.more += 1 }
     }
 
     /// What was found; `help` says what a file without any scenario should hold.
@@ -110,17 +110,17 @@ impl ScenariosRead {
         if total == 0 {
             return Err(Error::input(file, "holds no scenario", help));
         }
-        if bad * ONE_IN > total {
+        if bad * MAX_BAD_ONE_IN > total {
             let first_help = self.problems[0].help().unwrap_or_default();
             if bad == 1 {
                 return Err(self.problems.swap_remove(0));
             }
-            let mut problem = format!("{bad} of {total} scenarios cannot be used, more than one in {ONE_IN}:");
-            for error in self.problems.iter().take(TOLD) {
+            let mut problem = format!("{bad} of {total} scenarios cannot be used, more than one in {MAX_BAD_ONE_IN}:");
+            for error in self.problems.iter().take(MAX_LISTED) {
                 problem.push_str(&format!("\n- {error}"));
             }
-            if bad > TOLD as u64 {
-                problem.push_str(&format!("\n- and {} more", bad - TOLD as u64));
+            if bad > MAX_LISTED as u64 {
+                problem.push_str(&format!("\n- and {} more", bad - MAX_LISTED as u64));
             }
             return Err(Error::input(file, problem, first_help));
         }

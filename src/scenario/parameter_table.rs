@@ -5,9 +5,8 @@ use serde_json::{Map, Value};
 
 use super::case_parameters::{CaseParameters, at_least};
 use super::check::name;
-use super::columns::{Chosen, HELP, choose};
+use super::columns::{Chosen, HELP, choose, number};
 use super::found::{ScenarioFile, ScenariosRead};
-use super::leaves::number;
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
@@ -40,9 +39,9 @@ const WIDTH_M: f64 = 1.9;
 /// Default samples per second.
 const RATE_HZ: f64 = 25.0;
 /// Default minimum duration of a scenario, s.
-const MIN_DURATION_S: f64 = 1.0;
+const MIN_DEFAULT_DURATION_S: f64 = 1.0;
 /// Maximum duration, s: the time cap of the paper's profile.
-const MAX_DURATION_S: f64 = 120.0;
+const MAX_CASE_DURATION_S: f64 = 120.0;
 /// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
@@ -184,7 +183,7 @@ fn of_row(
     };
     parameters.settle(doubts, place);
     let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
-    let case = plain.case(MAX_DURATION_S)?;
+    let case = plain.case(MAX_CASE_DURATION_S)?;
     let in_range = |key: &str, default: f64, least: f64, most: f64| match value(key) {
         None => Ok(default),
         Some(value) if (least..=most).contains(&value) => Ok(value),
@@ -194,7 +193,7 @@ fn of_row(
         }
     };
     let rate_hz = in_range("rate", RATE_HZ, 1.0, 1000.0)?;
-    let duration_s = in_range("duration", case.horizon_s.max(MIN_DURATION_S), 0.1, MAX_DURATION_S)?;
+    let duration_s = in_range("duration", case.horizon_s.max(MIN_DEFAULT_DURATION_S), 0.1, MAX_CASE_DURATION_S)?;
     let (gap0, thw0) = match (value("gap"), value("thw")) {
         (Some(_), Some(_)) => {
             return Err(Error::usage(

@@ -6,9 +6,8 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::check::name;
-use super::columns::{Chosen, HELP, choose};
+use super::columns::{Chosen, HELP, Leaf, choose, leaves, names};
 use super::found::{ScenarioFile, ScenariosRead};
-use super::leaves::{Leaf, leaves, names};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
 use crate::support::error::{Error, Place, Result};
@@ -117,7 +116,7 @@ impl Reader {
         let time = self.leaves.len();
         let typed = |(column, value): (&Chosen, Value)| match self.leaves.get(column.field) {
             Some(leaf) => leaf.typed(value, column.divisor),
-            None => super::leaves::number(value, column.divisor),
+            None => super::columns::number(value, column.divisor),
         };
         let values: Vec<Value> = self.chosen.iter().zip(row.values).map(typed).collect();
         let value_of = |field: usize| {

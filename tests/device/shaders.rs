@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 use crate::wgsl::{
     Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments,
 };
-use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Quantity, Recipe, ReducedColumns};
+use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns};
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
 use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
 use lanesweep::model::profile::Profile;
+use lanesweep::scenario::parameterization::Variable;
 use lanesweep::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED};
 use lanesweep::stats::random::SOBOL_ROW;
 
@@ -146,23 +147,23 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("ATTEMPTS", ATTEMPTS),
         ("NO_SLOT", NO_SLOT),
-        ("TARGET_SPEED", Quantity::TargetSpeed as u32),
-        ("LATERAL_SPEED", Quantity::LateralSpeed as u32),
-        ("EGO_SPEED", Quantity::EgoSpeed as u32),
-        ("TARGET_ACCELERATION", Quantity::TargetAcceleration as u32),
-        ("LEAD_SPEED", Quantity::LeadSpeed as u32),
-        ("LEAD_ACCELERATION", Quantity::LeadAcceleration as u32),
-        ("LEAD_GAP", Quantity::LeadGap as u32),
-        ("DURATION", Quantity::Duration as u32),
-        ("FINAL_SPEED", Quantity::FinalSpeed as u32),
-        ("MEAN_DECELERATION", Quantity::MeanDeceleration as u32),
-        ("TIME_HEADWAY", Quantity::TimeHeadway as u32),
-        ("QUANTITIES", Quantity::TimeHeadway as u32 + 1),
-        ("PATH_SINUSOID", generated::Path::Sinusoid as u32),
-        ("PATH_REDUCED", generated::Path::Reduced as u32),
-        ("LATERAL_ENTERING", generated::Lateral::Entering as u32),
-        ("LATERAL_LEAVING", generated::Lateral::Leaving as u32),
-        ("LATERAL_GONE", generated::Lateral::Gone as u32),
+        ("TARGET_SPEED", Variable::TargetSpeed as u32),
+        ("LATERAL_SPEED", Variable::LateralSpeed as u32),
+        ("EGO_SPEED", Variable::EgoSpeed as u32),
+        ("TARGET_ACCELERATION", Variable::TargetAcceleration as u32),
+        ("LEAD_SPEED", Variable::LeadSpeed as u32),
+        ("LEAD_ACCELERATION", Variable::LeadAcceleration as u32),
+        ("LEAD_GAP", Variable::LeadGap as u32),
+        ("DURATION", Variable::Duration as u32),
+        ("FINAL_SPEED", Variable::FinalSpeed as u32),
+        ("MEAN_DECELERATION", Variable::MeanDeceleration as u32),
+        ("TIME_HEADWAY", Variable::TimeHeadway as u32),
+        ("QUANTITIES", Variable::ALL.len() as u32),
+        ("PATH_SINUSOID", generated::CasePath::Sinusoid as u32),
+        ("PATH_REDUCED", generated::CasePath::Reduced as u32),
+        ("LATERAL_ENTERING", generated::LateralPath::Entering as u32),
+        ("LATERAL_LEAVING", generated::LateralPath::Leaving as u32),
+        ("LATERAL_GONE", generated::LateralPath::Gone as u32),
         ("NEVER", NEVER),
     ] {
         assert_eq!(constant(&module, name), value, "{name}");

@@ -173,7 +173,7 @@ fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
     for (key, scenario) in pairs {
         let recorded = recorded_case(&scenario, profile.frame.dt_s).unwrap();
         let id = ParameterizationId::find(scenario.category, key).unwrap();
-        let parameterized = id.kinematic_case(&scenario, profile.frame.dt_s, &options).unwrap();
+        let parameterized = id.case(&scenario, profile.frame.dt_s, &options, None).unwrap();
         for model in ModelId::ALL {
             for thw in headways() {
                 let (s, prime) = (run(&profile, &recorded, model, thw), run(&profile, &parameterized, model, thw));
@@ -205,7 +205,7 @@ fn what_a_scenario_holds_beyond_the_time_cap_changes_no_lane_and_takes_no_memory
             let grid = TimeGrid::of(&profile);
             let mut pairs = vec![[TimeGrid::from(grid.dt_s), grid].map(|grid| recorded_case(&scenario, grid).unwrap())];
             if scenario.category == Category::Lvd {
-                let case = |grid| sinusoid.kinematic_case(&scenario, grid, &options).unwrap();
+                let case = |grid| sinusoid.case(&scenario, grid, &options, None).unwrap();
                 pairs.push([TimeGrid::from(grid.dt_s), grid].map(case));
             }
             for [whole, capped] in &pairs {

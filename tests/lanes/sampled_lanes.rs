@@ -55,7 +55,7 @@ fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 1
 fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
         for id in ParameterizationId::ALL {
-            let density = density(id, false);
+            let density = density(id.clone(), false);
             let points: Vec<Vec<f64>> = density.kde.points().to_vec();
             let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();
             let mut late = 0;
@@ -142,7 +142,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
     for id in ParameterizationId::ALL {
         for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
-            let density = density(id, false);
+            let density = density(id.clone(), false);
             let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
             let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
@@ -165,7 +165,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
         for id in ParameterizationId::ALL {
             for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
                 let n = 400;
-                let density = density(id, with_thw);
+                let density = density(id.clone(), with_thw);
                 let mixture = density.mixture().unwrap();
                 let plan = plan_samples(&density, &mixture, &profile, &options(n, source)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
@@ -186,7 +186,7 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
     let n = 500;
     for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
         let id = ParameterizationId::find(id.1, id.0).unwrap();
-        let density = density(id, true);
+        let density = density(id.clone(), true);
         let kernels = density.mixture().unwrap();
         // A second mixture of another shape beside: weights and two factors.
         let mean = kernels.mean(0).to_vec();

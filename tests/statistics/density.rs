@@ -6,8 +6,8 @@ use crate::common;
 use std::sync::OnceLock;
 
 use lanesweep::scenario::parameterization::{
-    CutInParameters, CutOutParameters, Kind, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale,
-    Sizes, SvdLateral, fit_svd,
+    Family, Kinematic, LaneChange, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale, Sizes,
+    SpeedProfile, SvdLateral, Variable, fit_svd,
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
 use lanesweep::stats::density::{
@@ -18,23 +18,6 @@ use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use serde_json::Value;
-
-#[test]
-fn a_case_that_needs_a_lateral_speed_is_not_made_without_one() {
-    let sizes = |s: &Scenario| Sizes::of(s);
-    let options = ParameterizationOptions::default();
-    let first = |category: Category| scenarios().iter().find(|s| s.category == category && s.kept).unwrap();
-    let (cut_in, cut_out) = (first(Category::CutIn), first(Category::CutOut));
-    let without = CutInParameters { lateral_speed_mps: None, ..CutInParameters::of(cut_in, &options) };
-    for (key, is_made) in [("1", false), ("2", false), ("3", true), ("4", true)] {
-        assert_eq!(without.case(key, &sizes(cut_in), &options).is_ok(), is_made, "cut-in {key}");
-    }
-    let of = CutOutParameters::of(cut_out, &options).unwrap();
-    let without = CutOutParameters { lateral_speed_mps: None, ..of };
-    for (key, is_made) in [("a", false), ("b", false), ("c", true), ("d", true)] {
-        assert_eq!(without.case(key, &sizes(cut_out), &options).is_ok(), is_made, "cut-out {key}");
-    }
-}
 
 fn golden(name: &str) -> Value {
     // Python writes infinities, which JSON does not know; they are the scores that underflow.
@@ -375,19 +358,16 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
         let options = ParameterizationOptions { svd_lateral, ..ParameterizationOptions::default() };
         let mut compared = 0;
         for id in ParameterizationId::ALL {
-            let space = space(id, &options, true);
+            let space = space(id.clone(), &options, true);
             for scenario in kept(id.category) {
                 let what = format!("{} under {}", scenario.id, id.key);
                 let point = space.point(scenario).unwrap();
                 space.check(&point).unwrap_or_else(|invalid| panic!("{what}: {invalid}"));
                 assert_eq!(space.thw_s(&point), scenario.thw0);
                 let ours = space.case(&point, &Sizes::of(scenario), 0.04).unwrap();
-                let theirs = match (id.kind, space.reduction()) {
-                    (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, 0.04).unwrap(),
-                    _ => id.kinematic_case(scenario, 0.04, &options).unwrap(),
-                };
+                let theirs = id.case(scenario, 0.04, &options, space.reduction()).unwrap();
                 let from_right = svd_lateral == SvdLateral::Signed && scenario.side == Side::Right;
-                if id.category == Category::Lvd && id.kind == Kind::Kinematic {
+                if id.variables().contains(&Variable::MeanDeceleration) {
                     assert_same_case(&ours, &theirs, &what);
                 } else if from_right {
                     assert_eq!(mirrored(ours), theirs, "{what}");
@@ -399,6 +379,24 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
         }
         assert!(compared > 19 * 20, "{compared}");
     }
+}
+
+#[test]
+fn an_instance_that_no_registry_lists_encodes_and_decodes() {
+    let options = ParameterizationOptions::default();
+    let kept = kept(Category::Lvd);
+    let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
+    let six = ParameterizationId { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
+    let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
+    assert_eq!(point.len(), six.parameters(&options).len());
+    let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();
+    assert_eq!(decoded, six.case(kept[0], 0.04, &options, Some(&reduction)).unwrap());
+    assert!(six.encode(kept[0], &options, None).is_err(), "without a decomposition");
+    let decoded = six.decode(&point[1..], &Sizes::of(kept[0]), 0.04, &options, Some(&reduction));
+    assert!(decoded.is_err(), "without a coefficient");
+    let features = Kinematic { speed: SpeedProfile::Constant, lane_change: LaneChange::None };
+    let steady = ParameterizationId { family: Family::Kinematic(features), ..six };
+    assert!(steady.encode(kept[0], &options, None).is_err(), "an LVD that does not decelerate");
 }
 
 #[test]
@@ -459,8 +457,8 @@ fn a_reconstruction_is_refused_where_its_own_duration_speed_or_gap_is_impossible
         for mut point in far.draws(&stream, 0..4000) {
             point.iter_mut().for_each(|c| *c *= 6.0);
             let z = reduction.basis.reconstruct(&point);
-            let (duration, ego) = (z[reduction.duration_column()], z[reduction.ego_speed_column()]);
-            let gap = reduction.lead_gap_column().map_or(1.0, |c| z[c]);
+            let column = |variable| reduction.column(variable).map_or(1.0, |c| z[c]);
+            let [duration, ego, gap] = [Variable::Duration, Variable::EgoSpeed, Variable::LeadGap].map(column);
             let possible = (0.1..=600.0).contains(&duration) && ego >= 0.0 && gap >= 0.0;
             match space.check(&point) {
                 Ok(()) => assert!(possible),

@@ -3,9 +3,10 @@
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::NEVER;
 use crate::model::scalar::Real;
+use crate::scenario::parameterization::Variable;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
-use super::recipe::{Lateral, NO_SLOT, Path, Quantity, Recipe};
+use super::recipe::{CasePath, LateralPath, NO_SLOT, Recipe};
 
 /// An event this close behind a step, in steps, counts as at the step.
 const STEP_TOLERANCE: f64 = 1e-4;
@@ -29,7 +30,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
             return false;
         }
     }
-    if recipe.path() == Path::Reduced {
+    if recipe.path() == CasePath::Reduced {
         let columns = &recipe.columns;
         let duration = column::<f32>(recipe, basis, point, columns.duration);
         let ego_speed = column::<f32>(recipe, basis, point, columns.ego_speed);
@@ -40,11 +41,11 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
             && gap >= 0.0;
     }
     if recipe.decelerates != 0 {
-        let (initial, end) = (at(recipe, point, Quantity::TargetSpeed), at(recipe, point, Quantity::FinalSpeed));
+        let (initial, end) = (at(recipe, point, Variable::TargetSpeed), at(recipe, point, Variable::FinalSpeed));
         if end >= initial {
             return false;
         }
-        let duration = (initial - end).exact_div(at(recipe, point, Quantity::MeanDeceleration));
+        let duration = (initial - end).exact_div(at(recipe, point, Variable::MeanDeceleration));
         return duration >= recipe.min_duration && duration <= recipe.longest_duration;
     }
     true
@@ -53,7 +54,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
 /// The case of a valid point; series go to the end of `tables`.
 pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
     let number = |value: f32| R::from_f64(value.into());
-    let is_reduced = recipe.path() == Path::Reduced;
+    let is_reduced = recipe.path() == CasePath::Reduced;
     let (mut principal, mut ahead) = (Motion::resting(), Motion::resting());
     let (ego_speed, lead_gap, horizon);
     if is_reduced {
@@ -70,30 +71,30 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
         lead_gap = if columns.lead_gap == NO_SLOT { R::ZERO } else { column(recipe, basis, point, columns.lead_gap) };
         horizon = steps_up(duration * number(recipe.inverse_dt));
     } else {
-        let value = |quantity| number(at(recipe, point, quantity));
-        let initial = value(Quantity::TargetSpeed);
-        let mut duration = value(Quantity::Duration);
+        let value = |variable| number(at(recipe, point, variable));
+        let initial = value(Variable::TargetSpeed);
+        let mut duration = value(Variable::Duration);
         if recipe.decelerates != 0 {
-            let (end, deceleration) = (value(Quantity::FinalSpeed), value(Quantity::MeanDeceleration));
+            let (end, deceleration) = (value(Variable::FinalSpeed), value(Variable::MeanDeceleration));
             duration = (initial - end).exact_div(deceleration);
-            if recipe.path() == Path::Sinusoid {
+            if recipe.path() == CasePath::Sinusoid {
                 sinusoidal_speed(recipe, initial, end, duration, &mut principal, tables);
             } else {
                 kinematic_speed(recipe, initial, -deceleration, duration, &mut principal);
                 principal.speed_end = end;
             }
         } else {
-            kinematic_speed(recipe, initial, value(Quantity::TargetAcceleration), duration, &mut principal);
+            kinematic_speed(recipe, initial, value(Variable::TargetAcceleration), duration, &mut principal);
         }
-        let lead_speed = value(Quantity::LeadSpeed);
-        kinematic_speed(recipe, lead_speed, value(Quantity::LeadAcceleration), duration, &mut ahead);
-        let change = kinematic_lateral(recipe, value(Quantity::LateralSpeed), &mut principal);
-        let has_ego_speed = recipe.slots[Quantity::EgoSpeed as usize] != NO_SLOT;
-        ego_speed = if has_ego_speed { value(Quantity::EgoSpeed) } else { initial };
-        lead_gap = value(Quantity::LeadGap);
+        let lead_speed = value(Variable::LeadSpeed);
+        kinematic_speed(recipe, lead_speed, value(Variable::LeadAcceleration), duration, &mut ahead);
+        let change = kinematic_lateral(recipe, value(Variable::LateralSpeed), &mut principal);
+        let has_ego_speed = recipe.slots[Variable::EgoSpeed as usize] != NO_SLOT;
+        ego_speed = if has_ego_speed { value(Variable::EgoSpeed) } else { initial };
+        lead_gap = value(Variable::LeadGap);
         horizon = steps_up(duration.larger(change) * number(recipe.inverse_dt));
     }
-    let headway_gap = number(at(recipe, point, Quantity::TimeHeadway)) * ego_speed;
+    let headway_gap = number(at(recipe, point, Variable::TimeHeadway)) * ego_speed;
     let other = |motion, which: usize, gap_offset, judged| LaneOther {
         motion,
         half_lengths: number(recipe.half_lengths[which]),
@@ -123,10 +124,10 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
     LaneCase { others: [first, second], ego_speed, ego_width: number(recipe.ego_width), horizon, pair: recipe.pair }
 }
 
-/// The value of a quantity; 0 where no parameter gives it.
+/// The value of a variable; 0 where no parameter gives it.
 #[inline]
-fn at(recipe: &Recipe, point: &[f32], quantity: Quantity) -> f32 {
-    let slot = recipe.slots[quantity as usize];
+fn at(recipe: &Recipe, point: &[f32], variable: Variable) -> f32 {
+    let slot = recipe.slots[variable as usize];
     if slot == NO_SLOT { 0.0 } else { point[slot as usize] }
 }
 
@@ -168,15 +169,15 @@ fn kinematic_speed<R: Real>(recipe: &Recipe, initial: R, acceleration: R, durati
 /// Lateral motion at constant speed; gives the time of the lane change, s.
 fn kinematic_lateral<R: Real>(recipe: &Recipe, lateral_speed: R, motion: &mut Motion<R>) -> R {
     let (dt, way) = (R::from_f64(recipe.dt.into()), R::from_f64(recipe.lane_change.into()));
-    if recipe.lateral == Lateral::Gone as u32 {
+    if recipe.lateral == LateralPath::Gone as u32 {
         motion.lateral_initial = way;
         motion.lateral_end = way;
     }
-    if recipe.lateral == Lateral::Gone as u32 || recipe.lateral == Lateral::Centred as u32 {
+    if recipe.lateral == LateralPath::Gone as u32 || recipe.lateral == LateralPath::Centred as u32 {
         return R::ZERO;
     }
     let change = way.exact_div(lateral_speed);
-    let enters = recipe.lateral == Lateral::Entering as u32;
+    let enters = recipe.lateral == LateralPath::Entering as u32;
     let per_step = lateral_speed * dt;
     motion.lateral_until = steps_up(change * R::from_f64(recipe.inverse_dt.into())).saturating_sub(1);
     motion.lateral_initial = if enters { way } else { R::ZERO };

@@ -9,7 +9,7 @@ mod points;
 mod recipe;
 
 pub use points::{ATTEMPTS, Drawn, MAX_PARAMETERS, PointSource, Points};
-pub use recipe::{Lateral, NO_SLOT, Path, Quantity, Recipe, ReducedColumns};
+pub use recipe::{CasePath, LateralPath, NO_SLOT, Recipe, ReducedColumns};
 
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
@@ -49,9 +49,9 @@ impl Generator {
     pub fn table_entries(&self) -> [u32; 2] {
         let entries = self.recipe.longest_series();
         match self.recipe.path() {
-            Path::Kinematic => [0, 0],
-            Path::Sinusoid => [entries, 0],
-            Path::Reduced => [entries * self.recipe.speed_series(), entries * self.recipe.lateral_series()],
+            CasePath::Kinematic => [0, 0],
+            CasePath::Sinusoid => [entries, 0],
+            CasePath::Reduced => [entries * self.recipe.speed_series(), entries * self.recipe.lateral_series()],
         }
     }
 }

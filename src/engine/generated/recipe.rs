@@ -10,47 +10,18 @@ use bytemuck::{Pod, Zeroable};
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
-use crate::scenario::Motion;
+use crate::scenario::parameterization::{LaneChange, ParameterizationId, SpeedProfile, Variable};
+use crate::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
 
-/// A quantity that a case is made of; its code is its place in [`Recipe::slots`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Quantity {
-    /// Speed of cutter or cutting-out vehicle at t = 0, m/s; LVD: of the leader.
-    TargetSpeed,
-    /// Size of the lateral speed, m/s.
-    LateralSpeed,
-    /// Speed of the ego, m/s; LVD: that of the leader where it has no slot.
-    EgoSpeed,
-    /// Acceleration of the target over [0, T], m/s².
-    TargetAcceleration,
-    /// Speed of the vehicle ahead at t = 0, m/s.
-    LeadSpeed,
-    /// Its acceleration over [0, T], m/s².
-    LeadAcceleration,
-    /// Gap D, m.
-    LeadGap,
-    /// T, s.
-    Duration,
-    /// LVD: speed of the leader at the end, m/s.
-    FinalSpeed,
-    /// LVD: (v0 − v1)/T, m/s².
-    MeanDeceleration,
-    /// Time headway, s.
-    TimeHeadway,
-}
-
-/// Number of quantities.
-pub const QUANTITIES: usize = 11;
-/// A quantity that no parameter gives.
+/// A variable that no parameter gives.
 pub const NO_SLOT: u32 = u32::MAX;
 
 /// How speeds and lateral positions follow from a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Path {
+pub enum CasePath {
     /// Constant speeds and accelerations.
     Kinematic,
     /// LVD ii: half a cosine.
@@ -59,10 +30,21 @@ pub enum Path {
     Reduced,
 }
 
+impl CasePath {
+    /// That of a parameterization.
+    pub fn of(id: &ParameterizationId) -> CasePath {
+        match id.features().map(|features| features.speed) {
+            None => CasePath::Reduced,
+            Some(SpeedProfile::Sinusoidal) => CasePath::Sinusoid,
+            Some(SpeedProfile::Constant | SpeedProfile::ConstantAcceleration) => CasePath::Kinematic,
+        }
+    }
+}
+
 /// Lateral motion of the principal vehicle on kinematic paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Lateral {
+pub enum LateralPath {
     /// In the middle of the ego's lane.
     Centred,
     /// From the side into the ego's lane at constant lateral speed.
@@ -71,6 +53,19 @@ pub enum Lateral {
     Leaving,
     /// Beside the ego's lane from the start.
     Gone,
+}
+
+impl LateralPath {
+    /// That of a parameterization; unused on reduced paths.
+    pub fn of(id: &ParameterizationId) -> LateralPath {
+        let is_gradual = id.features().is_some_and(|features| features.lane_change == LaneChange::Gradual);
+        match (id.category, is_gradual) {
+            (Category::CutIn, true) => LateralPath::Entering,
+            (Category::CutOut, true) => LateralPath::Leaving,
+            (Category::CutOut, false) => LateralPath::Gone,
+            (Category::CutIn | Category::Lvd, _) => LateralPath::Centred,
+        }
+    }
 }
 
 /// Columns of a reduction's vector.
@@ -101,9 +96,9 @@ pub struct ReducedColumns {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recipe {
-    /// [`Path`] as a number.
+    /// [`CasePath`] as a number.
     pub path: u32,
-    /// [`Lateral`] as a number.
+    /// [`LateralPath`] as a number.
     pub lateral: u32,
     /// Parameters of a point.
     pub dimensions: u32,
@@ -117,8 +112,8 @@ pub struct Recipe {
     pub judged: u32,
     /// Last step of every lane.
     pub step_cap: u32,
-    /// Index of the parameter that gives each [`Quantity`], or [`NO_SLOT`].
-    pub slots: [u32; QUANTITIES],
+    /// Index of the parameter that gives each [`Variable`], or [`NO_SLOT`].
+    pub slots: [u32; Variable::ALL.len()],
     /// Columns of the reduction.
     pub columns: ReducedColumns,
     /// Least valid value of each parameter.
@@ -158,11 +153,11 @@ unsafe impl Pod for Recipe {}
 
 impl Recipe {
     /// How motions follow from a point.
-    pub fn path(&self) -> Path {
+    pub fn path(&self) -> CasePath {
         match self.path {
-            0 => Path::Kinematic,
-            1 => Path::Sinusoid,
-            _ => Path::Reduced,
+            0 => CasePath::Kinematic,
+            1 => CasePath::Sinusoid,
+            _ => CasePath::Reduced,
         }
     }
 

@@ -9,7 +9,7 @@ use crate::engine::{Constants, LaneCase, NO_STEP, Outcome, Silent, Start};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
-use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, recorded_case};
+use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, recorded_case};
 use crate::scenario::{Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
@@ -59,13 +59,13 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
                 "S" => recorded_case(scenario, dt_s)?,
                 // One by SVD needs the fit of the study that the table came from.
                 _ => ParameterizationId::find(scenario.category, param)
-                    .filter(|id| id.kind == Kind::Kinematic)
+                    .filter(|id| id.features().is_some())
                     .ok_or_else(|| {
                         let problem =
                             format!("{} has no kinematic parameterization `{param}`", scenario.category.label());
                         Error::input(row.place("param"), problem, "expected S or a kinematic one (1–4, a–d, i, ii)")
                     })?
-                    .kinematic_case(scenario, dt_s, &options)?,
+                    .case(scenario, dt_s, &options, None)?,
             };
             let mut tables64 = Tables::default();
             let case64 = LaneCase::encode(&case, profile, &mut tables64);

@@ -246,7 +246,7 @@ pub struct ComparedCell {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedParameterization {
     /// Its name in the paper.
-    pub key: &'static str,
+    pub key: String,
     /// Number of its parameters.
     pub parameters: usize,
     /// SHA-256 of its density.

@@ -2,13 +2,13 @@
 
 use crate::engine::attention_rules;
 use crate::engine::generated::{
-    Generator, Lateral, MAX_PARAMETERS, NO_SLOT, Path, PointSource, Points, Quantity, Recipe, ReducedColumns,
+    CasePath, Generator, LateralPath, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe, ReducedColumns,
 };
 use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::model::scalar::Real;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{AfterDuration, Kind, Sizes};
-use crate::stats::density::{Mixture, ParameterSpace, Quantity as Parameter};
+use crate::scenario::parameterization::{AfterDuration, Series, Sizes, Variable};
+use crate::stats::density::{Mixture, ParameterSpace};
 use crate::stats::random::{AliasTable, Sobol, Stream};
 use crate::{Error, Place, Result};
 
@@ -94,7 +94,7 @@ fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Pr
     let d = points.dimensions;
     if d > MAX_PARAMETERS || d != space.dimensions() {
         return Err(Error::usage(
-            Place::item(name_of(space)),
+            Place::item(space.id().name()),
             format!("{d} parameters cannot be sampled, {MAX_PARAMETERS} can"),
             "use a parameterization with fewer",
         ));
@@ -111,10 +111,6 @@ fn assembled(space: &ParameterSpace, points: Points, sizes: &Sizes, profile: &Pr
     Ok(Generator { points, recipe, basis: basis(space) })
 }
 
-fn name_of(space: &ParameterSpace) -> String {
-    format!("{} {}", space.id().category.label(), space.id().key)
-}
-
 fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Recipe> {
     let id = space.id();
     let category = id.category;
@@ -122,16 +118,12 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     let lead = match (pair, sizes.lead) {
         (true, None) => {
             let problem = "a cut-out needs the size of the vehicle ahead of the cutting-out one";
-            return Err(Error::input(Place::item(name_of(space)), problem, "fit the density again"));
+            return Err(Error::input(Place::item(space.id().name()), problem, "fit the density again"));
         }
         (_, lead) => lead.unwrap_or(sizes.target),
     };
-    let mut slots = [NO_SLOT; 11];
     let (mut lower, mut upper) = ([f32::MIN; MAX_PARAMETERS], [f32::MAX; MAX_PARAMETERS]);
-    for (j, (quantity, parameter)) in space.quantities().iter().zip(space.parameters()).enumerate() {
-        if let Some(slot) = slot_of(*quantity) {
-            slots[slot as usize] = j as u32;
-        }
+    for (j, parameter) in space.parameters().iter().enumerate() {
         if let Some(bound) = parameter.lower {
             lower[j] = at_least(bound, parameter.lower_excluded);
         }
@@ -139,31 +131,20 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
             upper[j] = at_most(bound);
         }
     }
-    let path = match (id.kind, id.key) {
-        (Kind::Svd(_), _) => Path::Reduced,
-        (_, "ii") => Path::Sinusoid,
-        _ => Path::Kinematic,
-    };
-    let lateral = match (category, id.key) {
-        (Category::CutIn, "1" | "2") => Lateral::Entering,
-        (Category::CutOut, "a" | "b") => Lateral::Leaving,
-        (Category::CutOut, _) => Lateral::Gone,
-        _ => Lateral::Centred,
-    };
     let frame = &profile.frame;
     let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
     let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
     let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
     Ok(Recipe {
-        path: path as u32,
-        lateral: lateral as u32,
+        path: CasePath::of(id) as u32,
+        lateral: LateralPath::of(id) as u32,
         dimensions: space.dimensions() as u32,
         pair: u32::from(pair),
-        decelerates: u32::from(category == Category::Lvd && id.kind == Kind::Kinematic),
+        decelerates: u32::from(space.dimension_of(Variable::MeanDeceleration).is_some()),
         unlimited: u32::from(unlimited),
         judged: u32::from(!(pair && frame.cut_out_judged == CutOutJudged::Ahead)),
         step_cap: profile.step_cap(),
-        slots,
+        slots: Variable::ALL.map(|variable| slot(space.dimension_of(variable))),
         columns: columns(space),
         lower,
         upper,
@@ -180,22 +161,9 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     })
 }
 
-/// Where a case generator keeps a parameter; `None` for coefficients.
-fn slot_of(parameter: Parameter) -> Option<Quantity> {
-    Some(match parameter {
-        Parameter::TargetSpeed | Parameter::InitialSpeed => Quantity::TargetSpeed,
-        Parameter::LateralSpeed => Quantity::LateralSpeed,
-        Parameter::EgoSpeed => Quantity::EgoSpeed,
-        Parameter::TargetAcceleration => Quantity::TargetAcceleration,
-        Parameter::LeadSpeed => Quantity::LeadSpeed,
-        Parameter::LeadAcceleration => Quantity::LeadAcceleration,
-        Parameter::LeadGap => Quantity::LeadGap,
-        Parameter::Duration => Quantity::Duration,
-        Parameter::FinalSpeed => Quantity::FinalSpeed,
-        Parameter::MeanDeceleration => Quantity::MeanDeceleration,
-        Parameter::TimeHeadway => Quantity::TimeHeadway,
-        Parameter::Coefficient(_) => return None,
-    })
+/// A place in a record of the device.
+fn slot(place: Option<usize>) -> u32 {
+    place.map_or(NO_SLOT, |place| place as u32)
 }
 
 /// The least number of the lane arithmetic that keeps a lower bound; never a subnormal one.
@@ -213,7 +181,7 @@ fn at_most(bound: f64) -> f32 {
 }
 
 fn columns(space: &ParameterSpace) -> ReducedColumns {
-    let (Some(reduction), Kind::Svd(d)) = (space.reduction(), space.id().kind) else {
+    let (Some(reduction), Some(d)) = (space.reduction(), space.id().coefficients()) else {
         return ReducedColumns {
             lateral: NO_SLOT,
             lead_speed: NO_SLOT,
@@ -221,22 +189,18 @@ fn columns(space: &ParameterSpace) -> ReducedColumns {
             ..ReducedColumns::default()
         };
     };
-    let instants = space.options().svd_instants as u32;
-    let (lateral, speed, lead_speed) = match space.id().category {
-        Category::CutIn => (0, instants, NO_SLOT),
-        Category::CutOut => (0, instants, 2 * instants),
-        Category::Lvd => (NO_SLOT, 0, NO_SLOT),
-    };
+    let series = |series| slot(reduction.series_column(series));
+    let number = |variable| slot(reduction.column(variable));
     ReducedColumns {
         width: reduction.basis.mean.len() as u32,
-        instants,
+        instants: space.options().svd_instants as u32,
         coefficients: d as u32,
-        lateral,
-        speed,
-        lead_speed,
-        ego_speed: reduction.ego_speed_column() as u32,
-        lead_gap: reduction.lead_gap_column().map_or(NO_SLOT, |column| column as u32),
-        duration: reduction.duration_column() as u32,
+        lateral: series(Series::Lateral),
+        speed: series(Series::TargetSpeed),
+        lead_speed: series(Series::LeadSpeed),
+        ego_speed: number(Variable::EgoSpeed),
+        lead_gap: number(Variable::LeadGap),
+        duration: number(Variable::Duration),
     }
 }
 
@@ -247,7 +211,7 @@ fn rounded(value: f64) -> f32 {
 
 /// Mean and directions divided by the weights, so that a lane only multiplies and adds.
 fn basis(space: &ParameterSpace) -> Vec<f32> {
-    let (Some(reduction), Kind::Svd(d)) = (space.reduction(), space.id().kind) else { return Vec::new() };
+    let (Some(reduction), Some(d)) = (space.reduction(), space.id().coefficients()) else { return Vec::new() };
     let basis = &reduction.basis;
     let divided = |row: &Vec<f64>| row.iter().zip(&basis.weights).map(|(v, w)| rounded(v / w)).collect::<Vec<_>>();
     std::iter::once(&basis.mean).chain(&basis.directions[..d]).flat_map(divided).collect()

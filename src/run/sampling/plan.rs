@@ -121,7 +121,7 @@ fn plan(
     let block = Block {
         category: id.category,
         units: Units::Numbered(samples),
-        variants: vec![id.key.to_owned()],
+        variants: vec![id.key.to_string()],
         first_unit: 0,
         first_lane: 0,
     };

@@ -14,7 +14,7 @@ use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
 use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{
-    Kind, ParameterizationId, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
+    ParameterizationId, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
 };
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
@@ -176,7 +176,7 @@ impl StudyCases {
 
 /// Those of a category, with or without a decomposition.
 pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = ParameterizationId> {
-    ParameterizationId::of(category).filter(move |id| id.kind == Kind::Kinematic || has_reduction)
+    ParameterizationId::of(category).filter(move |id| id.features().is_some() || has_reduction)
 }
 
 /// Entries of the cases that are in memory at once, at any time step: 2 GiB.
@@ -185,7 +185,7 @@ const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
 /// Values in the series of a scenario per step, with its parameterizations: speed, lateral position and lateral speed of
 /// each that is sampled; in a cut-out the speed of the vehicle ahead; an LVD is centred.
 pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = ParameterizationId>) -> f64 {
-    let sampled = ids.filter(|id| id.kind != Kind::Kinematic || id.key == "ii").count() + 1;
+    let sampled = ids.filter(ParameterizationId::has_series).count() + 1;
     let series = match category {
         Category::CutIn => 3,
         Category::CutOut => 4,
@@ -204,10 +204,7 @@ fn cases_of(
 ) -> Result<Vec<Case>> {
     let mut cases = vec![recorded_case(scenario, grid)?];
     for id in ids {
-        cases.push(match (id.kind, reduction) {
-            (Kind::Svd(d), Some(reduction)) => reduction.case(scenario, d, grid)?,
-            _ => id.kinematic_case(scenario, grid, options)?,
-        });
+        cases.push(id.case(scenario, grid, options, reduction)?);
     }
     Ok(cases)
 }

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
+use crate::scenario::parameterization::{Parameter, ParameterizationId, ParameterizationOptions, SpeedProfile};
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::ParameterSpace;
 use crate::support::round_step::plain_step;
@@ -38,18 +38,16 @@ pub fn parameter_histograms(
     scenarios: &[&Scenario],
     options: &ParameterizationOptions,
 ) -> Result<Vec<ParameterHistogram>> {
-    let keys: &[&str] = match category {
-        // Where the start is recorded 2 has no density, but 4 has.
-        Category::CutIn => &["2", "4"],
-        Category::CutOut => &["b"],
-        Category::Lvd => &["i"],
+    // Of cut-ins with a recorded start only those without a gradual lane change have a density.
+    let accelerates = |id: &ParameterizationId| {
+        id.features().is_some_and(|features| features.speed == SpeedProfile::ConstantAcceleration)
     };
-    let spaces = keys.iter().filter_map(|key| ParameterizationId::find(category, key));
-    let Some(space) = spaces.filter_map(|id| ParameterSpace::new(id, options, None, false).ok()).next() else {
+    let ids = ParameterizationId::of(category).filter(accelerates);
+    let Some(space) = ids.filter_map(|id| ParameterSpace::new(id, options, None, false).ok()).next() else {
         return Ok(Vec::new());
     };
     let points = scenarios.iter().map(|scenario| space.point(scenario)).collect::<Result<Vec<_>>>()?;
-    let of = |(at, parameter): (usize, &crate::stats::density::Parameter)| {
+    let of = |(at, parameter): (usize, &Parameter)| {
         let values: Vec<f64> = points.iter().map(|point| point[at]).collect();
         let (low, width, counts) = bins(values)?;
         Some(ParameterHistogram { name: parameter.name.clone(), unit: parameter.unit.clone(), low, width, counts })

@@ -9,7 +9,7 @@ use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::unit_record::{self, UnitRecords};
-use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
+use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, problem_of};
 use crate::support::hex::hex;
 use crate::{Error, Place, Result};
@@ -44,7 +44,7 @@ pub(crate) struct BlockHead {
 impl BlockHead {
     /// Of the decomposition, what cases are made with.
     pub fn new(category: Category, units: u64, reduction: Option<&Reduction>) -> BlockHead {
-        let used = directions_used(category);
+        let used = ParameterizationId::max_coefficients(category);
         let basis = reduction.map(|reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();
             let directions = directions.into_iter().take(used).collect();
@@ -52,12 +52,6 @@ impl BlockHead {
         });
         BlockHead { category, units, basis }
     }
-}
-
-/// Directions of a decomposition that the cases of a category need.
-fn directions_used(category: Category) -> usize {
-    let used = |id: ParameterizationId| if let Kind::Svd(directions) = id.kind { directions } else { 0 };
-    ParameterizationId::of(category).map(used).max().unwrap_or(0)
 }
 
 impl StudyHead {
@@ -123,7 +117,7 @@ impl StudyHead {
             return wrong("a headway is out of range (0 to 1e6)");
         }
         for block in &self.blocks {
-            let used = directions_used(block.category);
+            let used = ParameterizationId::max_coefficients(block.category);
             if block.basis.as_ref().is_some_and(|basis| basis.directions.len() != used) {
                 return wrong("a decomposition does not have the directions of its parameterizations");
             }

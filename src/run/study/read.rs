@@ -39,11 +39,11 @@ impl StudyHead {
             let (from, end) = (held.first.clamp(first, first + block.units), first + block.units);
             let names: Vec<String> =
                 records.by_ref().take((held.units().end.clamp(from, end) - from) as usize).collect();
-            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key);
+            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
             blocks.push(Block {
                 category: block.category,
                 units: Units::Held(block.units, from - first, names.into()),
-                variants: std::iter::once("S").chain(variants).map(str::to_owned).collect(),
+                variants: std::iter::once("S".to_owned()).chain(variants).collect(),
                 first_unit: 0,
                 first_lane: 0,
             });

@@ -1,33 +1,31 @@
-//! Parameterizations: from a mined scenario to the cases that are simulated.
+//! Parameterizations: from a mined scenario to a point, and from a scenario or a point to the case that is simulated.
 //!
 //! Here live S (the scenario as recorded), the kinematic parameterizations and the reduction by singular
 //! value decomposition. Here lives nothing about headways, models or verdicts. Scenarios come from
 //! [`crate::scenario`]; cases go to [`crate::engine`].
 //!
-//! To add a parameterization: a line in [`ParameterizationId::ALL`], its case in the category's file.
+//! A [`ParameterizationId`] is data: all that others ask of it (parameters, description, encoding, decoding) follows
+//! from its category and its [`Family`]. To add one of a known family: a line in [`ParameterizationId::ALL`].
 
-mod cut_in;
-mod cut_out;
-mod lvd;
-mod modes;
+mod kinematic;
 mod options;
-mod recorded;
+mod parameter;
 mod reduction;
 mod series;
 mod sizes;
 mod svd;
 
-pub use cut_in::CutInParameters;
-pub use cut_out::CutOutParameters;
-pub use lvd::LvdParameters;
-pub use modes::ModeShape;
+use std::borrow::Cow;
+
+pub use kinematic::{Kinematic, LaneChange, SpeedProfile};
 pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };
-pub use recorded::recorded_case;
-pub use reduction::{MIN_DURATION_S, ReducedScenario, Reduction};
-pub use series::TimeGrid;
+pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
+pub use reduction::{ModeShape, ReducedScenario, Reduction, Series};
 pub(crate) use series::steps_of;
+pub use series::{TimeGrid, recorded_case};
+pub(crate) use sizes::vehicle_ahead;
 pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 
@@ -36,61 +34,76 @@ use crate::{Error, Place, Result};
 
 /// How a parameterization describes a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// By physical parameters.
-    Kinematic,
+pub enum Family {
+    /// By physical variables.
+    Kinematic(Kinematic),
     /// By this many coefficients of a singular value decomposition.
     Svd(usize),
 }
 
-/// One of the paper's parameterizations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+impl Family {
+    /// `kinematic` or `SVD`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Family::Kinematic(_) => "kinematic",
+            Family::Svd(_) => "SVD",
+        }
+    }
+}
+
+/// The specification of one parameterization.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ParameterizationId {
     /// Kind of scenario.
     pub category: Category,
-    /// Name in the paper: `1`…`7`, `a`…`g`, `i`…`v`.
-    pub key: &'static str,
+    /// Name, unique in its category; in the paper `1`…`7`, `a`…`g`, `i`…`v`.
+    pub key: Cow<'static, str>,
     /// How it describes a scenario.
-    pub kind: Kind,
-    /// Number of parameters without the headway.
-    pub parameters: usize,
-    /// One line: what is kept.
-    pub description: &'static str,
+    pub family: Family,
 }
 
-const fn id(
+const fn kinematic(
     category: Category,
     key: &'static str,
-    kind: Kind,
-    parameters: usize,
-    description: &'static str,
+    speed: SpeedProfile,
+    lane_change: LaneChange,
 ) -> ParameterizationId {
-    ParameterizationId { category, key, kind, parameters, description }
+    let family = Family::Kinematic(Kinematic { speed, lane_change });
+    ParameterizationId { category, key: Cow::Borrowed(key), family }
+}
+
+const fn svd(category: Category, key: &'static str, coefficients: usize) -> ParameterizationId {
+    ParameterizationId { category, key: Cow::Borrowed(key), family: Family::Svd(coefficients) }
 }
 
 impl ParameterizationId {
-    /// The registry: all 19, in the order of every table.
-    pub const ALL: [ParameterizationId; 19] = [
-        id(Category::CutIn, "1", Kind::Kinematic, 3, "constant speed, constant lateral speed"),
-        id(Category::CutIn, "2", Kind::Kinematic, 4, "constant acceleration, constant lateral speed"),
-        id(Category::CutIn, "3", Kind::Kinematic, 2, "constant speed, instantaneous lane change"),
-        id(Category::CutIn, "4", Kind::Kinematic, 3, "constant acceleration, instantaneous lane change"),
-        id(Category::CutIn, "5", Kind::Svd(3), 3, "SVD, 3 coefficients"),
-        id(Category::CutIn, "6", Kind::Svd(4), 4, "SVD, 4 coefficients"),
-        id(Category::CutIn, "7", Kind::Svd(5), 5, "SVD, 5 coefficients"),
-        id(Category::CutOut, "a", Kind::Kinematic, 5, "constant speeds, constant lateral speed"),
-        id(Category::CutOut, "b", Kind::Kinematic, 7, "constant accelerations, constant lateral speed"),
-        id(Category::CutOut, "c", Kind::Kinematic, 4, "constant speeds, instantaneous lane change"),
-        id(Category::CutOut, "d", Kind::Kinematic, 6, "constant accelerations, instantaneous lane change"),
-        id(Category::CutOut, "e", Kind::Svd(3), 3, "SVD, 3 coefficients"),
-        id(Category::CutOut, "f", Kind::Svd(5), 5, "SVD, 5 coefficients"),
-        id(Category::CutOut, "g", Kind::Svd(7), 7, "SVD, 7 coefficients"),
-        id(Category::Lvd, "i", Kind::Kinematic, 3, "constant deceleration"),
-        id(Category::Lvd, "ii", Kind::Kinematic, 3, "sinusoidal deceleration"),
-        id(Category::Lvd, "iii", Kind::Svd(3), 3, "SVD, 3 coefficients"),
-        id(Category::Lvd, "iv", Kind::Svd(4), 4, "SVD, 4 coefficients"),
-        id(Category::Lvd, "v", Kind::Svd(5), 5, "SVD, 5 coefficients"),
-    ];
+    /// The paper's 19, in the order of every table.
+    pub const ALL: [ParameterizationId; 19] = {
+        use Category::{CutIn, CutOut, Lvd};
+        use LaneChange::{Gradual, Instantaneous, None};
+        use SpeedProfile::{Constant, ConstantAcceleration, Sinusoidal};
+        [
+            kinematic(CutIn, "1", Constant, Gradual),
+            kinematic(CutIn, "2", ConstantAcceleration, Gradual),
+            kinematic(CutIn, "3", Constant, Instantaneous),
+            kinematic(CutIn, "4", ConstantAcceleration, Instantaneous),
+            svd(CutIn, "5", 3),
+            svd(CutIn, "6", 4),
+            svd(CutIn, "7", 5),
+            kinematic(CutOut, "a", Constant, Gradual),
+            kinematic(CutOut, "b", ConstantAcceleration, Gradual),
+            kinematic(CutOut, "c", Constant, Instantaneous),
+            kinematic(CutOut, "d", ConstantAcceleration, Instantaneous),
+            svd(CutOut, "e", 3),
+            svd(CutOut, "f", 5),
+            svd(CutOut, "g", 7),
+            kinematic(Lvd, "i", ConstantAcceleration, None),
+            kinematic(Lvd, "ii", Sinusoidal, None),
+            svd(Lvd, "iii", 3),
+            svd(Lvd, "iv", 4),
+            svd(Lvd, "v", 5),
+        ]
+    };
 
     /// Those of one category, in order.
     pub fn of(category: Category) -> impl Iterator<Item = ParameterizationId> {
@@ -102,44 +115,190 @@ impl ParameterizationId {
         Self::of(category).find(|p| p.key == key)
     }
 
-    /// The case of a scenario under a kinematic parameterization; an error for one that needs a fit.
-    pub fn kinematic_case(
+    /// Largest number of SVD coefficients in a category.
+    pub fn max_coefficients(category: Category) -> usize {
+        Self::of(category).filter_map(|id| id.coefficients()).max().unwrap_or(0)
+    }
+
+    /// `cut-in 2`.
+    pub fn name(&self) -> String {
+        format!("{} {}", self.category.label(), self.key)
+    }
+
+    /// One line: what is kept.
+    pub fn description(&self) -> String {
+        match self.family {
+            Family::Kinematic(features) => features.description(self.category),
+            Family::Svd(coefficients) => format!("SVD, {coefficients} coefficients"),
+        }
+    }
+
+    /// Number of SVD coefficients; `None` for a kinematic one, which needs no fit.
+    pub fn coefficients(&self) -> Option<usize> {
+        match self.family {
+            Family::Kinematic(_) => None,
+            Family::Svd(coefficients) => Some(coefficients),
+        }
+    }
+
+    /// Features; `None` for one by SVD.
+    pub fn features(&self) -> Option<Kinematic> {
+        match self.family {
+            Family::Kinematic(features) => Some(features),
+            Family::Svd(_) => None,
+        }
+    }
+
+    /// What each number of a point stands for; empty for coefficients, which stand for no single variable.
+    pub fn variables(&self) -> Vec<Variable> {
+        self.features().map_or(Vec::new(), |features| features.variables(self.category))
+    }
+
+    /// Names, units and bounds of a point's numbers, without the headway.
+    pub fn parameters(&self, options: &ParameterizationOptions) -> Vec<Parameter> {
+        match self.family {
+            Family::Svd(coefficients) => (0..coefficients).map(Parameter::coefficient).collect(),
+            Family::Kinematic(_) => self.variables().into_iter().map(|v| v.parameter(self.category, options)).collect(),
+        }
+    }
+
+    /// Number of parameters as the paper counts them: without the headway and without T.
+    pub fn parameter_count(&self) -> usize {
+        let variables = self.variables();
+        self.coefficients().unwrap_or_else(|| variables.iter().filter(|v| **v != Variable::Duration).count())
+    }
+
+    /// Whether the cases hold a series per time step, not a formula.
+    pub fn has_series(&self) -> bool {
+        self.features().is_none_or(|features| features.speed == SpeedProfile::Sinusoidal)
+    }
+
+    /// Refuses features that the category does not have.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn validate(&self) -> Result<()> {
+        if self.features().is_none_or(|features| features.exists_in(self.category)) {
+            return Ok(());
+        }
+        Err(Error::usage(
+            Place::item(self.name()),
+            format!("{} has no {}", self.category.label(), self.description()),
+            "an LVD changes its speed and stays in its lane; a sinusoid belongs to an LVD",
+        ))
+    }
+
+    /// A mined scenario as a point; one by SVD needs its decomposition.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a cut-out without the vehicle ahead; [`Error::Internal`] for a scenario of another
+    /// category or a missing decomposition.
+    pub fn encode(
+        &self,
+        scenario: &Scenario,
+        options: &ParameterizationOptions,
+        reduction: Option<&Reduction>,
+    ) -> Result<Vec<f64>> {
+        self.check_scenario(scenario)?;
+        match self.family {
+            Family::Kinematic(_) => self.variables().into_iter().map(|v| v.of(scenario, options)).collect(),
+            Family::Svd(d) => self.fitted(reduction)?.coefficients(scenario, d),
+        }
+    }
+
+    /// The case of a valid point, with sizes that the caller chooses.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a cut-out without the size of the vehicle ahead; [`Error::Internal`] for a point of
+    /// another length or a missing decomposition.
+    pub fn decode(
+        &self,
+        point: &[f64],
+        sizes: &Sizes,
+        grid: impl Into<TimeGrid>,
+        options: &ParameterizationOptions,
+        reduction: Option<&Reduction>,
+    ) -> Result<Case> {
+        self.validate()?;
+        let expected = self.coefficients().unwrap_or_else(|| self.variables().len());
+        if point.len() != expected {
+            return Err(Error::Internal(format!("{}: {} numbers, expected {expected}", self.name(), point.len())));
+        }
+        match self.family {
+            Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
+            // A point has no side: its lateral series stays as it is.
+            Family::Svd(_) => {
+                let reduction = self.fitted(reduction)?;
+                reduction.case_of(&reduction.rebuild(point, 1.0), sizes, grid)
+            }
+        }
+    }
+
+    /// The case that replays a mined scenario. Beside its point it keeps the recorded T, sizes and side.
+    ///
+    /// # Errors
+    /// As [`encode`](Self::encode).
+    pub fn case(
         &self,
         scenario: &Scenario,
         grid: impl Into<TimeGrid>,
         options: &ParameterizationOptions,
+        reduction: Option<&Reduction>,
     ) -> Result<Case> {
-        if self.kind != Kind::Kinematic || scenario.category != self.category {
-            return Err(Error::Internal(format!("{} is no kinematic parameterization of {}", self.key, scenario.id)));
+        self.check_scenario(scenario)?;
+        match self.family {
+            Family::Kinematic(features) => features.replay(scenario, grid.into(), options),
+            Family::Svd(d) => self.fitted(reduction)?.case(scenario, d, grid),
         }
-        let sizes = Sizes::of(scenario);
-        match self.category {
-            Category::CutIn => CutInParameters::of(scenario, options).case(self.key, &sizes, options),
-            Category::CutOut => CutOutParameters::of(scenario, options)?.case(self.key, &sizes, options),
-            Category::Lvd => LvdParameters::of(scenario).case(self.key, &sizes, grid, options),
+    }
+
+    fn check_scenario(&self, scenario: &Scenario) -> Result<()> {
+        self.validate()?;
+        if scenario.category == self.category {
+            return Ok(());
         }
+        Err(Error::Internal(format!("{} is no {}", scenario.id, self.category.label())))
+    }
+
+    fn fitted<'a>(&self, reduction: Option<&'a Reduction>) -> Result<&'a Reduction> {
+        reduction.ok_or_else(|| Error::Internal(format!("{} needs a decomposition", self.name())))
     }
 }
 
-/// The vehicle ahead of a cut-out and its gap; a scenario without them cannot be simulated.
-pub(crate) fn vehicle_ahead(scenario: &Scenario) -> Result<(&crate::scenario::Other, f64)> {
-    match (&scenario.lead, scenario.lead_gap) {
-        (Some(lead), Some(gap)) => Ok((lead, gap)),
-        _ => Err(Error::input(
-            Place::item(format!("scenario {}", scenario.id)),
-            "a cut-out needs the vehicle ahead of the cutting-out one",
-            "give `lead` with its series and `D`, or leave this scenario out (`kept: false`)",
-        )),
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The size of the vehicle ahead, which the case of a cut-out cannot do without.
-fn lead_size(sizes: &Sizes) -> Result<VehicleSize> {
-    sizes.lead.ok_or_else(|| {
-        Error::input(
-            Place::item("sizes"),
-            "a cut-out needs the size of the vehicle ahead of the cutting-out one",
-            "give the length and width of `lead`",
-        )
-    })
+    #[test]
+    fn counts_names_and_descriptions_follow_from_the_features() {
+        let told = |category, key| {
+            let id = ParameterizationId::find(category, key).unwrap();
+            let parameters = id.parameters(&ParameterizationOptions::default());
+            let names: Vec<String> = parameters.into_iter().map(|p| p.name).collect();
+            format!("{}: {}: {}", id.parameter_count(), id.description(), names.join(" "))
+        };
+        let accelerations = "constant accelerations, instantaneous lane change";
+        for (category, key, expected) in [
+            (
+                Category::CutIn,
+                "2",
+                "4: constant acceleration, constant lateral speed: \
+                 v_target_mps lateral_speed_mps v_ego_mps acceleration_target_mps2 duration_s",
+            ),
+            (Category::CutIn, "3", "2: constant speed, instantaneous lane change: v_target_mps v_ego_mps"),
+            (Category::CutIn, "5", "3: SVD, 3 coefficients: c1 c2 c3"),
+            (
+                Category::CutOut,
+                "d",
+                &format!(
+                    "6: {accelerations}: v_target_mps v_ego_mps v_lead_mps gap_lead_m acceleration_target_mps2 \
+                     acceleration_lead_mps2 duration_s"
+                ),
+            ),
+            (Category::Lvd, "i", "3: constant deceleration: v0_mps v1_mps mean_deceleration_mps2"),
+            (Category::Lvd, "ii", "3: sinusoidal deceleration: v0_mps v1_mps mean_deceleration_mps2"),
+        ] {
+            assert_eq!(told(category, key), expected);
+        }
+    }
 }

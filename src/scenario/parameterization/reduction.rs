@@ -1,15 +1,42 @@
 //! Scenarios as vectors and back: cut-in 5–7 (y, v; v^e_0, T), cut-out e–g (y, v^c, v^l; v^e_0, D, T),
-//! LVD iii–v (v; T).
+//! LVD iii–v (v; T). What the directions of a decomposition mean is shown by its mode shapes.
 
+use serde::{Deserialize, Serialize};
+
+use super::ParameterizationId;
 use super::options::{ParameterizationOptions, SvdLateral};
-use super::series::{TimeGrid, at, lateral_on_grid, speed_on_grid};
+use super::parameter::{MIN_DURATION_S, Variable};
+use super::series::{SeriesCase, TimeGrid, at};
+use super::sizes::{Sizes, vehicle_ahead};
 use super::svd::{SvdBasis, fit_svd};
-use super::{Kind, ParameterizationId, Sizes, lead_size, vehicle_ahead};
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Scenario};
+use crate::scenario::{Case, Category, Scenario};
 use crate::{Error, Result};
 
-/// Shortest duration of a reconstruction, s.
-pub const MIN_DURATION_S: f64 = 0.1;
+/// Directions whose mode shapes are shown.
+const SHOWN: usize = 3;
+
+/// A series in the vector of a decomposition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Series {
+    /// Lateral position of the target, m.
+    Lateral,
+    /// Speed of the target, m/s.
+    TargetSpeed,
+    /// Speed of the vehicle ahead, m/s.
+    LeadSpeed,
+}
+
+/// The vector of a category: its series one behind the other, then single numbers, T last.
+fn layout(category: Category) -> (&'static [Series], &'static [Variable]) {
+    use Variable::{Duration, EgoSpeed, LeadGap};
+    match category {
+        Category::CutIn => (&[Series::Lateral, Series::TargetSpeed], &[EgoSpeed, Duration]),
+        Category::CutOut => {
+            (&[Series::Lateral, Series::TargetSpeed, Series::LeadSpeed], &[EgoSpeed, LeadGap, Duration])
+        }
+        Category::Lvd => (&[Series::TargetSpeed], &[Duration]),
+    }
+}
 
 /// A decomposition of one category's scenarios.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,15 +69,10 @@ impl Reduction {
     /// Fits on scenarios of one category. Needs more scenarios than the largest number of coefficients.
     pub fn fit(category: Category, scenarios: &[&Scenario], options: &ParameterizationOptions) -> Result<Reduction> {
         let rows = scenarios.iter().map(|s| vector(s, options)).collect::<Result<Vec<_>>>()?;
-        let needed = ParameterizationId::of(category)
-            .filter_map(|p| match p.kind {
-                Kind::Svd(d) => Some(d),
-                Kind::Kinematic => None,
-            })
-            .max()
-            .unwrap_or(0);
+        let needed = ParameterizationId::max_coefficients(category);
         let name = format!("{} scenarios", category.label());
-        let basis = fit_svd(&rows, series_count(category), options.svd_instants, needed, options.series_scale, &name)?;
+        let series = layout(category).0.len();
+        let basis = fit_svd(&rows, series, options.svd_instants, needed, options.series_scale, &name)?;
         Ok(Reduction { category, basis, options: options.clone() })
     }
 
@@ -60,12 +82,8 @@ impl Reduction {
     /// [`Error::Input`] where lengths do not fit the category and the number of instants, or a number is not
     /// finite or a weight not above 0.
     pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
-        let extras = match category {
-            Category::CutIn => 2,
-            Category::CutOut => 3,
-            Category::Lvd => 1,
-        };
-        let p = series_count(category) * options.svd_instants + extras;
+        let (series, extras) = layout(category);
+        let p = series.len() * options.svd_instants + extras.len();
         let wrong = |problem: String| Err(Error::input(crate::Place::item("basis"), problem, "fit it again"));
         let lengths = [basis.weights.len(), basis.mean.len()].into_iter().chain(basis.directions.iter().map(Vec::len));
         if let Some(other) = lengths.into_iter().find(|&length| length != p) {
@@ -109,66 +127,39 @@ impl Reduction {
         weighted / self.basis.weights[column]
     }
 
-    /// Instants of a series.
-    pub(super) fn instants(&self) -> usize {
-        self.options.svd_instants
+    /// First column of a series, where the category has it.
+    pub fn series_column(&self, series: Series) -> Option<usize> {
+        let at = layout(self.category).0.iter().position(|s| *s == series)?;
+        Some(at * self.options.svd_instants)
     }
 
-    /// Whether the lateral series is left-positive instead of positive on the target's side.
-    pub(super) fn is_signed(&self) -> bool {
-        self.options.svd_lateral == SvdLateral::Signed
-    }
-
-    /// Column of T, the last one.
-    pub fn duration_column(&self) -> usize {
-        self.basis.mean.len() - 1
-    }
-
-    /// Column of the ego's initial speed; in LVD the leader's.
-    pub fn ego_speed_column(&self) -> usize {
-        match self.category {
-            Category::CutIn | Category::CutOut => series_count(self.category) * self.options.svd_instants,
-            Category::Lvd => 0,
+    /// Column of a variable, where the vector has it; in LVD the ego starts at the leader's speed.
+    pub fn column(&self, variable: Variable) -> Option<usize> {
+        let (series, extras) = layout(self.category);
+        match extras.iter().position(|v| *v == variable) {
+            Some(at) => Some(series.len() * self.options.svd_instants + at),
+            None if variable == Variable::EgoSpeed => self.series_column(Series::TargetSpeed),
+            None => None,
         }
-    }
-
-    /// Column of the gap D between the cutting-out vehicle and the one ahead.
-    pub fn lead_gap_column(&self) -> Option<usize> {
-        (self.category == Category::CutOut).then(|| self.ego_speed_column() + 1)
     }
 
     /// Vector → scenario: mirrored back and brought into the physical range.
     fn scenario_of(&self, z: &[f64], side: f64) -> ReducedScenario {
-        let n = self.options.svd_instants;
-        let speeds = |part: &[f64]| part.iter().map(|v| v.max(0.0)).collect::<Vec<_>>();
         let mirror = match self.options.svd_lateral {
             SvdLateral::Signed => side,
             SvdLateral::Mirrored => 1.0,
         };
-        let lateral = |part: &[f64]| part.iter().map(|y| y * mirror).collect::<Vec<_>>();
-        let extras = &z[series_count(self.category) * n..];
-        let duration_s = extras[extras.len() - 1].max(MIN_DURATION_S);
-        match self.category {
-            Category::CutIn => ReducedScenario {
-                y: lateral(&z[..n]),
-                v: speeds(&z[n..2 * n]),
-                v_lead: Vec::new(),
-                v_ego: extras[0].max(0.0),
-                lead_gap_m: 0.0,
-                duration_s,
-            },
-            Category::CutOut => ReducedScenario {
-                y: lateral(&z[..n]),
-                v: speeds(&z[n..2 * n]),
-                v_lead: speeds(&z[2 * n..3 * n]),
-                v_ego: extras[0].max(0.0),
-                lead_gap_m: extras[1].max(0.0),
-                duration_s,
-            },
-            Category::Lvd => {
-                let v = speeds(&z[..n]);
-                ReducedScenario { v_ego: v[0], y: Vec::new(), v, v_lead: Vec::new(), lead_gap_m: 0.0, duration_s }
-            }
+        let series =
+            |series| self.series_column(series).map_or(&[][..], |first| &z[first..first + self.options.svd_instants]);
+        let speeds = |of| series(of).iter().map(|v| v.max(0.0)).collect::<Vec<f64>>();
+        let number = |variable| self.column(variable).map_or(0.0, |column| z[column]);
+        ReducedScenario {
+            y: series(Series::Lateral).iter().map(|y| y * mirror).collect(),
+            v: speeds(Series::TargetSpeed),
+            v_lead: speeds(Series::LeadSpeed),
+            v_ego: number(Variable::EgoSpeed).max(0.0),
+            lead_gap_m: number(Variable::LeadGap).max(0.0),
+            duration_s: number(Variable::Duration).max(MIN_DURATION_S),
         }
     }
 
@@ -182,51 +173,62 @@ impl Reduction {
     /// # Errors
     /// For a cut-out without the size of the vehicle ahead.
     pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
-        let grid = grid.into();
-        let duration_s = reduced.duration_s;
-        let fps = (self.options.svd_instants - 1) as f64 / duration_s;
-        let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, grid);
-        let lateral = if self.category == Category::Lvd {
-            Lateral::Centred
-        } else {
-            let (position_m, towards_mps) = lateral_on_grid(&reduced.y, fps, duration_s, grid);
-            Lateral::Sampled { position_m, towards_mps }
-        };
-        let ahead = if self.category == Category::CutOut {
-            let lead = lead_size(sizes)?;
-            let vehicle = Participant {
-                length_m: lead.length_m,
-                width_m: lead.width_m,
-                speed: speed(&reduced.v_lead),
-                lateral: Lateral::Centred,
-            };
-            Some(Ahead { vehicle, gap_m: reduced.lead_gap_m })
-        } else {
-            None
-        };
-        Ok(Case {
+        SeriesCase {
             category: self.category,
-            ego_length_m: sizes.ego.length_m,
-            ego_width_m: sizes.ego.width_m,
+            y: &reduced.y,
+            v: &reduced.v,
+            lead: (self.category == Category::CutOut).then_some((reduced.v_lead.as_slice(), reduced.lead_gap_m)),
             ego_speed_mps: reduced.v_ego,
-            principal: Participant {
-                length_m: sizes.target.length_m,
-                width_m: sizes.target.width_m,
-                speed: speed(&reduced.v),
-                lateral,
-            },
-            ahead,
-            horizon_s: duration_s,
-        })
+            fps: (self.options.svd_instants - 1) as f64 / reduced.duration_s,
+            duration_s: reduced.duration_s,
+        }
+        .on(grid.into(), sizes)
+    }
+
+    /// The series of the decomposition with their shapes.
+    pub fn mode_shapes(&self) -> Vec<ModeShape> {
+        let target = match self.category {
+            Category::CutIn => "cutter",
+            Category::CutOut => "cutting-out vehicle",
+            Category::Lvd => "leader",
+        };
+        let side = if self.options.svd_lateral == SvdLateral::Signed { ", left positive" } else { "" };
+        let shown = SHOWN.min(self.basis.directions.len()).min(self.basis.singular_values.len());
+        let vector = |along: Option<usize>| {
+            let mut coefficients = vec![0.0; shown];
+            if let Some(j) = along {
+                coefficients[j] = self.basis.singular_values[j] / (self.basis.rows as f64).sqrt();
+            }
+            self.basis.reconstruct(&coefficients)
+        };
+        let (mean, along) = (vector(None), (0..shown).map(|j| vector(Some(j))).collect::<Vec<_>>());
+        let instants = self.options.svd_instants;
+        let part = |z: &[f64], at: usize| z[at * instants..(at + 1) * instants].to_vec();
+        let shape = |(at, series): (usize, &Series)| {
+            let (quantity, unit) = match series {
+                Series::Lateral => (format!("lateral position of the {target}{side}"), "m"),
+                Series::TargetSpeed => (format!("speed of the {target}"), "m/s"),
+                Series::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
+            };
+            let along = along.iter().map(|z| part(z, at)).collect();
+            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean, at), along }
+        };
+        layout(self.category).0.iter().enumerate().map(shape).collect()
     }
 }
 
-fn series_count(category: Category) -> usize {
-    match category {
-        Category::CutIn => 2,
-        Category::CutOut => 3,
-        Category::Lvd => 1,
-    }
+/// One series of the mean scenario and of those along the first directions, in the units of the recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeShape {
+    /// What it is: `lateral position of the cutter`.
+    pub quantity: String,
+    /// Unit.
+    pub unit: String,
+    /// The mean, over equidistant instants of [0, T].
+    pub mean: Vec<f64>,
+    /// The mean plus σ_j/√N times direction j, for the first directions: one standard deviation of coefficient j.
+    pub along: Vec<Vec<f64>>,
 }
 
 /// Scenario → vector: series at n_t equidistant points over [0, T], then the extras.
@@ -248,24 +250,17 @@ fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<
         SvdLateral::Mirrored => 1.0,
     };
     let target = &scenario.target;
-    let mut z = Vec::with_capacity(3 * n + 3);
-    match scenario.category {
-        Category::CutIn => {
-            z.extend(sample(&target.y, sign));
-            z.extend(sample(&target.v, 1.0));
-            z.extend([scenario.ego.v0, duration_s]);
-        }
-        Category::CutOut => {
-            let (lead, gap) = vehicle_ahead(scenario)?;
-            z.extend(sample(&target.y, sign));
-            z.extend(sample(&target.v, 1.0));
-            z.extend(sample(&lead.v, 1.0));
-            z.extend([scenario.ego.v0, gap, duration_s]);
-        }
-        Category::Lvd => {
-            z.extend(sample(&target.v, 1.0));
-            z.push(duration_s);
-        }
+    let (series, extras) = layout(scenario.category);
+    let mut z = Vec::with_capacity(series.len() * n + extras.len());
+    for series in series {
+        z.extend(match series {
+            Series::Lateral => sample(&target.y, sign),
+            Series::TargetSpeed => sample(&target.v, 1.0),
+            Series::LeadSpeed => sample(&vehicle_ahead(scenario)?.0.v, 1.0),
+        });
+    }
+    for extra in extras {
+        z.push(extra.of(scenario, options)?);
     }
     Ok(z)
 }

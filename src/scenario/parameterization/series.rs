@@ -1,8 +1,11 @@
-//! Series on other time grids, and the numbers that kinematic parameterizations take from them.
+//! Series on other time grids, the cases that consist of series, and the numbers that kinematic parameterizations take
+//! from them.
 
 use super::options::{AfterDuration, LateralSpeed, ParameterizationOptions};
+use super::sizes::{Sizes, vehicle_ahead};
+use crate::Result;
 use crate::model::profile::Profile;
-use crate::scenario::{Other, Scenario, Speed};
+use crate::scenario::{Case, Category, Lateral, Other, Scenario, Speed};
 
 /// Value of a series of rate `fps` at time `t_s`, linear between samples, the last one held.
 pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
@@ -71,6 +74,60 @@ pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid
     (position, towards)
 }
 
+/// A scenario whose vehicles follow series; after T the last values hold.
+pub(super) struct SeriesCase<'a> {
+    pub category: Category,
+    /// Lateral position of the target, m; unused in LVD.
+    pub y: &'a [f64],
+    /// Speed of the target, m/s.
+    pub v: &'a [f64],
+    /// Cut-out: speed of the vehicle ahead, m/s, and the gap to it, m.
+    pub lead: Option<(&'a [f64], f64)>,
+    pub ego_speed_mps: f64,
+    /// Samples per second.
+    pub fps: f64,
+    pub duration_s: f64,
+}
+
+impl SeriesCase<'_> {
+    /// The case on a time grid.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) for a cut-out without the size of the vehicle ahead.
+    pub fn on(&self, grid: TimeGrid, sizes: &Sizes) -> Result<Case> {
+        let SeriesCase { category, fps, duration_s, .. } = *self;
+        let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, grid);
+        let lateral = if category == Category::Lvd {
+            Lateral::Centred
+        } else {
+            let (position_m, towards_mps) = lateral_on_grid(self.y, fps, duration_s, grid);
+            Lateral::Sampled { position_m, towards_mps }
+        };
+        let lead = self.lead.map(|(series, gap_m)| (speed(series), gap_m));
+        sizes.case(category, self.ego_speed_mps, (speed(self.v), lateral), lead, duration_s)
+    }
+}
+
+/// S: the case of the recorded scenario on a time grid. Fails for a cut-out without a vehicle ahead.
+pub fn recorded_case(scenario: &Scenario, grid: impl Into<TimeGrid>) -> Result<Case> {
+    let target = &scenario.target;
+    let lead = match scenario.category {
+        Category::CutOut => Some(vehicle_ahead(scenario)?).map(|(lead, gap_m)| (lead.v.as_slice(), gap_m)),
+        Category::CutIn | Category::Lvd => None,
+    };
+    SeriesCase {
+        category: scenario.category,
+        y: &target.y,
+        v: &target.v,
+        lead,
+        // In LVD the ego starts at the leader's speed, in S as well.
+        ego_speed_mps: if scenario.category == Category::Lvd { target.v[0].max(0.0) } else { scenario.ego.v0 },
+        fps: scenario.fps,
+        duration_s: scenario.duration_s(),
+    }
+    .on(grid.into(), &Sizes::of(scenario))
+}
+
 /// Size of the constant lateral speed, m/s: the displacement over the time. (|y(0)| − |y(T)|)/T, as one may
 /// also read the specification, would shorten the path of a target that ends beyond the lane's middle.
 pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
@@ -91,14 +148,9 @@ pub fn mean_acceleration(other: &Other, duration_s: f64) -> f64 {
     if duration_s > 0.0 { (last - first) / duration_s } else { 0.0 }
 }
 
-/// A speed with constant acceleration from t = 0, with the option's end.
-pub fn accelerated(
-    initial_mps: f64,
-    acceleration_mps2: f64,
-    duration_s: f64,
-    options: &ParameterizationOptions,
-) -> Speed {
-    let until_s = match options.after_duration {
+/// A speed with constant acceleration from t = 0.
+pub fn accelerated(initial_mps: f64, acceleration_mps2: f64, duration_s: f64, after: AfterDuration) -> Speed {
+    let until_s = match after {
         AfterDuration::Hold => duration_s,
         // Longer than any run.
         AfterDuration::Unlimited => 1e6,

@@ -1,9 +1,10 @@
-//! Lengths and widths of the vehicles of a case. Sizes are no parameters: S and S' share them, and points drawn
-//! from a density take the means of its scenarios.
+//! Sizes of the vehicles of a case, and the case that follows from sizes and motions. Sizes are no parameters: S and
+//! S' share them, and points drawn from a density take the means of its scenarios.
 
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::Scenario;
+use crate::scenario::{Ahead, Case, Category, Lateral, Other, Participant, Scenario, Speed};
+use crate::{Error, Place, Result};
 
 /// Length and width of one vehicle, m, > 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,5 +55,57 @@ impl Sizes {
             target: mean(all.iter().map(|s| s.target).collect())?,
             lead: mean(all.iter().filter_map(|s| s.lead).collect()),
         })
+    }
+
+    /// The case of vehicles of these sizes; `lead` is the speed of the vehicle ahead and the gap to it, m.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a vehicle ahead without a size.
+    pub(super) fn case(
+        &self,
+        category: Category,
+        ego_speed_mps: f64,
+        (speed, lateral): (Speed, Lateral),
+        lead: Option<(Speed, f64)>,
+        horizon_s: f64,
+    ) -> Result<Case> {
+        let participant = |size: VehicleSize, speed, lateral| Participant {
+            length_m: size.length_m,
+            width_m: size.width_m,
+            speed,
+            lateral,
+        };
+        let no_size = || {
+            Error::input(
+                Place::item("sizes"),
+                "a cut-out needs the size of the vehicle ahead of the cutting-out one",
+                "give the length and width of `lead`",
+            )
+        };
+        let ahead = |(speed, gap_m)| -> Result<Ahead> {
+            let vehicle = participant(self.lead.ok_or_else(no_size)?, speed, Lateral::Centred);
+            Ok(Ahead { vehicle, gap_m })
+        };
+        Ok(Case {
+            category,
+            ego_length_m: self.ego.length_m,
+            ego_width_m: self.ego.width_m,
+            ego_speed_mps,
+            principal: participant(self.target, speed, lateral),
+            ahead: lead.map(ahead).transpose()?,
+            horizon_s,
+        })
+    }
+}
+
+/// The vehicle ahead of a cut-out and its gap, m; a scenario without them cannot be simulated.
+pub(crate) fn vehicle_ahead(scenario: &Scenario) -> Result<(&Other, f64)> {
+    match (&scenario.lead, scenario.lead_gap) {
+        (Some(lead), Some(gap)) => Ok((lead, gap)),
+        _ => Err(Error::input(
+            Place::item(format!("scenario {}", scenario.id)),
+            "a cut-out needs the vehicle ahead of the cutting-out one",
+            "give `lead` with its series and `D`, or leave this scenario out (`kept: false`)",
+        )),
     }
 }

@@ -10,7 +10,7 @@ use super::mixture::Mixture;
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
 use super::valid::{VALID_SHARE_DRAWS, ValidShare};
-use crate::scenario::parameterization::{Kind, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdFit};
+use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
 use crate::{Error, Place, Result};
 
@@ -120,7 +120,7 @@ impl DensityModel {
     ) -> Result<Fitted> {
         let of_category = || scenarios.iter().filter(|s| s.category == id.category);
         let kept: Vec<&Scenario> = of_category().filter(|s| s.kept).collect();
-        let name = || format!("{} {}", id.category.label(), id.key);
+        let name = || id.name();
         if kept.is_empty() {
             return Err(Error::input(
                 Place::item(name()),
@@ -128,8 +128,8 @@ impl DensityModel {
                 "use more recordings, or relax the filters in the study file (option `config`)",
             ));
         }
-        let reduction = reduction(id, scenarios, &kept, options)?;
-        let space = ParameterSpace::new(id, &options.parameterization, reduction.as_ref(), options.with_thw)?;
+        let reduction = reduction(&id, scenarios, &kept, options)?;
+        let space = ParameterSpace::new(id.clone(), &options.parameterization, reduction.as_ref(), options.with_thw)?;
         let (mut used, mut points, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
         for &scenario in &kept {
             let point = space.point(scenario).and_then(|p| match space.check(&p) {
@@ -204,12 +204,12 @@ impl DensityModel {
 
 /// The decomposition, where the parameterization needs one.
 fn reduction(
-    id: ParameterizationId,
+    id: &ParameterizationId,
     scenarios: &[Scenario],
     kept: &[&Scenario],
     options: &FitOptions,
 ) -> Result<Option<Reduction>> {
-    if id.kind == Kind::Kinematic {
+    if id.coefficients().is_none() {
         return Ok(None);
     }
     let fitted: Vec<&Scenario> = match options.parameterization.svd_fit {

@@ -16,11 +16,12 @@ use super::json_rows::to_readable_json;
 use super::kde::Kde;
 use super::model::{DensityModel, Provenance};
 use super::parameters::ParameterSpace;
-use super::quantity::Parameter;
 use super::representativeness::Representativeness;
 use super::valid::ValidShare;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
+use crate::scenario::parameterization::{
+    Parameter, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis,
+};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::hex::hex;
 use crate::support::input_file;
@@ -96,7 +97,7 @@ impl File {
             lanesweep_density: VERSION,
             content_sha256: String::new(),
             category: model.category(),
-            parameterization: space.id().key.to_owned(),
+            parameterization: space.id().key.to_string(),
             with_thw: space.has_thw(),
             provenance: model.provenance.clone(),
             parameters: space.parameters().to_vec(),

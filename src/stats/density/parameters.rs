@@ -1,8 +1,7 @@
 //! The space a density lives in: ordered parameters of one parameterization, scenario → point, point → case.
 //!
-//! Kinematic parameterizations take the physical parameters of the paper. 2, 4, b and d have T besides, because
-//! their accelerations last over [0, T]. The reduction takes c_j = σ_j u_j. A last dimension `thw_s` can hold the
-//! observed headway. Sizes are no parameters.
+//! The numbers are those of [`ParameterizationId::parameters`]. A last dimension `thw_s` can hold the observed headway.
+//! Sizes are no parameters.
 //!
 //! **Sides.** Lateral parameters of kinematic parameterizations are sizes. Under the reduction with
 //! `svd_lateral = signed` the lateral series of a point is left-positive, so a point belongs to a side; lanes judge
@@ -15,10 +14,9 @@
 //! reconstructed series are no reason to refuse a point: below 0 they are set to 0, as in a study. The filters of
 //! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
-use super::quantity::{MAX_DURATION_S, Parameter, Quantity};
 use crate::scenario::parameterization::{
-    CutInParameters, CutOutParameters, Kind, LateralStart, LvdParameters, MIN_DURATION_S, ParameterizationId,
-    ParameterizationOptions, ReducedScenario, Reduction, Sizes,
+    Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, ParameterizationId, ParameterizationOptions,
+    ReducedScenario, Reduction, Sizes, Variable,
 };
 use crate::scenario::{Case, Category, Scenario};
 use crate::support::near_name::nearest;
@@ -30,8 +28,11 @@ pub struct ParameterSpace {
     id: ParameterizationId,
     options: ParameterizationOptions,
     reduction: Option<Reduction>,
-    quantities: Vec<Quantity>,
+    variables: Vec<Variable>,
     parameters: Vec<Parameter>,
+    has_thw: bool,
+    /// Bounded values that follow from several parameters: a column of the decomposition, or T of a deceleration.
+    derived: Vec<(Option<usize>, Parameter)>,
 }
 
 /// Why a point is outside the valid region.
@@ -61,13 +62,12 @@ impl From<Invalid> for Error {
     }
 }
 
-fn in_range(parameter: &str, value: f64, lower: f64, upper: f64) -> std::result::Result<(), Invalid> {
-    // Written so that NaN is refused.
-    if value >= lower && value <= upper {
+/// Refuses NaN as well.
+fn in_bounds(parameter: &Parameter, value: f64) -> std::result::Result<(), Invalid> {
+    if parameter.holds(value) {
         return Ok(());
     }
-    let bound = if upper.is_finite() { format!("{lower} … {upper}") } else { format!("≥ {lower}") };
-    Err(Invalid { parameter: parameter.to_owned(), value, bound })
+    Err(Invalid { parameter: parameter.name.clone(), value, bound: parameter.bounds_text() })
 }
 
 impl ParameterSpace {
@@ -85,34 +85,12 @@ impl ParameterSpace {
         reduction: Option<&Reduction>,
         with_thw: bool,
     ) -> Result<ParameterSpace> {
-        use Quantity as Q;
         options.validate()?;
-        let place = || Place::item(format!("{} {}", id.category.label(), id.key));
-        let mut quantities = match (id.kind, id.category, id.key) {
-            (Kind::Svd(d), ..) => (0..d).map(Q::Coefficient).collect(),
-            (_, _, "1") => vec![Q::TargetSpeed, Q::LateralSpeed, Q::EgoSpeed],
-            (_, _, "2") => vec![Q::TargetSpeed, Q::LateralSpeed, Q::EgoSpeed, Q::TargetAcceleration, Q::Duration],
-            (_, _, "3") => vec![Q::TargetSpeed, Q::EgoSpeed],
-            (_, _, "4") => vec![Q::TargetSpeed, Q::EgoSpeed, Q::TargetAcceleration, Q::Duration],
-            (_, Category::CutOut, key @ ("a" | "b" | "c" | "d")) => {
-                let mut list = vec![Q::TargetSpeed];
-                if matches!(key, "a" | "b") {
-                    list.push(Q::LateralSpeed);
-                }
-                list.extend([Q::EgoSpeed, Q::LeadSpeed, Q::LeadGap]);
-                if matches!(key, "b" | "d") {
-                    list.extend([Q::TargetAcceleration, Q::LeadAcceleration, Q::Duration]);
-                }
-                list
-            }
-            (_, Category::Lvd, _) => vec![Q::InitialSpeed, Q::FinalSpeed, Q::MeanDeceleration],
-            _ => return Err(Error::Internal(format!("no parameters are known of {} {}", id.category.label(), id.key))),
-        };
-        if with_thw {
-            quantities.push(Q::TimeHeadway);
-        }
+        id.validate()?;
+        let place = || Place::item(id.name());
+        let variables = id.variables();
         if id.category == Category::CutIn
-            && quantities.contains(&Q::LateralSpeed)
+            && variables.contains(&Variable::LateralSpeed)
             && options.lateral_start == LateralStart::Recorded
         {
             return Err(Error::usage(
@@ -121,21 +99,33 @@ impl ParameterSpace {
                 "use lateral_start = lane-width",
             ));
         }
-        let reduction = match (id.kind, reduction) {
-            (Kind::Kinematic, _) => None,
-            (Kind::Svd(d), Some(r)) if r.category == id.category && r.basis.directions.len() >= d => Some(r.clone()),
-            (Kind::Svd(d), _) => {
+        let reduction = match (id.family, reduction) {
+            (Family::Kinematic(_), _) => None,
+            (Family::Svd(d), Some(r)) if r.category == id.category && r.basis.directions.len() >= d => Some(r.clone()),
+            (Family::Svd(d), _) => {
                 let problem = format!("needs a decomposition of its category with {d} directions");
                 return Err(Error::usage(place(), problem, "fit one on at least as many scenarios and one more"));
             }
         };
-        let parameters = quantities.iter().map(|q| q.parameter(options)).collect();
-        Ok(ParameterSpace { id, options: options.clone(), reduction, quantities, parameters })
+        let parameter = |variable: Variable| variable.parameter(id.category, options);
+        let mut parameters = id.parameters(options);
+        parameters.extend(with_thw.then(|| parameter(Variable::TimeHeadway)));
+        let derived = match &reduction {
+            Some(reduction) => {
+                let bounded = [Variable::Duration, Variable::EgoSpeed, Variable::LeadGap];
+                let column = |variable| Some((Some(reduction.column(variable)?), parameter(variable)));
+                bounded.into_iter().filter_map(column).collect()
+            }
+            None if variables.contains(&Variable::MeanDeceleration) => vec![(None, parameter(Variable::Duration))],
+            None => Vec::new(),
+        };
+        let options = options.clone();
+        Ok(ParameterSpace { id, options, reduction, variables, parameters, has_thw: with_thw, derived })
     }
 
     /// Category and parameterization.
-    pub fn id(&self) -> ParameterizationId {
-        self.id
+    pub fn id(&self) -> &ParameterizationId {
+        &self.id
     }
 
     /// Options of the parameterization.
@@ -153,9 +143,12 @@ impl ParameterSpace {
         &self.parameters
     }
 
-    /// What each dimension means, in the same order.
-    pub fn quantities(&self) -> &[Quantity] {
-        &self.quantities
+    /// The dimension that gives a variable.
+    pub fn dimension_of(&self, variable: Variable) -> Option<usize> {
+        if variable == Variable::TimeHeadway {
+            return self.has_thw.then(|| self.dimensions() - 1);
+        }
+        self.variables.iter().position(|v| *v == variable)
     }
 
     /// Number of dimensions.
@@ -165,12 +158,12 @@ impl ParameterSpace {
 
     /// The last dimension is the headway.
     pub fn has_thw(&self) -> bool {
-        self.quantities.last() == Some(&Quantity::TimeHeadway)
+        self.has_thw
     }
 
     /// The headway of a point, s, where it has one.
     pub fn thw_s(&self, point: &[f64]) -> Option<f64> {
-        self.has_thw().then(|| point[point.len() - 1])
+        self.has_thw.then(|| point[point.len() - 1])
     }
 
     /// Index of the parameter with this name.
@@ -185,7 +178,7 @@ impl ParameterSpace {
         let near =
             nearest(name, names.iter().copied(), 0.0).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
         Err(Error::usage(
-            Place::item(format!("{} {}", self.id.category.label(), self.id.key)),
+            Place::item(self.id.name()),
             format!("there is no parameter `{name}`{near}"),
             format!("use one of {}", names.join(", ")),
         ))
@@ -197,70 +190,11 @@ impl ParameterSpace {
     /// [`Error::Input`] for a scenario without what a dimension needs: the vehicle ahead, the observed headway;
     /// [`Error::Internal`] for one of another category.
     pub fn point(&self, scenario: &Scenario) -> Result<Vec<f64>> {
-        use Quantity as Q;
-        if scenario.category != self.id.category {
-            return Err(Error::Internal(format!("{} is no {}", scenario.id, self.id.category.label())));
-        }
-        let mut point = match (&self.reduction, self.id.kind) {
-            (Some(reduction), Kind::Svd(d)) => reduction.coefficients(scenario, d)?,
-            _ => self.kinematic_point(scenario)?,
-        };
-        if self.quantities.last() == Some(&Q::TimeHeadway) {
-            let thw_s = scenario.thw0.ok_or_else(|| {
-                Error::input(
-                    Place::item(format!("scenario {}", scenario.id)).column("thw0"),
-                    "no observed headway, which the dimension `thw_s` needs (the ego may have stood)",
-                    "leave the scenario out or fit without option `with_thw`",
-                )
-            })?;
-            point.push(thw_s);
+        let mut point = self.id.encode(scenario, &self.options, self.reduction())?;
+        if self.has_thw {
+            point.push(Variable::TimeHeadway.of(scenario, &self.options)?);
         }
         Ok(point)
-    }
-
-    fn kinematic_point(&self, scenario: &Scenario) -> Result<Vec<f64>> {
-        use Quantity as Q;
-        let of_none = |q: Q| Error::Internal(format!("{q:?} is no parameter of a {}", self.id.category.label()));
-        let quantities = self.quantities.iter().filter(|q| **q != Q::TimeHeadway);
-        match self.id.category {
-            Category::CutIn => {
-                let p = CutInParameters::of(scenario, &self.options);
-                let value = |q: &Q| match q {
-                    Q::TargetSpeed => Ok(p.v_target_mps),
-                    Q::LateralSpeed => p.lateral_speed_mps.ok_or_else(|| of_none(*q)),
-                    Q::EgoSpeed => Ok(p.v_ego_mps),
-                    Q::TargetAcceleration => Ok(p.acceleration_target_mps2),
-                    Q::Duration => Ok(p.duration_s),
-                    other => Err(of_none(*other)),
-                };
-                quantities.map(value).collect()
-            }
-            Category::CutOut => {
-                let p = CutOutParameters::of(scenario, &self.options)?;
-                let value = |q: &Q| match q {
-                    Q::TargetSpeed => Ok(p.v_target_mps),
-                    Q::LateralSpeed => p.lateral_speed_mps.ok_or_else(|| of_none(*q)),
-                    Q::EgoSpeed => Ok(p.v_ego_mps),
-                    Q::LeadSpeed => Ok(p.v_lead_mps),
-                    Q::LeadGap => Ok(p.gap_lead_m),
-                    Q::TargetAcceleration => Ok(p.acceleration_target_mps2),
-                    Q::LeadAcceleration => Ok(p.acceleration_lead_mps2),
-                    Q::Duration => Ok(p.duration_s),
-                    other => Err(of_none(*other)),
-                };
-                quantities.map(value).collect()
-            }
-            Category::Lvd => {
-                let p = LvdParameters::of(scenario);
-                let value = |q: &Q| match q {
-                    Q::InitialSpeed => Ok(p.v0_mps),
-                    Q::FinalSpeed => Ok(p.v1_mps),
-                    Q::MeanDeceleration => Ok((p.v0_mps - p.v1_mps) / p.duration_s),
-                    other => Err(of_none(*other)),
-                };
-                quantities.map(value).collect()
-            }
-        }
     }
 
     /// The point is inside the valid region.
@@ -277,30 +211,36 @@ impl ParameterSpace {
                 bound: self.dimensions().to_string(),
             });
         }
-        if let Some((parameter, value)) = self.parameters.iter().zip(point).find(|(p, v)| !p.holds(**v)) {
-            let bound = parameter.bounds_text();
-            return Err(Invalid { parameter: parameter.name.clone(), value: *value, bound });
+        self.parameters.iter().zip(point).try_for_each(|(parameter, value)| in_bounds(parameter, *value))?;
+        for (column, parameter) in &self.derived {
+            let value = match (&self.reduction, column) {
+                (Some(reduction), Some(column)) => reduction.rebuilt_column(self.without_thw(point), *column),
+                _ => self.deceleration_time(point)?,
+            };
+            in_bounds(parameter, value)?;
         }
-        match (&self.reduction, self.id.kind) {
-            (Some(reduction), Kind::Svd(d)) => check_rebuilt(reduction, &point[..d]),
-            _ if self.id.category == Category::Lvd => {
-                let (v0, v1) = (point[0], point[1]);
-                if v1 >= v0 {
-                    let bound = format!("< v0_mps = {v0}");
-                    return Err(Invalid { parameter: "v1_mps".to_owned(), value: v1, bound });
-                }
-                in_range("duration_s", (v0 - v1) / point[2], MIN_DURATION_S, MAX_DURATION_S)
-            }
-            _ => Ok(()),
+        Ok(())
+    }
+
+    /// T = (v0 − v1)/ā of a leader that decelerates.
+    fn deceleration_time(&self, point: &[f64]) -> std::result::Result<f64, Invalid> {
+        let value = |variable| self.dimension_of(variable).map_or(f64::NAN, |at| point[at]);
+        let (v0, v1) = (value(Variable::TargetSpeed), value(Variable::FinalSpeed));
+        if v1 >= v0 {
+            let bound = format!("< v0_mps = {v0}");
+            return Err(Invalid { parameter: "v1_mps".to_owned(), value: v1, bound });
         }
+        Ok((v0 - v1) / value(Variable::MeanDeceleration))
+    }
+
+    /// The part of a point that the parameterization decodes.
+    fn without_thw<'a>(&self, point: &'a [f64]) -> &'a [f64] {
+        &point[..point.len() - usize::from(self.has_thw)]
     }
 
     /// The rebuilt scenario of a point under the reduction, left-positive; `None` for kinematic ones.
     pub fn reduced(&self, point: &[f64]) -> Option<ReducedScenario> {
-        match (&self.reduction, self.id.kind) {
-            (Some(reduction), Kind::Svd(d)) => Some(reduction.rebuild(point.get(..d)?, 1.0)),
-            _ => None,
-        }
+        Some(self.reduction()?.rebuild(self.without_thw(point), 1.0))
     }
 
     /// The case of a point, with sizes that the caller chooses, on a time grid of step `dt_s`. The headway
@@ -311,52 +251,6 @@ impl ParameterSpace {
     /// of the vehicle ahead.
     pub fn case(&self, point: &[f64], sizes: &Sizes, dt_s: f64) -> Result<Case> {
         self.check(point)?;
-        if let (Some(reduction), Some(reduced)) = (&self.reduction, self.reduced(point)) {
-            return reduction.case_of(&reduced, sizes, dt_s);
-        }
-        let value = |quantity| {
-            let index = self.quantities.iter().position(|q| *q == quantity);
-            index.map(|i| point[i])
-        };
-        // What a parameterization does not have, its case does not use.
-        let of = |quantity| value(quantity).unwrap_or(0.0);
-        let lateral_speed_mps = value(Quantity::LateralSpeed);
-        match self.id.category {
-            Category::CutIn => CutInParameters {
-                v_target_mps: of(Quantity::TargetSpeed),
-                acceleration_target_mps2: of(Quantity::TargetAcceleration),
-                lateral_speed_mps,
-                start_m: self.options.lane_change_m,
-                v_ego_mps: of(Quantity::EgoSpeed),
-                duration_s: of(Quantity::Duration),
-            }
-            .case(self.id.key, sizes, &self.options),
-            Category::CutOut => CutOutParameters {
-                v_target_mps: of(Quantity::TargetSpeed),
-                acceleration_target_mps2: of(Quantity::TargetAcceleration),
-                lateral_speed_mps,
-                v_ego_mps: of(Quantity::EgoSpeed),
-                v_lead_mps: of(Quantity::LeadSpeed),
-                acceleration_lead_mps2: of(Quantity::LeadAcceleration),
-                gap_lead_m: of(Quantity::LeadGap),
-                duration_s: of(Quantity::Duration),
-            }
-            .case(self.id.key, sizes, &self.options),
-            Category::Lvd => {
-                let (v0_mps, v1_mps) = (of(Quantity::InitialSpeed), of(Quantity::FinalSpeed));
-                let duration_s = (v0_mps - v1_mps) / of(Quantity::MeanDeceleration);
-                LvdParameters { v0_mps, v1_mps, duration_s }.case(self.id.key, sizes, dt_s, &self.options)
-            }
-        }
-    }
-}
-
-fn check_rebuilt(reduction: &Reduction, coefficients: &[f64]) -> std::result::Result<(), Invalid> {
-    let column = |c| reduction.rebuilt_column(coefficients, c);
-    in_range("duration_s", column(reduction.duration_column()), MIN_DURATION_S, MAX_DURATION_S)?;
-    in_range("v_ego_mps", column(reduction.ego_speed_column()), 0.0, f64::INFINITY)?;
-    match reduction.lead_gap_column() {
-        Some(gap) => in_range("gap_lead_m", column(gap), 0.0, f64::INFINITY),
-        None => Ok(()),
+        self.id.decode(self.without_thw(point), sizes, dt_s, &self.options, self.reduction())
     }
 }
