@@ -14,7 +14,7 @@ use crate::model::profile::Profile;
 use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MappedGrid, Parameter, count};
 use crate::support::readable;
 use crate::support::run_dir::Results;
-use crate::support::table::quoted;
+use crate::support::table::csv_field;
 use crate::{Error, Result};
 
 /// A whole run.
@@ -236,7 +236,7 @@ impl MapReport {
         let mut out = io::BufWriter::new(out);
         write_header(&mut out, &self.grids, "first,second,difference")?;
         for Difference { grid, first, second, cells, .. } in differences {
-            let (first, second) = (quoted(first), quoted(second));
+            let (first, second) = (csv_field(first), csv_field(second));
             for (cell, kind) in cells.iter().enumerate() {
                 writeln!(out, "{},{first},{second},{}", place_of(grid, cell), kind.key())?;
             }

@@ -4,7 +4,7 @@
 use crate::engine::{Chunk, LanePlan, Outcome};
 use crate::model::criterion::Criterion;
 use crate::support::readable::{count, count_of};
-use crate::support::table::quoted;
+use crate::support::table::csv_field;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +70,7 @@ impl ReferenceComparison {
         let mut text = "lane,criterion,failed_in_f32,distance_to_threshold\n".to_owned();
         for d in &self.differences {
             let failed = u8::from(d.failed_in_f32);
-            text += &format!("{},{},{failed},{}\n", quoted(&d.lane), d.criterion.key(), d.distance);
+            text += &format!("{},{},{failed},{}\n", csv_field(&d.lane), d.criterion.key(), d.distance);
         }
         text
     }

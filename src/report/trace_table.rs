@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::Result;
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
-use crate::support::table::quoted;
+use crate::support::table::csv_field;
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
 const COLUMNS: [&str; 11] =
@@ -25,7 +25,7 @@ pub fn csv(traces: &[(String, &Trace)]) -> String {
     }
     text.push_str(",mark\n");
     for (name, trace) in traces {
-        let lane = if is_named { format!("{},", quoted(name)) } else { String::new() };
+        let lane = if is_named { format!("{},", csv_field(name)) } else { String::new() };
         let marks = Mark::ALL.map(|mark| (mark, trace.step_of(mark)));
         for step in &trace.steps {
             text.push_str(&lane);

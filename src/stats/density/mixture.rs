@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::covariance::{cholesky, colour, whiten};
-use super::standard_normal::{normal, uniform};
+use super::normal::{normal, uniform};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 

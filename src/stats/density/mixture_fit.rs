@@ -3,7 +3,7 @@
 
 use super::Mixture;
 use super::covariance::{cholesky, moments};
-use super::standard_normal::uniform;
+use super::normal::uniform;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 

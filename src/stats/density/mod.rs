@@ -16,11 +16,10 @@ mod mixture;
 mod mixture_fit;
 mod model;
 mod model_file;
-mod normal;
+pub(crate) mod normal;
 mod parameters;
 mod representativeness;
 mod scaling;
-pub(crate) mod standard_normal;
 mod transport;
 mod valid;
 

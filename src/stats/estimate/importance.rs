@@ -18,7 +18,7 @@ use super::summary::Estimate;
 use super::trust::Warning;
 use super::weights::{WeightSums, WeightedDraw};
 use crate::stats::density::covariance::moments;
-use crate::stats::density::standard_normal::uniform;
+use crate::stats::density::normal::uniform;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::beta::beta_reg;
 
-use crate::stats::density::standard_normal::quantile;
+use crate::stats::density::normal_quantile;
 
 /// How an interval was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,7 +65,7 @@ pub fn wilson(failures: f64, runs: f64, level: f64) -> Interval {
     if runs <= 0.0 {
         return Interval::nothing(level);
     }
-    let z = quantile(0.5 + 0.5 * level);
+    let z = normal_quantile(0.5 + 0.5 * level);
     let p = failures / runs;
     let z2 = z * z / runs;
     let middle = (p + 0.5 * z2) / (1.0 + z2);
@@ -114,15 +114,15 @@ pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_fr
 /// Quantile of Student's t. Above 1,000 degrees of freedom it is the normal one to 0.2 %.
 pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom > 1000.0 {
-        return quantile(p);
+        return normal_quantile(p);
     }
-    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or_else(|_| quantile(p), |t| t.inverse_cdf(p))
+    StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or_else(|_| normal_quantile(p), |t| t.inverse_cdf(p))
 }
 
 /// The normal quantile over Student's at a level: at most 1.
 pub(super) fn student_factor(degrees_of_freedom: f64, level: f64) -> f64 {
     let p = 0.5 + 0.5 * level;
-    quantile(p) / student_quantile(p, degrees_of_freedom)
+    normal_quantile(p) / student_quantile(p, degrees_of_freedom)
 }
 
 /// x with I_x(a, b) = p, to the last digits that the regularised incomplete beta function has. Bisection of ln x:

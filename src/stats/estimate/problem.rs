@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::stats::density::Mixture;
-use crate::stats::density::standard_normal::normal;
+use crate::stats::density::normal::normal;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 

@@ -17,7 +17,7 @@ use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
 use crate::stats::density::covariance::{cholesky, colour, moments, whiten};
-use crate::stats::density::standard_normal::uniform;
+use crate::stats::density::normal::uniform;
 use crate::stats::random::Stream;
 
 /// Acceptance that the step size is steered towards between levels.

@@ -27,7 +27,7 @@ pub(crate) use names::{Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;
-pub(crate) use spreadsheet::{cell_text, quoted, text_of_cell};
+pub(crate) use spreadsheet::{cell_text, csv_field, text_of_cell};
 pub use writer::TableWriter;
 
 /// No reader here panics without Parquet; see the function of this name with it.

@@ -25,7 +25,7 @@ pub(crate) fn text_of_cell(field: &str) -> &str {
 }
 
 /// A text as a field of CSV, in quotes where it needs them.
-pub(crate) fn quoted(text: &str) -> String {
+pub(crate) fn csv_field(text: &str) -> String {
     let field = cell_text(text);
     match field.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", field.replace('"', "\"\"")),
@@ -48,6 +48,6 @@ mod tests {
             assert_eq!(cell_text(text), text);
             assert_eq!(text_of_cell(text), text);
         }
-        assert_eq!(quoted("=a,b"), "\"'=a,b\"");
+        assert_eq!(csv_field("=a,b"), "\"'=a,b\"");
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
-use super::spreadsheet::quoted;
+use super::spreadsheet::csv_field;
 use super::{Cell, Column, Kind, TableFacts, TableFormat, jsonl};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
@@ -36,7 +36,7 @@ impl TableWriter {
         let out = match format {
             TableFormat::Csv => {
                 let mut file = AtomicFile::create(path)?;
-                let names: Vec<String> = columns.iter().map(|column| quoted(&column.name)).collect();
+                let names: Vec<String> = columns.iter().map(|column| csv_field(&column.name)).collect();
                 file.append(format!("{}\n", names.join(",")).as_bytes())?;
                 Out::Csv(file, String::new())
             }
@@ -119,7 +119,7 @@ fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
         // Writing to a string does not fail.
         let _ = match cell {
             Cell::Null => Ok(()),
-            Cell::Text(field) => write!(text, "{}", quoted(field)),
+            Cell::Text(field) => write!(text, "{}", csv_field(field)),
             Cell::Flag(flag) => write!(text, "{}", u8::from(*flag)),
             Cell::Whole(number) => write!(text, "{number}"),
             Cell::Number(number) if column.kind == Kind::Binary32 => write!(text, "{}", *number as f32),
