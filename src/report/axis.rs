@@ -5,9 +5,10 @@ use super::svg::{Canvas, TextAnchor};
 use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
     /// Equal differences are equally far apart.
+    #[default]
     Linear,
     /// Equal ratios are equally far apart; zero and what lies below it have no place.
     Logarithmic,
@@ -81,6 +82,26 @@ impl Axis {
     /// The axis that ends exactly at `low` and `high` (finite, `low < high`), linear.
     pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
         Self { scale: AxisScale::Linear, low, high, from_px, to_px }
+    }
+
+    /// Whether `value` is between the ends.
+    pub fn holds(&self, value: f64) -> bool {
+        self.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
+    }
+
+    pub fn length_px(&self) -> f64 {
+        (self.to_px - self.from_px).abs()
+    }
+
+    /// How many numbers stand above one another without crowding.
+    pub fn vertical_numbers(&self) -> usize {
+        let most = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
+        (self.length_px() / 18.0).clamp(2.0, most) as usize
+    }
+
+    /// Whether the axis has a place for `value`.
+    pub fn shows(&self, value: f64) -> bool {
+        self.scale.shows(value)
     }
 
     /// Where `value` is; at the nearer end if the axis has no place for it.

@@ -1,11 +1,12 @@
 //! A study as text for the terminal and as files in the output folder.
 
-use super::distributions::distributions;
-use super::panels::PanelFigure;
-use super::radar::{RadarChart, RadarSeries, radar_svg};
+use super::plot::Figure;
+use super::radar::{RadarChart, RadarSeries};
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
-use super::study_figures::{HeadwayFailures, f1_by_parameters, legend_name, modes, recall_and_precision};
+use super::study_figures::{
+    HeadwayFailures, distributions, f1_by_parameters, legend_name, modes, recall_and_precision,
+};
 use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
@@ -99,16 +100,17 @@ impl StudyReport {
             };
             RadarSeries { name: legend_name(scores, variant), values: spokes.iter().map(value).collect() }
         });
-        radar_svg(&RadarChart {
+        let chart = RadarChart {
             title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
             spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
             series: series.collect(),
-        })
+        };
+        chart.figure().svg()
     }
 
     /// The other figures of a category, with the beginnings of their files' names; without what there is no data for.
-    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, PanelFigure)> {
+    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.scores.categories[at], &self.run.data);
         let mut figures = Vec::new();
         if scores.variants.len() > 1 {
