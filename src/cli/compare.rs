@@ -219,7 +219,7 @@ impl Compare {
         for comparison in &file.categories {
             for criterion in Criterion::ALL {
                 let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
-                let figure = compare_figures::rates(file, comparison, criterion);
+                let figure = compare_figures::rates(file, comparison, criterion).figure();
                 let svg = figure.svg();
                 results.add(&name, svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));

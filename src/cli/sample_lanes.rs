@@ -55,7 +55,7 @@ pub(super) fn write(
     let mut figures = Vec::new();
     if !run.convergence.is_empty() {
         results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
-        let figure = sampling_figures::convergence(density, &run.convergence);
+        let figure = sampling_figures::convergence(density, &run.convergence).figure();
         let svg = figure.svg();
         results.add("convergence.svg", svg.as_bytes())?;
         figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
@@ -99,7 +99,7 @@ pub(super) fn write(
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
             let figure = sampling_figures::failure_map(density, map, model, *id, counting.criterion);
-            let (name, svg) = (format!("map-{}", id.name()), figure.svg());
+            let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
             results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
             results.add(&format!("{name}.svg"), svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
