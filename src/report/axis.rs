@@ -1,7 +1,5 @@
 //! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
 
-use super::drawing::{GREY, GRID, TICK, line, text};
-use super::svg::{Canvas, TextAnchor};
 use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
@@ -162,37 +160,6 @@ impl Axis {
             }
         }
         ticks
-    }
-
-    /// The axis below a plot that reaches from `top` to `bottom`: grid, numbers. Returns the y below the numbers.
-    pub fn draw_below(&self, canvas: &mut Canvas, (top, bottom): (f64, f64), most: usize, grid: bool) -> f64 {
-        for tick in self.ticks(most) {
-            let Some(label) = &tick.label else {
-                line(canvas, (tick.at_px, bottom), (tick.at_px, bottom + 3.0), GREY, 0.8);
-                continue;
-            };
-            if grid {
-                line(canvas, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
-            }
-            line(canvas, (tick.at_px, bottom), (tick.at_px, bottom + 6.0), GREY, 1.0);
-            text(canvas, (tick.at_px, bottom + 20.0), label, TICK, TextAnchor::Middle);
-        }
-        bottom + 24.0
-    }
-
-    /// The axis at the left of a plot that reaches from `left` to `right`: grid, numbers.
-    pub fn draw_left(&self, canvas: &mut Canvas, (left, right): (f64, f64), most: usize, grid: bool) {
-        for tick in self.ticks(most) {
-            let Some(label) = &tick.label else {
-                line(canvas, (left - 3.0, tick.at_px), (left, tick.at_px), GREY, 0.8);
-                continue;
-            };
-            if grid {
-                line(canvas, (left, tick.at_px), (right, tick.at_px), GRID, 0.8);
-            }
-            line(canvas, (left - 6.0, tick.at_px), (left, tick.at_px), GREY, 1.0);
-            text(canvas, (left - 9.0, tick.at_px + 4.5), label, TICK, TextAnchor::End);
-        }
     }
 }
 

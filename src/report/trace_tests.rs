@@ -1,6 +1,6 @@
 //! What must hold for every figure and table of a case, the strangest ones too.
 
-use super::drawing::tests::words;
+use super::plot::words;
 use super::trace_figure::TraceFigure;
 use super::trace_panels::TraceSeries;
 use super::trace_table::csv;

@@ -256,7 +256,7 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
-pub(in crate::report) mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// The words of the document's texts, lines joined, and a check that its tags nest.
