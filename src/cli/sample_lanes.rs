@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
 use crate::report::html::PageFigure;
-use crate::report::sampled_rows;
+use crate::report::lanes;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
@@ -31,12 +31,12 @@ impl<'a> RowTable<'a> {
             synthetic: density.provenance.synthetic,
         };
         let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
-        let table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
+        let table = TableWriter::create(path, format, lanes::sampled_columns(density), &facts)?;
         Ok(RowTable { table, plan, density })
     }
 
     pub fn add(&mut self, chunk: &Chunk) -> Result<()> {
-        sampled_rows::write_chunk(&mut self.table, self.plan, self.density, chunk)
+        lanes::write_sampled_chunk(&mut self.table, self.plan, self.density, chunk)
     }
 
     pub fn stage(self) -> Result<StagedFile> {

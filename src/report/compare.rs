@@ -1,9 +1,10 @@
 //! A comparison of rates of failure as text and as files.
 
+use serde::Serialize;
 use std::fmt::Write;
 
-use serde::Serialize;
-
+use super::axis::AxisScale;
+use super::forest::{ForestFigure, ForestGroup, ForestRow};
 use super::html::{Page, PageFigure, Section};
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
@@ -353,5 +354,33 @@ fn factor(value: f64) -> String {
         v if v >= 99.5 => ">99".to_owned(),
         v if v >= 9.95 => format!("{v:.1}"),
         v => format!("{v:.2}"),
+    }
+}
+
+fn row(name: String, rate: &RateRecord) -> ForestRow {
+    // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
+    ForestRow { name, estimate: rate.rate.is_finite().then_some(rate.rate), lower: rate.low, upper: rate.high }
+}
+
+/// One criterion of one category: a group per driver model, a row per density, the recorded scenarios as reference.
+pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> ForestFigure {
+    let recorded = comparison.recorded.iter().filter(|cell| cell.criterion == criterion);
+    let groups = recorded.map(|cell| {
+        let density = |p: &crate::run::sampling::ComparedParameterization| {
+            let found = p.cells.iter().find(|c| c.model == cell.model && c.criterion == criterion)?;
+            Some(row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate))
+        };
+        ForestGroup {
+            name: cell.model.name().to_owned(),
+            reference: Some(row("S, as recorded".to_owned(), &cell.rate)),
+            rows: comparison.parameterizations.iter().filter_map(density).collect(),
+        }
+    });
+    ForestFigure {
+        title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),
+        subtitle: Some(format!("{} · densities of {} samples each", file.data, file.samples)),
+        axis: "Failure probability".to_owned(),
+        scale: AxisScale::Logarithmic,
+        groups: groups.collect(),
     }
 }

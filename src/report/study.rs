@@ -1,7 +1,8 @@
-//! A study as text for the terminal and as files in the output folder.
+//! A study as text for the terminal, as one JSON document and as files in the output folder.
 
 use super::plot::Figure;
 use super::radar::{RadarChart, RadarSeries};
+use super::records::{document, records};
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
 use super::study_figures::{
@@ -10,11 +11,13 @@ use super::study_figures::{
 use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
-use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1};
+use crate::model::driver::ModelId;
+use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1, published_failures, published_lvd_f1};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
-use crate::scenario::parameterization::ModeShape;
+use crate::scenario::parameterization::{ModeShape, ParameterizationId};
 use crate::support::run_dir::Results;
+use serde_json::Value;
 
 /// What the figures of one category need beside the scores.
 #[derive(Debug, Clone)]
@@ -142,4 +145,56 @@ impl StudyReport {
 /// `radar-cut-in.svg`.
 pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> String {
     format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
+}
+
+impl StudyReport {
+    /// The same tables as one JSON document, undefined values null; the published numbers where they were asked for.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn json(&self) -> Result<String> {
+        let mut value = serde_json::json!({
+            "program": self.run.program,
+            "data": self.run.data,
+            "synthetic": self.run.synthetic,
+            "plan_sha256": self.run.plan_sha256,
+            "lanes": self.run.lanes,
+            "left_out": self.run.left_out,
+            "failures": records(&csv::failures(&self.scores, "")?)?,
+            "f1": records(&csv::f1_scores(&self.scores, "")?)?,
+            "claims": records(&csv::claims(&self.claims, "")?)?,
+        });
+        if self.published {
+            value["published"] = published();
+        }
+        if let Some(comparison) = &self.comparison {
+            value["reference"] = records(comparison.csv().as_bytes())?;
+        }
+        document(&value)
+    }
+}
+
+/// The paper's numbers, of highD.
+fn published() -> Value {
+    let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
+    let failures = Category::ALL.into_iter().flat_map(|category| {
+        cells().filter_map(move |(model, criterion)| {
+            let theirs = published_failures(category, model, criterion)?;
+            Some(serde_json::json!({
+                "category": category.key(), "model": model.name(), "criterion": criterion.key(),
+                "failures": theirs.failures, "simulations": theirs.simulations,
+            }))
+        })
+    });
+    let lvd = ParameterizationId::ALL.iter().filter(|id| id.category == Category::Lvd);
+    let f1 = lvd.flat_map(|id| {
+        cells().filter_map(move |(model, criterion)| {
+            let theirs = published_lvd_f1(id.key, model, criterion)?;
+            Some(serde_json::json!({
+                "category": id.category.key(), "parameterization": id.key, "model": model.name(),
+                "criterion": criterion.key(), "f1": theirs,
+            }))
+        })
+    });
+    serde_json::json!({"data": "highD", "failures": failures.collect::<Vec<_>>(), "f1": f1.collect::<Vec<_>>()})
 }

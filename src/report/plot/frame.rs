@@ -31,7 +31,7 @@ impl Plot {
         has_numbers: bool,
         has_grid: bool,
     ) {
-        for tick in axis.ticks((axis.length_px() / 60.0) as usize) {
+        for tick in axis.ticks((axis.length_px() / 58.0) as usize) {
             let x = tick.at_px;
             let Some(label) = &tick.label else {
                 canvas.line((x, bottom), (x, bottom + 3.0), GREY, 0.8);

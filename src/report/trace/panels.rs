@@ -1,7 +1,7 @@
 //! What the figure of a case shows: its panels as plots. Where they stand on the sheet is the figure's business.
 
-use super::axis::plain_end;
-use super::plot::{GREY, Height, INK, Layer, Look, Mark as Drawn, Plot, PlotAxis, Rule, Series, Symbol, Value};
+use super::super::axis::plain_end;
+use super::super::plot::{GREY, Height, INK, Layer, Look, Mark as Drawn, Plot, PlotAxis, Rule, Series, Symbol, Value};
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
 
 /// One lane on the sheet.
@@ -58,6 +58,15 @@ pub(super) fn mark_look(mark: Mark, look: &Look) -> Look {
         Mark::Contact => Symbol::Cross,
     };
     Look { symbol, marker_px: 5.0, ..*look }
+}
+
+/// Dashes of the line through all panels at a mark.
+pub(super) fn mark_dash(mark: Mark) -> &'static str {
+    match mark {
+        Mark::Reaction => "2,3",
+        Mark::Braking => "7,3",
+        Mark::Contact => "",
+    }
 }
 
 /// A line through a panel.
@@ -131,13 +140,8 @@ impl<'a> Shown<'a> {
         // A lane of one step has an axis too.
         let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
         let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
-            let dash = match mark {
-                Mark::Reaction => "2,3",
-                Mark::Braking => "7,3",
-                Mark::Contact => "",
-            };
             let attributes = format!("class=\"mark-line {}\"", mark.label());
-            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, dash) }.into()
+            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }.into()
         });
         let plot = Plot {
             heading: title.to_owned(),
