@@ -3,9 +3,9 @@
 use serde::Serialize;
 use std::fmt::Write;
 
-use super::axis::AxisScale;
 use super::forest::{ForestFigure, ForestGroup, ForestRow};
 use super::html::{Page, PageFigure, Section};
+use super::plot::AxisScale;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::model::criterion::Criterion;
@@ -197,13 +197,8 @@ impl CompareFile {
         if !self.left_out.is_empty() {
             warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
         }
-        let rates = Section {
-            id: "rates".to_owned(),
-            title: "Rates and their ratios".to_owned(),
-            text: self.text(),
-            ..Section::default()
-        };
-        let pictures = Section { id: "figures".to_owned(), title: "Figures".to_owned(), figures, ..Section::default() };
+        let rates = Section { text: self.text(), ..Section::new("rates", "Rates and their ratios") };
+        let pictures = Section { figures, ..Section::new("figures", "Figures") };
         let facts = [
             ("program", self.program.clone()),
             ("profile", self.profile.clone()),
@@ -218,15 +213,13 @@ impl CompareFile {
         ];
         let named = |(name, value): (&str, String)| (name.to_owned(), value);
         let reproduction = Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro:
                 "The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of \
                     it."
                 .to_owned(),
             facts: facts.into_iter().map(named).collect(),
             host: host.into_iter().map(named).collect(),
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {
             title: "Rates of failure: recorded, replayed, drawn".to_owned(),

@@ -4,8 +4,10 @@
 //! Both axes are logarithmic, because probabilities span decades. An estimate of zero has no place there: its
 //! interval's upper end is drawn instead, with an arrow downwards.
 
-use super::axis::{AxisScale, logarithmic_reach, number};
+use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{Ends, Figure, Mark, Plot, PlotAxis, Series, Value};
+use crate::run::sampling::Checkpoint;
+use crate::stats::density::DensityModel;
 
 /// The estimate after so many samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +64,39 @@ impl ConvergencePoint {
     }
 }
 
+/// What was sampled, for the line below a heading.
+pub(super) fn sampled(density: &DensityModel) -> String {
+    let id = density.space.id();
+    format!("{} {} · {}", id.category.label(), id.key, density.provenance.data)
+}
+
 impl ConvergenceFigure {
+    /// Probability over samples of a sampling run, one panel per driver model.
+    pub fn of(density: &DensityModel, checkpoints: &[Checkpoint]) -> ConvergenceFigure {
+        let mut series: Vec<ConvergenceSeries> = Vec::new();
+        for checkpoint in checkpoints {
+            for row in &checkpoint.rows {
+                let (panel, name) = (row.model.name(), row.criterion.label());
+                let point = ConvergencePoint {
+                    samples: checkpoint.samples,
+                    probability: row.probability,
+                    lower: row.interval[0],
+                    upper: row.interval[1],
+                };
+                match series.iter_mut().find(|s| s.panel == panel && s.name == name) {
+                    Some(known) => known.points.push(point),
+                    None => series.push(ConvergenceSeries {
+                        panel: panel.to_owned(),
+                        name: name.to_owned(),
+                        points: vec![point],
+                    }),
+                }
+            }
+        }
+        let title = "Failure probability against samples".to_owned();
+        ConvergenceFigure { title, subtitle: Some(sampled(density)), series }
+    }
+
     /// The figure. A point that is no estimate (not finite, no probability, no samples, interval upside down, zero
     /// without an upper limit) is not drawn but counted in a note.
     pub fn figure(&self) -> Figure {
@@ -164,7 +198,7 @@ fn caption(drawn: &[Vec<ConvergencePoint>]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::Axis;
+    use super::super::plot::Axis;
     use super::super::plot::words;
     use super::*;
 

@@ -7,8 +7,13 @@
 
 use std::fmt::Write;
 
-use super::axis::{number, plain_end};
+use super::convergence::sampled;
 use super::plot::{Cell, Cells, ColourBar, Figure, Fill, Hatch, Height, Plot, PlotAxis};
+use super::plot::{number, plain_end};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{self, MapCounts};
+use crate::stats::density::DensityModel;
 
 /// One parameter, cut into cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +87,23 @@ enum Share {
 }
 
 impl FailureMap {
+    /// The failure map of one model of a sampling run.
+    pub fn of(density: &DensityModel, map: &MapCounts, at: usize, model: ModelId, criterion: Criterion) -> FailureMap {
+        let axis = |axis: &sampling::MapAxis| MapAxis {
+            name: axis.name.clone(),
+            unit: axis.unit.clone(),
+            edges: axis.edges(),
+        };
+        FailureMap {
+            title: format!("{}: share of lanes that fail {}", model.name(), criterion.label()),
+            subtitle: Some(sampled(density)),
+            x: axis(&map.axes.x),
+            y: axis(&map.axes.y),
+            samples: map.lanes.clone(),
+            failures: map.failures[at].clone(),
+        }
+    }
+
     /// Why the map cannot be drawn, if so: an axis without cells, edges that do not increase, or counts that do not
     /// match the cells. Then [`FailureMap::svg`] says so in words and [`FailureMap::csv`] has no rows.
     pub fn problem(&self) -> Option<String> {

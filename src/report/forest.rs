@@ -1,6 +1,6 @@
 //! A forest plot: estimates with their intervals, one line each, in groups, each group with its reference as a band.
 
-use super::axis::{AxisScale, logarithmic_reach, number};
+use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{
     Cell, Cells, Ends, Figure, Fill, Height, INK, Layer, Look, Mark, Name, Plot, PlotAxis, ROW, Rule, Series, Symbol,
     Value,

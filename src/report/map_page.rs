@@ -120,17 +120,15 @@ impl MapReport {
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         let shares = Section {
-            id: "shares".to_owned(),
-            title: "Shares".to_owned(),
             intro: if self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some)) {
                 "Known shares are those of the JRC's evidence.".to_owned()
             } else {
                 String::new()
             },
             text: self.text(),
-            ..Section::default()
+            ..Section::new("shares", "Shares")
         };
-        let sheets = Section { id: "maps".to_owned(), title: "Maps".to_owned(), figures, ..Section::default() };
+        let sheets = Section { figures, ..Section::new("maps", "Maps") };
         let hashes = self.grids.iter().flat_map(|mapped| {
             let parts = mapped.plan.parts.iter();
             parts.map(|part| {
@@ -141,8 +139,6 @@ impl MapReport {
         host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
         let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
         let reproduction = Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
                 .to_owned(),
             facts: [("program".to_owned(), program.clone()), ("profile".to_owned(), self.profile.name.clone())]
@@ -151,7 +147,7 @@ impl MapReport {
                 .collect(),
             host,
             details: vec![("Profile".to_owned(), profile)],
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {
             title: "Outcomes over a grid".to_owned(),

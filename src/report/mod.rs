@@ -4,7 +4,6 @@
 //! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
 //! [`crate::run::score`]; text and files go to the user.
 
-pub mod axis;
 pub mod compare;
 pub mod convergence;
 pub mod csv;
@@ -21,7 +20,6 @@ pub mod records;
 pub mod reference;
 pub mod run_record;
 pub mod sampling;
-pub mod sampling_figures;
 mod sampling_page;
 pub mod sampling_tables;
 pub mod study;

@@ -131,8 +131,6 @@ impl EstimateFile {
             row.estimate.trust.warnings.iter().map(move |warning| (name.clone(), warning.to_string()))
         });
         Section {
-            id: "estimates".to_owned(),
-            title: "Estimates".to_owned(),
             intro: format!(
                 "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
                  {}{}",
@@ -153,7 +151,7 @@ impl EstimateFile {
             ),
             tables,
             facts: said.collect(),
-            ..Section::default()
+            ..Section::new("estimates", "Estimates")
         }
     }
 
@@ -231,15 +229,13 @@ impl EstimateFile {
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         Ok(Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro: "The same density, flags and seed give the same numbers, on any machine, whole or in shards. \
                     estimate.json holds all of it; `lanesweep simulate --from` reruns a lane."
                 .to_owned(),
             facts,
             host,
             details: vec![("Profile".to_owned(), profile)],
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         })
     }
 }
@@ -247,10 +243,8 @@ impl EstimateFile {
 fn pictures(figures: Vec<PageFigure>) -> Section {
     let none = "This estimator has no figure of its own.";
     Section {
-        id: "figures".to_owned(),
-        title: "Figures".to_owned(),
         intro: if figures.is_empty() { none } else { "" }.to_owned(),
         figures,
-        ..Section::default()
+        ..Section::new("figures", "Figures")
     }
 }

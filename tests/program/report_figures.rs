@@ -1,9 +1,9 @@
 //! Sample figures of every kind, for looking at: what a test cannot see is whether a picture is clear.
 
-use lanesweep::report::axis::AxisScale;
 use lanesweep::report::convergence::{ConvergenceFigure, ConvergencePoint, ConvergenceSeries};
 use lanesweep::report::failure_map::{FailureMap, MapAxis};
 use lanesweep::report::forest::{ForestFigure, ForestGroup, ForestRow};
+use lanesweep::report::plot::AxisScale;
 use std::path::PathBuf;
 
 const MODELS: [&str; 4] = ["Reg157", "RSS", "CC human driver", "FSM"];

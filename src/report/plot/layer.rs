@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::super::axis::{Axis, number};
+use super::axis::{Axis, number};
 use super::cells::Cells;
 use super::svg::{Anchor, Canvas, GREY, Paint, Place, Type, WHITE, set};
 
@@ -411,7 +411,7 @@ fn without_inner_points(places: &[Place]) -> Vec<Place> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::axis::AxisScale;
+    use super::super::axis::AxisScale;
     use super::*;
 
     #[test]

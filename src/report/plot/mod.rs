@@ -4,6 +4,7 @@
 //! picture and as numbers. A new kind of picture is a layer or a scale of an axis. A page is 1000 px wide and as high
 //! as its texts need, so no text is cut.
 
+mod axis;
 mod cells;
 mod frame;
 mod layer;
@@ -21,9 +22,10 @@ pub use layer::{Layer, Look, Mark, Rule, Series, Symbol, Value};
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, WHITE, set};
 
-use super::axis::{Axis, AxisScale};
 use super::csv;
 use crate::Result;
+pub use axis::AxisScale;
+pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
 
 const WIDTH_PX: f64 = 1000.0;
 const BORDER_PX: f64 = 36.0;

@@ -10,8 +10,8 @@ mod trace_tests;
 
 use std::fmt::Write;
 
-use super::axis::{Axis, number};
 use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
+use super::plot::{Axis, number};
 use crate::Result;
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
 use crate::support::table::quoted;

@@ -1,6 +1,6 @@
 //! What the figure of a case shows: its panels as plots. Where they stand on the sheet is the figure's business.
 
-use super::super::axis::plain_end;
+use super::super::plot::plain_end;
 use super::super::plot::{GREY, Height, INK, Layer, Look, Mark as Drawn, Plot, PlotAxis, Rule, Series, Symbol, Value};
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
 

@@ -14,7 +14,7 @@ pub enum AxisScale {
 
 impl AxisScale {
     /// Whether the axis has a place for `value`. Beyond 1e±300 widths and ratios would leave the range of `f64`.
-    pub(super) fn shows(self, value: f64) -> bool {
+    pub(in crate::report) fn shows(self, value: f64) -> bool {
         match self {
             Self::Linear => value.abs() <= 1e300,
             Self::Logarithmic => (1e-300..=1e300).contains(&value),
@@ -32,7 +32,7 @@ impl AxisScale {
 
 /// An axis between two ends, both at a plain number.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Axis {
+pub(in crate::report) struct Axis {
     scale: AxisScale,
     /// Ends, as [`AxisScale::place`] gives them.
     low: f64,
@@ -43,7 +43,7 @@ pub(super) struct Axis {
 
 /// A place on the axis that is marked, and the number beside it, if there is room for one.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tick {
+pub(in crate::report) struct Tick {
     pub at_px: f64,
     pub label: Option<String>,
 }
@@ -168,7 +168,7 @@ impl Axis {
 /// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than one decade
 /// below the smallest estimate or, where that is zero, upper end. Below an upper end that stands for a zero estimate
 /// there is room for an arrow.
-pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
+pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
     let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
     let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
@@ -177,7 +177,7 @@ pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
 }
 
 /// A number with three digits in plain short form: `0.012`, `250`, `1.5e-6`; not finite in words.
-pub(super) fn number(value: f64) -> String {
+pub(in crate::report) fn number(value: f64) -> String {
     digits_text(value, 3)
 }
 
@@ -216,7 +216,7 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
 }
 
 /// A plain number not much above `value` (positive), at which an axis from zero can end.
-pub(super) fn plain_end(value: f64) -> f64 {
+pub(in crate::report) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
 }
