@@ -1,8 +1,7 @@
 //! Reports: what a person or another program reads of a study.
 //!
-//! Here live the terminal tables, the CSV files, the figures (SVG), `run.json` and the one way files are
-//! written: temporary name, sync, rename. Here lives no arithmetic beyond formatting. Scores come from
-//! [`crate::run::score`]; text and files go to the user.
+//! Here live the terminal tables, the CSV files, the figures (SVG, all drawn by [`plot`]), the pages and `run.json`.
+//! Here lives no arithmetic beyond formatting. Scores come from [`crate::run::score`]; text and files go to the user.
 
 pub mod compare;
 pub mod convergence;

@@ -12,20 +12,21 @@ mod svg;
 
 use std::f64::consts::TAU;
 
+pub use axis::AxisScale;
 pub use cells::{Cell, Cells, ColourBar, Fill, Hatch};
-pub(super) use frame::ROW;
-use frame::{colour_bar, numbers_left, spoke_name};
-pub(super) use layer::TICK;
-use layer::{Axes, on_circle};
 pub use layer::{Layer, Look, Mark, Rule, Series, Symbol, Value};
+
+pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
+pub(super) use frame::ROW;
+pub(super) use layer::TICK;
 #[cfg(test)]
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, WHITE, set};
 
 use super::csv;
 use crate::Result;
-pub use axis::AxisScale;
-pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
+use frame::{colour_bar, numbers_left, spoke_name};
+use layer::{Axes, on_circle};
 
 const WIDTH_PX: f64 = 1000.0;
 const BORDER_PX: f64 = 36.0;
@@ -36,8 +37,8 @@ const GAP_PX: f64 = 22.0;
 const SAMPLE_PX: f64 = 56.0;
 const SAMPLE_TEXT_PX: f64 = 68.0;
 /// Widths of the words left and right of a plot whose vertical axis has named ticks, and how far rows stand in.
-pub(super) const NAME_PX: f64 = 280.0;
-pub(super) const NOTE_PX: f64 = 226.0;
+const NAME_PX: f64 = 280.0;
+const NOTE_PX: f64 = 226.0;
 const INDENT_PX: f64 = 14.0;
 /// Radius of the outer ring of a plot around a centre, the distance of names from it, and their width.
 const RADIUS_PX: f64 = 285.0;
@@ -46,7 +47,7 @@ const SPOKE_PX: f64 = WIDTH_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
 
 const TITLE: Type = set(24, true, INK);
 const TEXT: Type = set(16, false, INK);
-pub(super) const HEADING: Type = set(16, true, INK);
+const HEADING: Type = set(16, true, INK);
 const NOTE: Type = set(14, false, INK);
 
 /// A page of plots with their words.
