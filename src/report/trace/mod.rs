@@ -5,8 +5,6 @@
 //! stays readable at that width. Series differ in colour, dashes and line width, marks in their shapes.
 
 mod panels;
-#[cfg(test)]
-mod trace_tests;
 
 use std::fmt::Write;
 
@@ -247,3 +245,6 @@ fn write_vehicle(text: &mut String, other: &TracedVehicle) {
     let (present, judged) = (u8::from(*is_present), u8::from(*is_judged));
     let _ = write!(text, ",{x_m},{y_m},{v_mps},{gap_m},{lateral_gap_m},{ttc_s},{btn},{pfs},{cfs},{present},{judged}");
 }
+
+#[cfg(test)]
+mod trace_tests;
