@@ -15,8 +15,7 @@ use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
 use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
-use crate::report::compare::CompareFile;
-use crate::report::compare_figures;
+use crate::report::compare::{CompareFile, rates};
 use crate::report::html::PageFigure;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
@@ -217,7 +216,7 @@ impl Compare {
         for comparison in &file.categories {
             for criterion in Criterion::ALL {
                 let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
-                let figure = compare_figures::rates(file, comparison, criterion);
+                let figure = rates(file, comparison, criterion).figure();
                 let svg = figure.svg();
                 results.add(&name, svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
+use crate::report::convergence::ConvergenceFigure;
+use crate::report::failure_map::FailureMap;
 use crate::report::html::PageFigure;
-use crate::report::sampled_rows;
+use crate::report::lanes;
 use crate::report::sampling::EstimateFile;
-use crate::report::sampling_figures;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::run::sampling::{CrudeRun, TallyOptions};
 use crate::stats::density::DensityModel;
@@ -31,12 +32,12 @@ impl<'a> RowTable<'a> {
             synthetic: density.provenance.synthetic,
         };
         let format = TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
-        let table = TableWriter::create(path, format, sampled_rows::columns(density), &facts)?;
+        let table = TableWriter::create(path, format, lanes::sampled_columns(density), &facts)?;
         Ok(RowTable { table, plan, density })
     }
 
     pub fn add(&mut self, chunk: &Chunk) -> Result<()> {
-        sampled_rows::write_chunk(&mut self.table, self.plan, self.density, chunk)
+        lanes::write_sampled_chunk(&mut self.table, self.plan, self.density, chunk)
     }
 
     pub fn stage(self) -> Result<StagedFile> {
@@ -55,7 +56,7 @@ pub(super) fn write(
     let mut figures = Vec::new();
     if !run.convergence.is_empty() {
         results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
-        let figure = sampling_figures::convergence(density, &run.convergence);
+        let figure = ConvergenceFigure::of(density, &run.convergence).figure();
         let svg = figure.svg();
         results.add("convergence.svg", svg.as_bytes())?;
         figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
@@ -98,8 +99,8 @@ pub(super) fn write(
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
-            let figure = sampling_figures::failure_map(density, map, model, *id, counting.criterion);
-            let (name, svg) = (format!("map-{}", id.name()), figure.svg());
+            let figure = FailureMap::of(density, map, model, *id, counting.criterion);
+            let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
             results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
             results.add(&format!("{name}.svg"), svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));

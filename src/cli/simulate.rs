@@ -14,8 +14,7 @@ use crate::engine::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_ste
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::report::records;
-use crate::report::trace_figure::{TraceFigure, TraceSeries};
-use crate::report::trace_table;
+use crate::report::trace::{self, TraceFigure, TraceSeries};
 use crate::scenario::Tables;
 use crate::support::files::{make_folder, write_atomically};
 use crate::support::readable::value;
@@ -90,7 +89,7 @@ impl Simulate {
             }
             write_atomically(path, figure(&lanes, self.plot_end).svg().as_bytes())?;
         }
-        self.format.print(|| trace_table::csv(&named), || document(&lanes, &named))?;
+        self.format.print(|| trace::csv(&named), || document(&lanes, &named))?;
         if verbosity != Verbosity::Quiet {
             lanes.traced.iter().for_each(|lane| console::say(&summary(lane, lanes.traced.len() > 1)));
         }
@@ -206,7 +205,7 @@ fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
         "data": lanes.origin,
         "synthetic": lanes.synthetic,
         "lanes": outcomes.collect::<Vec<_>>(),
-        "steps": trace_table::records(named)?,
+        "steps": trace::records(named)?,
     }))
 }
 

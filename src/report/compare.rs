@@ -1,10 +1,11 @@
 //! A comparison of rates of failure as text and as files.
 
+use serde::Serialize;
 use std::fmt::Write;
 
-use serde::Serialize;
-
+use super::forest::{ForestFigure, ForestGroup, ForestRow};
 use super::html::{Page, PageFigure, Section};
+use super::plot::AxisScale;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::model::criterion::Criterion;
@@ -196,13 +197,8 @@ impl CompareFile {
         if !self.left_out.is_empty() {
             warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
         }
-        let rates = Section {
-            id: "rates".to_owned(),
-            title: "Rates and their ratios".to_owned(),
-            text: self.text(),
-            ..Section::default()
-        };
-        let pictures = Section { id: "figures".to_owned(), title: "Figures".to_owned(), figures, ..Section::default() };
+        let rates = Section { text: self.text(), ..Section::new("rates", "Rates and their ratios") };
+        let pictures = Section { figures, ..Section::new("figures", "Figures") };
         let facts = [
             ("program", self.program.clone()),
             ("profile", self.profile.clone()),
@@ -217,15 +213,13 @@ impl CompareFile {
         ];
         let named = |(name, value): (&str, String)| (name.to_owned(), value);
         let reproduction = Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro:
                 "The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of \
                     it."
                 .to_owned(),
             facts: facts.into_iter().map(named).collect(),
             host: host.into_iter().map(named).collect(),
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {
             title: "Rates of failure: recorded, replayed, drawn".to_owned(),
@@ -353,5 +347,33 @@ fn factor(value: f64) -> String {
         v if v >= 99.5 => ">99".to_owned(),
         v if v >= 9.95 => format!("{v:.1}"),
         v => format!("{v:.2}"),
+    }
+}
+
+fn row(name: String, rate: &RateRecord) -> ForestRow {
+    // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
+    ForestRow { name, estimate: rate.rate.is_finite().then_some(rate.rate), lower: rate.low, upper: rate.high }
+}
+
+/// One criterion of one category: a group per driver model, a row per density, the recorded scenarios as reference.
+pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> ForestFigure {
+    let recorded = comparison.recorded.iter().filter(|cell| cell.criterion == criterion);
+    let groups = recorded.map(|cell| {
+        let density = |p: &crate::run::sampling::ComparedParameterization| {
+            let found = p.cells.iter().find(|c| c.model == cell.model && c.criterion == criterion)?;
+            Some(row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate))
+        };
+        ForestGroup {
+            name: cell.model.name().to_owned(),
+            reference: Some(row("S, as recorded".to_owned(), &cell.rate)),
+            rows: comparison.parameterizations.iter().filter_map(density).collect(),
+        }
+    });
+    ForestFigure {
+        title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),
+        subtitle: Some(format!("{} · densities of {} samples each", file.data, file.samples)),
+        axis: "Failure probability".to_owned(),
+        scale: AxisScale::Logarithmic,
+        groups: groups.collect(),
     }
 }

@@ -5,14 +5,15 @@
 //! a cell with few samples is a smaller square, and a cell without failures has its own grey, so that "none seen" and
 //! "few" differ.
 
-use super::svg::{Canvas, Color, PathData, Shape, TextAnchor};
 use std::fmt::Write;
 
-use super::axis::{Axis, number, plain_end};
-use super::drawing::{
-    self, BORDER_PX, GREY, GRID, INK, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, paragraph, path_data, rect,
-    text,
-};
+use super::convergence::sampled;
+use super::plot::{Cell, Cells, ColourBar, Figure, Fill, Hatch, Height, Plot, PlotAxis};
+use super::plot::{number, plain_end};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{self, MapCounts};
+use crate::stats::density::DensityModel;
 
 /// One parameter, cut into cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,25 +45,20 @@ pub struct FailureMap {
 
 /// With fewer samples than this a cell's share says little.
 const FEW_SAMPLES: u64 = 10;
-/// Left edge of the map, where its right edge and the colour bar are.
-const LEFT_PX: f64 = BORDER_PX + 64.0;
-const RIGHT_PX: f64 = WIDTH_PX - BORDER_PX - 120.0;
-const BAR_PX: (f64, f64) = (RIGHT_PX + 44.0, RIGHT_PX + 66.0);
 /// From a share of zero to the largest one. Relative luminance falls from step to step.
 const COLOURS: [(u8, u8, u8); 6] =
     [(255, 236, 150), (226, 199, 112), (176, 163, 116), (120, 124, 126), (66, 82, 122), (10, 32, 80)];
 /// A cell with samples and without failures.
 const NONE_FAILED: &str = "#ececec";
-const HATCH: &str = "#9a9a9a";
-const LABEL: Type = Type { size_px: 15, bold: false, colour: INK };
 
 impl MapAxis {
     fn cells(&self) -> usize {
         self.edges.len().saturating_sub(1)
     }
 
-    fn label(&self) -> String {
-        if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }
+    fn axis(&self) -> PlotAxis {
+        let label = if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) };
+        PlotAxis::exactly(label, self.edges[0], self.edges[self.cells()])
     }
 
     fn problem(&self) -> Option<String> {
@@ -91,6 +87,23 @@ enum Share {
 }
 
 impl FailureMap {
+    /// The failure map of one model of a sampling run.
+    pub fn of(density: &DensityModel, map: &MapCounts, at: usize, model: ModelId, criterion: Criterion) -> FailureMap {
+        let axis = |axis: &sampling::MapAxis| MapAxis {
+            name: axis.name.clone(),
+            unit: axis.unit.clone(),
+            edges: axis.edges(),
+        };
+        FailureMap {
+            title: format!("{}: share of lanes that fail {}", model.name(), criterion.label()),
+            subtitle: Some(sampled(density)),
+            x: axis(&map.axes.x),
+            y: axis(&map.axes.y),
+            samples: map.lanes.clone(),
+            failures: map.failures[at].clone(),
+        }
+    }
+
     /// Why the map cannot be drawn, if so: an axis without cells, edges that do not increase, or counts that do not
     /// match the cells. Then [`FailureMap::svg`] says so in words and [`FailureMap::csv`] has no rows.
     pub fn problem(&self) -> Option<String> {
@@ -109,83 +122,52 @@ impl FailureMap {
         }
     }
 
-    /// The map as a complete SVG document, 1000 px wide and as high as its cells and texts need.
+    /// The map as a figure.
     ///
-    /// A cell with more failures than samples is left white, crossed out and counted in a note. Texts are
-    /// XML-escaped; control characters become U+FFFD. The same map gives the same bytes. Nothing fails: a map with a
+    /// A cell with more failures than samples is left white, crossed out and counted in a note. A map with a
     /// [`FailureMap::problem`] is a text that names it.
-    pub fn svg(&self) -> String {
-        let (mut canvas, y) = drawing::page(&self.title, self.subtitle.as_deref());
+    pub fn figure(&self) -> Figure {
+        let (title, subtitle) = (self.title.clone(), self.subtitle.clone());
         if let Some(problem) = self.problem() {
-            let words = format!("This map cannot be drawn: {problem}.");
-            let y = paragraph(&mut canvas, (BORDER_PX, y + 14.0), &words, NOTE, TEXT_WIDTH_PX);
-            return drawing::document(canvas, y);
+            let caption = format!("This map cannot be drawn: {problem}.");
+            return Figure { title, subtitle, caption, ..Figure::default() };
         }
         let shares: Vec<Share> = (0..self.samples.len()).map(|cell| self.share(cell)).collect();
         let known = |s: &Share| if let Share::Known { share, .. } = s { Some(*share) } else { None };
         let largest = shares.iter().filter_map(known).fold(0.0, f64::max);
         let largest = if largest > 0.0 { plain_end(largest).min(1.0) } else { 0.0 };
-
-        let y = paragraph(&mut canvas, (BORDER_PX, y + 14.0), &self.y.label(), LABEL, RIGHT_PX - BORDER_PX);
-        let ratio = self.y.cells() as f64 / self.x.cells() as f64;
-        let (top, width_px) = (y + 8.0, RIGHT_PX - LEFT_PX);
-        let bottom = top + (width_px * ratio).clamp(360.0, width_px);
-        let ends = |axis: &MapAxis| (axis.edges[0], axis.edges[axis.cells()]);
-        let x = Axis::exactly(ends(&self.x), (LEFT_PX, RIGHT_PX));
-        let y = Axis::exactly(ends(&self.y), (bottom, top));
-
-        self.cells(&mut canvas, &shares, (&x, &y), largest);
-        rect(&mut canvas, (LEFT_PX, top), (RIGHT_PX, bottom), Color::None, Some((GREY, 1.0)));
-        y.draw_left(&mut canvas, (LEFT_PX, RIGHT_PX), 8, false);
-        let mut below = x.draw_below(&mut canvas, (top, bottom), 8, false);
-        colour_bar(&mut canvas, (top, bottom), largest);
-        for line in LABEL.wrap(&self.x.label(), RIGHT_PX - LEFT_PX) {
-            text(&mut canvas, ((LEFT_PX + RIGHT_PX) / 2.0, below + 19.0), &line, LABEL, TextAnchor::Middle);
-            below += LABEL.line_px();
-        }
-        let below = key(&mut canvas, &shares, below + 20.0);
-        let below = drawing::notes(&mut canvas, "Notes:", &self.notes(&shares), below + 10.0);
-        drawing::document(canvas, below)
-    }
-
-    fn cells(&self, canvas: &mut Canvas, shares: &[Share], (x, y): (&Axis, &Axis), largest: f64) {
-        let [across, up] = [(x, &self.x), (y, &self.y)].map(|(axis, edges)| {
-            let edges: Vec<f64> = edges.edges.iter().map(|e| axis.at(*e)).collect();
-            edges
-        });
-        let corners = |cell: usize| {
-            let (i, j) = (cell % self.x.cells(), cell / self.x.cells());
-            ((across[i], up[j]), (across[i + 1], up[j + 1]))
+        let cell = |(at, share): (usize, &Share)| {
+            let (i, j) = (at % self.x.cells(), at / self.x.cells());
+            Cell {
+                corners: [(self.x.edges[i], self.y.edges[j]), (self.x.edges[i + 1], self.y.edges[j + 1])],
+                fill: share.fill(largest),
+                tip: if let Share::Known { share, .. } = share { self.tip(at, *share) } else { String::new() },
+            }
         };
-        // Whole cells without smoothing, so that no white seams part neighbours; the rims of small squares need it.
-        for few_now in [false, true] {
-            let whole = "shape-rendering=\"crispEdges\"";
-            group(canvas, if few_now { "class=\"rarely-sampled\"" } else { whole }, None);
-            for (cell, share) in shares.iter().enumerate() {
-                let Share::Known { share, few } = *share else { continue };
-                if few != few_now {
-                    continue;
-                }
-                let class = if few { "class=\"cell few\"" } else { "class=\"cell\"" };
-                group(canvas, class, Some(self.tip(cell, share)));
-                square(canvas, corners(cell), share_colour(share, largest), few);
-                canvas.add(Shape::GroupEnd);
-            }
-            canvas.add(Shape::GroupEnd);
-        }
-        let mut strokes = Vec::new();
-        for (cell, share) in shares.iter().enumerate() {
-            let ((left, lower), (right, upper)) = corners(cell);
-            match share {
-                Share::Empty => strokes.extend(hatching(corners(cell))),
-                Share::Wrong => {
-                    strokes.push(path_data(&[(left, lower), (right, upper)], false));
-                    strokes.push(path_data(&[(left, upper), (right, lower)], false));
-                }
-                Share::Known { .. } => {}
-            }
-        }
-        hatch(canvas, &strokes);
+        let looks = [
+            ("no failure".to_owned(), Share::Known { share: 0.0, few: false }),
+            (format!("fewer than {FEW_SAMPLES} samples: smaller square"), Share::Known { share: 0.6, few: true }),
+            ("no samples".to_owned(), Share::Empty),
+        ];
+        let occurs = [
+            shares.iter().any(|s| matches!(s, Share::Known { share: 0.0, .. })),
+            shares.iter().any(|s| matches!(s, Share::Known { few: true, .. })),
+            shares.contains(&Share::Empty),
+        ];
+        let key = looks.into_iter().zip(occurs).filter(|(_, occurs)| *occurs);
+        let cells = Cells {
+            cells: shares.iter().enumerate().map(cell).collect(),
+            key: key.map(|((name, share), _)| (name, share.fill(1.0))).collect(),
+            bar: Some(ColourBar { label: "Share failed", largest, colour: scale_colour }),
+        };
+        let plot = Plot {
+            x: self.x.axis(),
+            y: self.y.axis(),
+            layers: vec![cells.into()],
+            height: Height::OfWidth((self.y.cells() as f64 / self.x.cells() as f64).clamp(0.5, 1.0)),
+            ..Plot::default()
+        };
+        Figure { title, subtitle, plots: vec![plot], notes: ("Notes:", self.notes(&shares)), ..Figure::default() }
     }
 
     fn tip(&self, cell: usize, share: f64) -> String {
@@ -235,122 +217,34 @@ impl FailureMap {
     }
 }
 
-type Corners = ((f64, f64), (f64, f64));
-
-/// A cell, or the middle of one with few samples.
-fn square(canvas: &mut Canvas, (a, b): Corners, fill: Color, few: bool) {
-    if !few {
-        return rect(canvas, a, b, fill, None);
-    }
-    let inner = |from: f64, to: f64| (from + 0.22 * (to - from), to - 0.22 * (to - from));
-    let ((x1, x2), (y1, y2)) = (inner(a.0, b.0), inner(a.1, b.1));
-    // In small cells the rim must not outweigh the colour.
-    let rim_px = (0.08 * (x2 - x1).abs().min((y2 - y1).abs())).min(0.8);
-    rect(canvas, (x1, y1), (x2, y2), fill, Some((HATCH, rim_px)));
-}
-
-/// Lines along the diagonal of a cell, about 12 px apart; in small cells the diagonal alone.
-fn hatching(((left, lower), (right, upper)): Corners) -> Vec<String> {
-    let size_px = (right - left).abs().min((upper - lower).abs());
-    let lines = (size_px / 12.0).clamp(1.0, 100.0) as i32;
-    let at = |x: f64, y: f64| (left + x * (right - left), lower + y * (upper - lower));
-    let line = |k: i32| {
-        let shift = f64::from(k) / f64::from(lines);
-        let (from, to) = ((-shift).max(0.0), (1.0 - shift).min(1.0));
-        path_data(&[at(from, from + shift), at(to, to + shift)], false)
-    };
-    (1 - lines..lines).map(line).collect()
-}
-
-fn hatch(canvas: &mut Canvas, strokes: &[String]) {
-    if strokes.is_empty() {
-        return;
-    }
-    let (d, stroke, stroke_width) = (strokes.join(" "), Color::from(HATCH), 0.8);
-    let (fill, opacity, stroke_dasharray) = (None, None, None);
-    group(canvas, "class=\"hatch\"", None);
-    canvas.add(Shape::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity, stroke_dasharray })));
-    canvas.add(Shape::GroupEnd);
-}
-
-fn share_colour(share: f64, largest: f64) -> Color {
-    if share <= 0.0 { Color::from(NONE_FAILED) } else { scale_colour(share / largest) }
-}
-
-/// The colour at `place` in 0..=1 of the scale, straight between its anchors.
-fn scale_colour(place: f64) -> Color {
-    let along = place.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
-    let first = (along as usize).min(COLOURS.len() - 2);
-    let (from, to, part) = (COLOURS[first], COLOURS[first + 1], along - first as f64);
-    let mix = |a: u8, b: u8| (f64::from(a) + part * (f64::from(b) - f64::from(a))).round() as u8;
-    Color::Rgb(mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
-}
-
-/// The scale from zero to `largest`, a plain number at or above every share, at the right of the map; without any failure there is none.
-fn colour_bar(canvas: &mut Canvas, (top, bottom): (f64, f64), largest: f64) {
-    if largest <= 0.0 {
-        return;
-    }
-    let (left, right) = BAR_PX;
-    let bottom = bottom.min(top + 420.0);
-    text(canvas, (left, top + 12.0), "Share failed", TICK, TextAnchor::Start);
-    let top = top + 28.0;
-    let bands = 100_u32;
-    let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(bands);
-    group(canvas, "shape-rendering=\"crispEdges\" class=\"scale\"", None);
-    for k in 0..bands {
-        rect(
-            canvas,
-            (left, edge(k)),
-            (right, edge(k + 1)),
-            scale_colour((f64::from(k) + 0.5) / f64::from(bands)),
-            None,
-        );
-    }
-    canvas.add(Shape::GroupEnd);
-    rect(canvas, (left, top), (right, bottom), Color::None, Some((GREY, 1.0)));
-    for tick in Axis::exactly((0.0, largest), (bottom, top)).ticks(6) {
-        drawing::line(canvas, (right, tick.at_px), (right + 5.0, tick.at_px), GREY, 1.0);
-        if let Some(label) = &tick.label {
-            text(canvas, (right + 8.0, tick.at_px + 4.5), label, TICK, TextAnchor::Start);
+impl Share {
+    /// The look of a cell beside a largest share.
+    fn fill(self, largest: f64) -> Fill {
+        let hatched = |hatch| Fill { hatch, ..Fill::default() };
+        match self {
+            Share::Empty => hatched(Hatch::Grey),
+            Share::Wrong => hatched(Hatch::Crossed),
+            Share::Known { share, few } => Fill {
+                colour: if share > 0.0 { scale_colour(share / largest) } else { NONE_FAILED.to_owned() },
+                is_inset: few,
+                ..Fill::default()
+            },
         }
     }
 }
 
-/// What the cells that are no plain colour mean, as far as they occur; returns the y below.
-fn key(canvas: &mut Canvas, shares: &[Share], top: f64) -> f64 {
-    let is = |test: fn(&Share) -> bool| shares.iter().any(test);
-    let mut x = LEFT_PX;
-    let mut entry = |canvas: &mut Canvas, words: &str| {
-        let corners = ((x, top + 18.0), (x + 18.0, top));
-        text(canvas, (x + 26.0, top + 14.0), words, NOTE, TextAnchor::Start);
-        x += 26.0 + NOTE.text_px(words) + 24.0;
-        corners
-    };
-    let mut any = false;
-    if is(|s| matches!(s, Share::Known { share: 0.0, .. })) {
-        let (a, b) = entry(canvas, "no failure");
-        rect(canvas, a, b, Color::from(NONE_FAILED), Some((GRID, 0.8)));
-        any = true;
-    }
-    if is(|s| matches!(s, Share::Known { few: true, .. })) {
-        let (a, b) = entry(canvas, &format!("fewer than {FEW_SAMPLES} samples: smaller square"));
-        rect(canvas, a, b, Color::None, Some((GRID, 0.8)));
-        square(canvas, (a, b), scale_colour(0.6), true);
-        any = true;
-    }
-    if is(|s| matches!(s, Share::Empty)) {
-        let (a, b) = entry(canvas, "no samples");
-        rect(canvas, a, b, Color::None, Some((GRID, 0.8)));
-        hatch(canvas, &hatching((a, b)));
-        any = true;
-    }
-    if any { top + 22.0 } else { top }
+/// The colour at `place` in 0..=1 of the scale, straight between its anchors.
+fn scale_colour(place: f64) -> String {
+    let along = place.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let first = (along as usize).min(COLOURS.len() - 2);
+    let (from, to, part) = (COLOURS[first], COLOURS[first + 1], along - first as f64);
+    let mix = |a: u8, b: u8| (f64::from(a) + part * (f64::from(b) - f64::from(a))).round() as u8;
+    format!("#{:02x}{:02x}{:02x}", mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::drawing::tests::words;
+    use super::super::plot::words;
     use super::*;
 
     fn axis(name: &str, unit: &str, cells: usize) -> MapAxis {
@@ -376,7 +270,7 @@ mod tests {
 
     #[test]
     fn axes_carry_name_and_unit_and_every_sampled_cell_is_drawn_once() {
-        let svg = map(4, 3, |i, j| (100, (i * j) as u64)).svg();
+        let svg = map(4, 3, |i, j| (100, (i * j) as u64)).figure().svg();
         let words = words(&svg);
         for name in ["initial gap (m)", "speed difference (m/s)", "Share failed", "no failure"] {
             assert!(words.contains(name), "{name} in {words}");
@@ -387,7 +281,7 @@ mod tests {
 
     #[test]
     fn unsampled_and_rarely_sampled_cells_are_marked_by_shape_and_explained() {
-        let svg = map(3, 1, |i, _| [(0, 0), (9, 3), (10, 3)][i]).svg();
+        let svg = map(3, 1, |i, _| [(0, 0), (9, 3), (10, 3)][i]).figure().svg();
         assert_eq!(cells(&svg), (1, 1));
         assert!(svg.contains("class=\"hatch\""));
         let words = words(&svg);
@@ -396,15 +290,16 @@ mod tests {
 
     #[test]
     fn each_colour_of_the_scale_is_darker_than_the_one_before_and_none_is_the_grey_of_no_failure() {
-        let luminance = |colour: Color| {
-            let Color::Rgb(r, g, b) = colour else { panic!("a colour of the scale") };
-            let linear = |v: u8| (f64::from(v) / 255.0).powf(2.2);
-            0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b)
+        let luminance = |colour: String| {
+            let linear =
+                |at: usize| (f64::from(u8::from_str_radix(&colour[at..at + 2], 16).unwrap()) / 255.0).powf(2.2);
+            0.2126 * linear(1) + 0.7152 * linear(3) + 0.0722 * linear(5)
         };
         let scale: Vec<f64> = (0..=50).map(|k| luminance(scale_colour(f64::from(k) / 50.0))).collect();
         assert!(scale.windows(2).all(|l| l[0] > l[1]), "{scale:?}");
         assert!(scale[0] > 0.8 && scale[50] < 0.02);
-        assert_ne!(share_colour(0.0, 1.0), share_colour(1e-9, 1.0));
+        let share = |share| Share::Known { share, few: false }.fill(1.0);
+        assert_ne!(share(0.0), share(1e-9));
     }
 
     #[test]
@@ -413,13 +308,13 @@ mod tests {
         let expected = "x_lower,x_upper,y_lower,y_upper,samples,failures,share\n\
                         10,15,10,15,8,2,0.25\n15,20,10,15,0,0,\n10,15,15,20,4,5,\n15,20,15,20,3,1,0.3333333333333333\n";
         assert_eq!(map.csv(), expected);
-        assert!(words(&map.svg()).contains("failures are more than samples: 1 of 4 cells"));
+        assert!(words(&map.figure().svg()).contains("failures are more than samples: 1 of 4 cells"));
     }
 
     #[test]
     fn rows_of_y_run_upwards() {
         let map = map(1, 2, |_, j| (100, [1, 99][j]));
-        let svg = map.svg();
+        let svg = map.figure().svg();
         let y = |tip: &str| -> f64 {
             let after = svg.split(tip).nth(1).unwrap().split(" y=\"").nth(1).unwrap();
             after.split('"').next().unwrap().parse().unwrap()
@@ -436,22 +331,22 @@ mod tests {
         problems[2].y.edges[2] = problems[2].y.edges[0];
         problems[3].failures.pop();
         for (map, why) in problems.iter().zip(["no cell", "not a finite", "do not increase", "3 counts of failures"]) {
-            assert!(words(&map.svg()).contains(why), "{why}");
+            assert!(words(&map.figure().svg()).contains(why), "{why}");
             assert_eq!(map.csv().lines().count(), 1);
         }
     }
 
     #[test]
     fn all_zero_all_failed_all_empty_one_cell_and_endless_names_make_a_picture() {
-        assert!(words(&map(5, 5, |_, _| (50, 0)).svg()).contains("No sample failed."));
-        assert!(words(&map(5, 5, |_, _| (0, 0)).svg()).contains("No cell has samples."));
-        assert_eq!(cells(&map(1, 1, |_, _| (50, 50)).svg()), (1, 0));
+        assert!(words(&map(5, 5, |_, _| (50, 0)).figure().svg()).contains("No sample failed."));
+        assert!(words(&map(5, 5, |_, _| (0, 0)).figure().svg()).contains("No cell has samples."));
+        assert_eq!(cells(&map(1, 1, |_, _| (50, 50)).figure().svg()), (1, 0));
         let mut long = map(100, 100, |i, j| ((i + j) as u64, (j / 3) as u64));
         long.x.name = "gap & <speed> ".repeat(40);
         long.y.name = "x".repeat(400);
-        let svg = long.svg();
+        let svg = long.figure().svg();
         words(&svg);
         assert!(!svg.contains("NaN"));
-        assert_eq!(svg, long.svg());
+        assert_eq!(svg, long.figure().svg());
     }
 }

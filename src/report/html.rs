@@ -76,6 +76,13 @@ pub struct Page {
     pub sections: Vec<Section>,
 }
 
+impl Section {
+    /// An empty chapter.
+    pub fn new(id: &str, title: &str) -> Section {
+        Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
+    }
+}
+
 impl Page {
     /// The page as a complete HTML document. The same page gives the same bytes.
     ///

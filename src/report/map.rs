@@ -5,7 +5,8 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::html::PageFigure;
-use super::map_sheet::{Kind, MapSheet};
+use super::map_page::{MapSheet, agreements, outcomes};
+use super::plot::Fill;
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};
 use crate::model::criterion::Criterion;
@@ -130,7 +131,7 @@ impl MapReport {
             for (at, model) in mapped.map.models.iter().enumerate() {
                 let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
                 let what = format!("{}, {}", model.name(), self.criterion.label());
-                let svg = self.sheet(&mapped.plan.grid, what, Kind::outcomes(), cells).svg();
+                let svg = self.sheet(&mapped.plan.grid, what, outcomes(), cells);
                 let name = format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name()));
                 results.add(&name, svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&name, "cells.csv"]));
@@ -140,8 +141,8 @@ impl MapReport {
         for difference in &differences {
             let cells = difference.cells.iter().map(|kind| *kind as u8).collect();
             let what = format!("{} against {}, {}", difference.first, difference.second, self.criterion.label());
-            let kinds = Kind::agreements(&difference.first, &difference.second);
-            let svg = self.sheet(difference.grid, what, kinds, cells).svg();
+            let kinds = agreements(&difference.first, &difference.second);
+            let svg = self.sheet(difference.grid, what, kinds, cells);
             let name = format!(
                 "{}_{}_against_{}.svg",
                 difference.grid.name(),
@@ -161,7 +162,7 @@ impl MapReport {
         Ok(names)
     }
 
-    fn sheet<'a>(&self, grid: &'a Grid, what: String, kinds: Vec<Kind>, cells: Vec<u8>) -> MapSheet<'a> {
+    fn sheet(&self, grid: &Grid, what: String, kinds: Vec<(String, Fill)>, cells: Vec<u8>) -> String {
         let fixed: Vec<String> =
             grid.fixed().iter().map(|(p, v)| format!("{}: {} {}.", p.label, readable::value(*v), p.unit)).collect();
         let mut notes = fixed;
@@ -171,14 +172,15 @@ impl MapReport {
         if grid.style() == CaseStyle::JrcComparison {
             notes.push("Cases with the lateral run-up of the JRC's comparison sweep.".to_owned());
         }
-        MapSheet {
+        let sheet = MapSheet {
             title: format!("{}: {what}", grid.category().label()),
             subtitle: format!("Profile {}, map {}", self.profile.name, grid.name()),
             grid,
             kinds,
             cells,
             notes,
-        }
+        };
+        sheet.figure().svg()
     }
 
     fn against_name(&self) -> String {

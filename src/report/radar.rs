@@ -4,15 +4,9 @@
 //! An undefined F1 (0/0) drawn as a number would be a false measurement. The line of a series is *broken* at an
 //! undefined spoke, and a note below the chart names the spoke.
 //!
-//! Several series often share a value (F1 = 1 above all). So the lines are drawn from thick to thin and the markers
-//! from large to small: what lies below stays visible.
+//! Several series often share a value (F1 = 1 above all), so lines and markers are thicker than in other figures.
 
-use super::drawing::{
-    self, BORDER_PX, GREY, GRID, Look, NAME, NOTE, TEXT_WIDTH_PX, TICK, Type, WIDTH_PX, group, on_circle, paragraph,
-    path_data, plain, text,
-};
-use super::svg::{Canvas, Color, Shape, TextAnchor};
-use std::f64::consts::TAU;
+use super::plot::{Figure, Look, Mark, Name, Plot, PlotAxis, Series, Value};
 
 /// One polygon: the scores of one parameterization.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,33 +32,66 @@ pub struct RadarChart {
     pub series: Vec<RadarSeries>,
 }
 
-/// Radius of the ring F1 = 1.
-const RADIUS_PX: f64 = 285.0;
-/// Distance of a spoke's name from the outer ring.
-const NAME_GAP_PX: f64 = 20.0;
-/// Widest line of a spoke's name; a name at three o'clock still fits between ring and border.
-const NAME_WIDTH_PX: f64 = WIDTH_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
-const NAME_UNDEFINED: Type = Type { colour: GREY, ..NAME };
-
-/// The chart as a complete SVG document, 1000 px wide and as high as its texts need.
-///
-/// The outer ring is 1, the centre 0, rings every 0.2. A score that is `None` gets no point and no line; all such
-/// spokes are named, series by series, below the legend. Texts are XML-escaped; control characters become U+FFFD.
-/// The same chart gives the same bytes. Nothing fails: without spokes or series only the texts remain.
-pub fn radar_svg(chart: &RadarChart) -> String {
-    let scores: Vec<Vec<Option<f64>>> = chart.series.iter().map(|s| scores(s, chart.spokes.len())).collect();
-    let (mut canvas, mut y) = drawing::page(&chart.title, chart.subtitle.as_deref());
-    if !chart.spokes.is_empty() {
-        y = web(&mut canvas, chart, &scores, y + 14.0);
+impl RadarChart {
+    /// The chart as a figure: the outer ring is 1, the centre 0, rings every 0.2. A score that is `None` gets no point
+    /// and no line; all such spokes are named, series by series, below the legend.
+    pub fn figure(&self) -> Figure {
+        let scores: Vec<Vec<Option<f64>>> = self.series.iter().map(|s| scores(s, self.spokes.len())).collect();
+        let is_undefined = |spoke: usize| !scores.is_empty() && scores.iter().all(|s| s[spoke].is_none());
+        let name = |(at, words): (usize, &String)| {
+            let is_empty = is_undefined(at);
+            let words = format!("{words}{}", if is_empty { " (undefined)" } else { "" });
+            Name { at: at as f64, words, is_empty, ..Name::default() }
+        };
+        let series = scores.iter().zip(&self.series).enumerate().map(|(at, (scores, series))| {
+            let value = |(spoke, score): (usize, &Option<f64>)| Value {
+                x: spoke as f64,
+                y: score.unwrap_or(f64::NAN),
+                tip: format!("{}; {}: {:.3}", series.name, self.spokes[spoke], score.unwrap_or(f64::NAN)),
+                ..Value::default()
+            };
+            let look = Look::of(at, self.series.len());
+            Series {
+                values: scores.iter().enumerate().map(value).collect(),
+                look: Some(Look { line_px: 1.6 * look.line_px, marker_px: 1.6 * look.marker_px, ..look }),
+                attributes: "class=\"score\"".to_owned(),
+                ..Series::new(&series.name, &[Mark::Line, Mark::Points], [])
+            }
+        });
+        let rings = [0.2, 0.4, 0.6, 0.8, 1.0].map(|at| Name { at, words: format!("{at:.1}"), ..Name::default() });
+        let names: Vec<Name> = self.spokes.iter().enumerate().map(name).collect();
+        let plot = Plot {
+            x: PlotAxis { names, ..PlotAxis::exactly("", 0.0, self.spokes.len() as f64) },
+            y: PlotAxis { names: rings.to_vec(), ..PlotAxis::exactly("", 0.0, 1.0) },
+            layers: series.map(Into::into).collect(),
+            is_polar: true,
+            ..Plot::default()
+        };
         let caption = "Radius: F1 score, 0 at the centre, 1 at the outer ring.";
-        y = paragraph(&mut canvas, (BORDER_PX, y + 12.0), caption, NOTE, TEXT_WIDTH_PX);
+        let notes = self.undefined(&scores, &is_undefined);
+        Figure {
+            title: self.title.clone(),
+            subtitle: self.subtitle.clone(),
+            caption: if self.spokes.is_empty() { String::new() } else { caption.to_owned() },
+            plots: if self.spokes.is_empty() { Vec::new() } else { vec![plot] },
+            notes: ("Undefined F1 (0/0): no point is drawn and the line is broken there.", notes),
+        }
     }
-    let count = chart.series.len();
-    let names = chart.series.iter().map(|s| s.name.as_str()).enumerate();
-    let legend: Vec<(&str, Look)> = names.map(|(s, name)| (name, Look::of(s, count))).collect();
-    y = drawing::legend(&mut canvas, &legend, y + 10.0);
-    y = notes(&mut canvas, chart, &scores, y + 10.0);
-    drawing::document(canvas, y)
+
+    /// Which scores are undefined.
+    fn undefined(&self, scores: &[Vec<Option<f64>>], is_undefined: &dyn Fn(usize) -> bool) -> Vec<String> {
+        let names = |is_named: &dyn Fn(usize) -> bool| {
+            let named = (0..self.spokes.len()).filter(|spoke| is_named(*spoke));
+            named.map(|spoke| self.spokes[spoke].as_str()).collect::<Vec<_>>().join(", ")
+        };
+        let all = names(is_undefined);
+        let everywhere = (!all.is_empty()).then(|| format!("In every series: {all}"));
+        let own = self.series.iter().zip(scores).filter_map(|(series, scores)| {
+            let gaps = names(&|spoke| scores[spoke].is_none() && !is_undefined(spoke));
+            (!gaps.is_empty()).then(|| format!("{} — {gaps}", series.name))
+        });
+        everywhere.into_iter().chain(own).collect()
+    }
 }
 
 /// One score per spoke; whatever is no number in 0..=1 is undefined.
@@ -73,142 +100,9 @@ fn scores(series: &RadarSeries, spokes: usize) -> Vec<Option<f64>> {
     (0..spokes).map(score).collect()
 }
 
-fn undefined_everywhere(scores: &[Vec<Option<f64>>], spoke: usize) -> bool {
-    !scores.is_empty() && scores.iter().all(|s| s[spoke].is_none())
-}
-
-/// Rings, spokes, names and polygons below `top`; returns the y below them.
-fn web(canvas: &mut Canvas, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
-    let names: Vec<Vec<String>> = (0..chart.spokes.len())
-        .map(|i| {
-            let mut lines = NAME.wrap(&chart.spokes[i], NAME_WIDTH_PX);
-            if undefined_everywhere(scores, i) {
-                lines.push("(undefined)".to_string());
-            }
-            lines
-        })
-        .collect();
-    let names_px = names.iter().map(Vec::len).max().unwrap_or(0) as f64 * NAME.line_px();
-    let reach = names_px + NAME_GAP_PX + RADIUS_PX;
-    let centre = (WIDTH_PX / 2.0, top + reach);
-    let turn = |i: usize| TAU * i as f64 / names.len() as f64;
-
-    for ring in 1..=5_u32 {
-        let (r, stroke) = (RADIUS_PX * f64::from(ring) / 5.0, Some(Color::from(GRID)));
-        let (fill, stroke_width) = (Color::None, Some(if ring == 5 { 1.6 } else { 1.0 }));
-        canvas.add(Shape::Circle { cx: centre.0, cy: centre.1, r, fill, stroke, stroke_width });
-    }
-    for (i, lines) in names.iter().enumerate() {
-        let nowhere = undefined_everywhere(scores, i);
-        let (x2, y2) = on_circle(centre, RADIUS_PX, turn(i));
-        canvas.add(Shape::Line {
-            x1: centre.0,
-            y1: centre.1,
-            x2,
-            y2,
-            stroke: Color::from(GRID),
-            stroke_width: 1.0,
-            stroke_dasharray: nowhere.then(|| "2,5".to_string()),
-        });
-        spoke_name(canvas, lines, centre, turn(i), if nowhere { NAME_UNDEFINED } else { NAME });
-    }
-    // Round joins: a mitred corner of a thin spike would reach beyond its score.
-    group(canvas, "stroke-linejoin=\"round\"", None);
-    for (s, values) in scores.iter().enumerate() {
-        let look = Look::of(s, scores.len());
-        let at = |(i, v): (usize, &Option<f64>)| v.map(|v| on_circle(centre, RADIUS_PX * v, turn(i)));
-        let points: Vec<Option<(f64, f64)>> = values.iter().enumerate().map(at).collect();
-        for (run, closed) in runs(&points) {
-            if run.len() > 1 {
-                canvas.add(look.line(path_data(&run, closed)));
-            }
-        }
-    }
-    // All markers above all lines: a marker says where a score is, also where lines cross.
-    for (s, values) in scores.iter().enumerate() {
-        let look = Look::of(s, scores.len());
-        for (i, value) in values.iter().enumerate() {
-            let Some(value) = value else { continue };
-            let tip = format!("{}; {}: {value:.3}", plain(&chart.series[s].name), plain(&chart.spokes[i]));
-            group(canvas, "class=\"score\"", Some(tip));
-            canvas.add(look.marker(on_circle(centre, RADIUS_PX * value, turn(i))));
-            canvas.add(Shape::GroupEnd);
-        }
-    }
-    canvas.add(Shape::GroupEnd);
-    ring_labels(canvas, centre, turn(1) / 2.0);
-    centre.1 + reach
-}
-
-/// The values of the rings, midway between the first two spokes where no marker lies, above the lines.
-fn ring_labels(canvas: &mut Canvas, centre: (f64, f64), turn: f64) {
-    for ring in 1..=5_u32 {
-        let (x, y) = on_circle(centre, RADIUS_PX * f64::from(ring) / 5.0, turn);
-        canvas.add(Shape::Rect {
-            x: x - 13.0,
-            y: y - 9.0,
-            width: 26.0,
-            height: 18.0,
-            fill: Color::from("#ffffff"),
-            stroke: None,
-            stroke_width: None,
-            opacity: Some(0.8),
-        });
-        let label = format!("{:.1}", f64::from(ring) / 5.0);
-        text(canvas, (x, y + 5.0), &label, TICK, TextAnchor::Middle);
-    }
-}
-
-/// The lines of a spoke's name outside the outer ring: upward at the top, downward at the bottom, centred beside it.
-fn spoke_name(canvas: &mut Canvas, lines: &[String], centre: (f64, f64), turn: f64, set: Type) {
-    let (x, y) = on_circle(centre, RADIUS_PX + NAME_GAP_PX, turn);
-    let (across, up) = (libm::sin(turn), libm::cos(turn));
-    let anchor = match across {
-        a if a > 0.2 => TextAnchor::Start,
-        a if a < -0.2 => TextAnchor::End,
-        _ => TextAnchor::Middle,
-    };
-    // `up` runs from 1 (the block ends at y) over 0 (centred on y) to -1 (it starts at y).
-    let block_px = lines.len() as f64 * set.line_px();
-    let first = y - block_px * (1.0 + up) / 2.0 + f64::from(set.size_px);
-    for (k, line) in lines.iter().enumerate() {
-        text(canvas, (x, first + k as f64 * set.line_px()), line, set, anchor);
-    }
-}
-
-/// Which scores are undefined, if any; returns the y below.
-fn notes(canvas: &mut Canvas, chart: &RadarChart, scores: &[Vec<Option<f64>>], top: f64) -> f64 {
-    let everywhere = |i: &usize| undefined_everywhere(scores, *i);
-    let name = |i: usize| chart.spokes[i].as_str();
-    let mut lines = Vec::new();
-    let all: Vec<&str> = (0..chart.spokes.len()).filter(everywhere).map(name).collect();
-    if !all.is_empty() {
-        lines.push(format!("In every series: {}", all.join(", ")));
-    }
-    for (series, values) in chart.series.iter().zip(scores) {
-        let here = |i: &usize| values[*i].is_none() && !everywhere(i);
-        let gaps: Vec<&str> = (0..chart.spokes.len()).filter(here).map(name).collect();
-        if !gaps.is_empty() {
-            lines.push(format!("{} — {}", series.name, gaps.join(", ")));
-        }
-    }
-    drawing::notes(canvas, "Undefined F1 (0/0): no point is drawn and the line is broken there.", &lines, top)
-}
-
-/// The pieces of a series' line, and whether the piece closes: the whole polygon, or what lies between the gaps
-/// (a piece may run over the top spoke).
-fn runs(points: &[Option<(f64, f64)>]) -> Vec<(Vec<(f64, f64)>, bool)> {
-    let Some(gap) = points.iter().position(Option::is_none) else {
-        return vec![(points.iter().copied().flatten().collect(), true)];
-    };
-    let from_gap: Vec<_> = points[gap..].iter().chain(&points[..gap]).copied().collect();
-    let pieces = from_gap.split(Option::is_none).filter(|run| !run.is_empty());
-    pieces.map(|run| (run.iter().copied().flatten().collect(), false)).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::drawing::tests::words;
+    use super::super::plot::words;
     use super::*;
 
     fn chart(series: usize, gaps: &[(usize, usize)]) -> RadarChart {
@@ -231,7 +125,7 @@ mod tests {
     #[test]
     fn every_title_spoke_and_series_is_named_and_no_note_stands_without_need() {
         let chart = chart(7, &[]);
-        let words = words(&radar_svg(&chart));
+        let words = words(&chart.figure().svg());
         let texts = chart.spokes.iter().chain(chart.series.iter().map(|s| &s.name));
         for text in texts.chain([&chart.title]).chain(chart.subtitle.as_ref()) {
             assert!(words.contains(text.as_str()), "{text} is missing");
@@ -244,8 +138,8 @@ mod tests {
 
     #[test]
     fn an_undefined_score_gets_no_point_and_is_named() {
-        let whole = radar_svg(&chart(2, &[]));
-        let broken = radar_svg(&chart(2, &[(1, 4), (0, 11), (1, 11)]));
+        let whole = chart(2, &[]).figure().svg();
+        let broken = chart(2, &[(1, 4), (0, 11), (1, 11)]).figure().svg();
         let points = |svg: &str| svg.matches("class=\"score\"").count();
         assert_eq!((points(&whole), points(&broken)), (24, 21));
         assert!(!broken.contains("NaN"));
@@ -264,17 +158,7 @@ mod tests {
             [Some(0.0), Some(1.0), None]
         );
         chart.series[0].values = values;
-        assert_eq!(radar_svg(&chart).matches("class=\"score\"").count(), 2);
-    }
-
-    #[test]
-    fn the_line_is_broken_at_every_gap_and_runs_over_the_top() {
-        let p = |k: usize| (k as f64, 0.0);
-        let full: Vec<_> = (0..4).map(|k| Some(p(k))).collect();
-        assert_eq!(runs(&full), [((0..4).map(p).collect(), true)]);
-        let gaps = [Some(p(0)), None, Some(p(2)), None, Some(p(4))];
-        assert_eq!(runs(&gaps), [(vec![p(2)], false), (vec![p(4), p(0)], false)]);
-        assert!(runs(&[None, None]).is_empty());
+        assert_eq!(chart.figure().svg().matches("class=\"score\"").count(), 2);
     }
 
     #[test]
@@ -282,25 +166,25 @@ mod tests {
         let mut chart = chart(1, &[(0, 0)]);
         chart.title = "a < b & \"c\" > 'd' $x$ \u{1}".into();
         chart.spokes[0] = "<script>".into();
-        let words = words(&radar_svg(&chart));
+        let words = words(&chart.figure().svg());
         assert!(words.contains("a &lt; b &amp; &quot;c&quot; &gt; &apos;d&apos; $x$ \u{FFFD}"), "{words}");
         assert!(words.contains("&lt;script&gt;"));
     }
 
     #[test]
     fn the_same_chart_gives_the_same_bytes() {
-        assert_eq!(radar_svg(&chart(7, &[(3, 3)])), radar_svg(&chart(7, &[(3, 3)])));
+        assert_eq!(chart(7, &[(3, 3)]).figure().svg(), chart(7, &[(3, 3)]).figure().svg());
     }
 
     #[test]
     fn empty_charts_and_long_texts_still_make_a_picture() {
         let mut empty = chart(0, &[]);
-        words(&radar_svg(&empty));
+        words(&empty.figure().svg());
         empty.spokes.clear();
-        words(&radar_svg(&empty));
+        words(&empty.figure().svg());
         let mut long = chart(9, &[]);
         long.subtitle = Some("SYNTHETIC DATA: ".repeat(40));
         long.series[0].name = "x".repeat(300);
-        words(&radar_svg(&long));
+        words(&long.figure().svg());
     }
 }

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-pub use super::run_facts::RunFacts;
 use super::run_record::DeviceRecord;
+pub use super::run_record::RunFacts;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};

@@ -1,7 +1,7 @@
 //! A sampling run as one page.
 
 use super::html::{Page, PageFigure, PageTable, Section};
-use super::panels::{Mark, Panel, PanelFigure, PanelSeries};
+use super::plot::{Figure, Layer, Mark, Plot, PlotAxis, Series};
 use super::sampling::{EstimateFile, interval_text, rate_text, short};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -131,8 +131,6 @@ impl EstimateFile {
             row.estimate.trust.warnings.iter().map(move |warning| (name.clone(), warning.to_string()))
         });
         Section {
-            id: "estimates".to_owned(),
-            title: "Estimates".to_owned(),
             intro: format!(
                 "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
                  {}{}",
@@ -153,12 +151,12 @@ impl EstimateFile {
             ),
             tables,
             facts: said.collect(),
-            ..Section::default()
+            ..Section::new("estimates", "Estimates")
         }
     }
 
     /// Probability over the headway, a panel per model; `None` where there is one headway only.
-    pub fn headways_figure(&self) -> Option<PanelFigure> {
+    pub fn headways_figure(&self) -> Option<Figure> {
         let thw_s = |row: &EstimateRow| {
             let of = |headway: &&Headway| headway.to_string() == row.headway;
             match self.plan_headways.iter().find(of) {
@@ -172,24 +170,24 @@ impl EstimateFile {
                 let point = |row: &EstimateRow| thw_s(row).map(|thw| (thw, 100.0 * row.estimate.probability));
                 let mut values: Vec<(f64, f64)> = own.filter_map(point).collect();
                 values.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let name = criterion.label().to_owned();
-                PanelSeries { name, mark: Mark::LineAndPoints, values, labels: Vec::new() }
+                Series::new(criterion.label(), &[Mark::Line, Mark::Points], values)
             };
-            Panel {
+            let series = Criterion::ALL.map(series).into_iter().filter(|series| !series.values.is_empty());
+            Plot {
                 heading: model.name().to_owned(),
-                x: "initial time headway in s".to_owned(),
-                y: "probability of failure in %".to_owned(),
-                y_range: Some((0.0, 100.0)),
-                series: Criterion::ALL.map(series).into_iter().filter(|s| !s.values.is_empty()).collect(),
-                ..Panel::default()
+                x: PlotAxis::new("initial time headway in s"),
+                y: PlotAxis::exactly("probability of failure in %", 0.0, 100.0),
+                layers: series.map(Layer::from).collect(),
+                ..Plot::default()
             }
         };
         let headways = self.plan_headways.iter().filter(|headway| matches!(headway, Headway::ThwS(_))).count();
-        (headways > 1).then(|| PanelFigure {
+        (headways > 1).then(|| Figure {
             title: format!("{}: probability of failure against the headway", self.name()),
             subtitle: Some(self.density.provenance.data.clone()),
             caption: "Each headway of its own; intervals are in estimates.csv.".to_owned(),
-            panels: self.models.iter().map(panel).collect(),
+            plots: self.models.iter().map(panel).collect(),
+            ..Figure::default()
         })
     }
 
@@ -231,15 +229,13 @@ impl EstimateFile {
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         Ok(Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro: "The same density, flags and seed give the same numbers, on any machine, whole or in shards. \
                     estimate.json holds all of it; `lanesweep simulate --from` reruns a lane."
                 .to_owned(),
             facts,
             host,
             details: vec![("Profile".to_owned(), profile)],
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         })
     }
 }
@@ -247,10 +243,8 @@ impl EstimateFile {
 fn pictures(figures: Vec<PageFigure>) -> Section {
     let none = "This estimator has no figure of its own.";
     Section {
-        id: "figures".to_owned(),
-        title: "Figures".to_owned(),
         intro: if figures.is_empty() { none } else { "" }.to_owned(),
         figures,
-        ..Section::default()
+        ..Section::new("figures", "Figures")
     }
 }

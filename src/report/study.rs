@@ -1,19 +1,23 @@
-//! A study as text for the terminal and as files in the output folder.
+//! A study as text for the terminal, as one JSON document and as files in the output folder.
 
-use super::distributions::distributions;
-use super::panels::PanelFigure;
-use super::radar::{RadarChart, RadarSeries, radar_svg};
+use super::plot::Figure;
+use super::radar::{RadarChart, RadarSeries};
+use super::records::{document, records};
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
-use super::study_figures::{HeadwayFailures, f1_by_parameters, legend_name, modes, recall_and_precision};
+use super::study_figures::{
+    HeadwayFailures, distributions, f1_by_parameters, legend_name, modes, recall_and_precision,
+};
 use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
-use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1};
+use crate::model::driver::ModelId;
+use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1, published_failures, published_lvd_f1};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
-use crate::scenario::parameterization::ModeShape;
+use crate::scenario::parameterization::{ModeShape, ParameterizationId};
 use crate::support::run_dir::Results;
+use serde_json::Value;
 
 /// What the figures of one category need beside the scores.
 #[derive(Debug, Clone)]
@@ -99,16 +103,17 @@ impl StudyReport {
             };
             RadarSeries { name: legend_name(scores, variant), values: spokes.iter().map(value).collect() }
         });
-        radar_svg(&RadarChart {
+        let chart = RadarChart {
             title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
             spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
             series: series.collect(),
-        })
+        };
+        chart.figure().svg()
     }
 
     /// The other figures of a category, with the beginnings of their files' names; without what there is no data for.
-    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, PanelFigure)> {
+    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.scores.categories[at], &self.run.data);
         let mut figures = Vec::new();
         if scores.variants.len() > 1 {
@@ -140,4 +145,56 @@ impl StudyReport {
 /// `radar-cut-in.svg`.
 pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> String {
     format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
+}
+
+impl StudyReport {
+    /// The same tables as one JSON document, undefined values null; the published numbers where they were asked for.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn json(&self) -> Result<String> {
+        let mut value = serde_json::json!({
+            "program": self.run.program,
+            "data": self.run.data,
+            "synthetic": self.run.synthetic,
+            "plan_sha256": self.run.plan_sha256,
+            "lanes": self.run.lanes,
+            "left_out": self.run.left_out,
+            "failures": records(&csv::failures(&self.scores, "")?)?,
+            "f1": records(&csv::f1_scores(&self.scores, "")?)?,
+            "claims": records(&csv::claims(&self.claims, "")?)?,
+        });
+        if self.published {
+            value["published"] = published();
+        }
+        if let Some(comparison) = &self.comparison {
+            value["reference"] = records(comparison.csv().as_bytes())?;
+        }
+        document(&value)
+    }
+}
+
+/// The paper's numbers, of highD.
+fn published() -> Value {
+    let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
+    let failures = Category::ALL.into_iter().flat_map(|category| {
+        cells().filter_map(move |(model, criterion)| {
+            let theirs = published_failures(category, model, criterion)?;
+            Some(serde_json::json!({
+                "category": category.key(), "model": model.name(), "criterion": criterion.key(),
+                "failures": theirs.failures, "simulations": theirs.simulations,
+            }))
+        })
+    });
+    let lvd = ParameterizationId::of(Category::Lvd);
+    let f1 = lvd.flat_map(|id| {
+        cells().filter_map(move |(model, criterion)| {
+            let theirs = published_lvd_f1(&id.key, model, criterion)?;
+            Some(serde_json::json!({
+                "category": id.category.key(), "parameterization": id.key, "model": model.name(),
+                "criterion": criterion.key(), "f1": theirs,
+            }))
+        })
+    });
+    serde_json::json!({"data": "highD", "failures": failures.collect::<Vec<_>>(), "f1": f1.collect::<Vec<_>>()})
 }

@@ -1,11 +1,13 @@
 //! The figures of a study beside the radar charts: recall and precision, failures against the headway, F1 against the
-//! number of parameters, the shapes of a decomposition.
+//! number of parameters, the shapes of a decomposition, the distributions of parameters.
 
-use super::panels::{Guide, Mark, Panel, PanelFigure, PanelSeries};
+use super::plot::{Figure, GREY, Mark, Plot, PlotAxis, Rule, Series, Value};
 use crate::engine::{Confusion, Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::score::{CategoryScores, f1, precision, recall};
+use crate::run::study::ParameterHistogram;
+use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, ParameterizationId};
 use crate::{Error, Result};
 
@@ -75,7 +77,7 @@ impl HeadwayFailures {
     }
 
     /// Share of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
-    pub fn figure(&self, scores: &CategoryScores, data: &str) -> PanelFigure {
+    pub fn figure(&self, scores: &CategoryScores, data: &str) -> Figure {
         let thw_s = |headway: &Headway| match headway {
             Headway::ThwS(seconds) => *seconds,
             Headway::GapM(metres) => *metres,
@@ -89,109 +91,112 @@ impl HeadwayFailures {
                 };
                 let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().map(share).collect();
                 values.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let name = criterion.label().to_owned();
-                PanelSeries { name, mark: Mark::LineAndPoints, values, labels: Vec::new() }
+                Series::new(criterion.label(), &[Mark::Line, Mark::Points], values)
             };
-            Panel {
+            Plot {
                 heading: id.name().to_owned(),
-                x: if is_gap { "initial gap in m" } else { "initial time headway in s" }.to_owned(),
-                y: "failed scenarios in %".to_owned(),
-                y_range: Some((0.0, 100.0)),
-                series: Criterion::ALL.map(series).to_vec(),
-                ..Panel::default()
+                x: PlotAxis::new(if is_gap { "initial gap in m" } else { "initial time headway in s" }),
+                y: PlotAxis::exactly("failed scenarios in %", 0.0, 100.0),
+                layers: Criterion::ALL.map(|criterion| series(criterion).into()).to_vec(),
+                ..Plot::default()
             }
         };
-        PanelFigure {
+        Figure {
             title: format!("{}: failures of the recorded scenarios against the headway", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
             caption: "Share of the recorded scenarios (S) in which the driver model fails the criterion.".to_owned(),
-            panels: self.models.iter().enumerate().map(panel).collect(),
+            plots: self.models.iter().enumerate().map(panel).collect(),
+            ..Figure::default()
         }
     }
 }
 
 /// Recall and precision of every parameterization, a panel per driver model and criterion.
-pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> PanelFigure {
+pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
     let panel = |model: ModelId, criterion: Criterion| {
         let series = |variant: usize| {
             let counts = scores.index(variant, model, criterion).map(|at| scores.cells[at].counts);
             let of = |share: fn(&Confusion) -> Option<f64>| counts.as_ref().and_then(share).unwrap_or(f64::NAN);
-            let name = legend_name(scores, variant);
-            PanelSeries { name, mark: Mark::Points, values: vec![(of(recall), of(precision))], labels: Vec::new() }
+            Series::new(legend_name(scores, variant), &[Mark::Points], [(of(recall), of(precision))])
         };
-        Panel {
+        let equal = Rule {
+            runs: [0.2, 0.4, 0.6, 0.8].map(equal_f1).to_vec(),
+            colour: GREY,
+            width_px: 0.9,
+            dash: "4,4",
+            attributes: "class=\"equal-f1\"".to_owned(),
+        };
+        Plot {
             heading: format!("{}, {}", model.name(), criterion.label()),
-            x: "recall".to_owned(),
-            y: "precision".to_owned(),
-            x_range: Some((0.0, 1.0)),
-            y_range: Some((0.0, 1.0)),
-            series: (1..scores.variants.len()).map(series).collect(),
-            guides: [0.2, 0.4, 0.6, 0.8].map(equal_f1).to_vec(),
+            x: PlotAxis::exactly("recall", 0.0, 1.0),
+            y: PlotAxis::exactly("precision", 0.0, 1.0),
+            layers: std::iter::once(equal.into())
+                .chain((1..scores.variants.len()).map(|variant| series(variant).into()))
+                .collect(),
+            ..Plot::default()
         }
     };
-    let panels = scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| panel(model, criterion)));
-    PanelFigure {
+    let plots = scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| panel(model, criterion)));
+    Figure {
         title: format!("{}: recall and precision of S' against S", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of \
                   their failures that were recorded. Dashed: equal F1, from 0.2 to 0.8. Without a failure on one side a \
                   share is undefined and has no marker."
             .to_owned(),
-        panels: panels.collect(),
+        plots: plots.collect(),
+        ..Figure::default()
     }
 }
 
 /// All pairs of recall and precision with this F1: P = F·R/(2R − F).
-fn equal_f1(f: f64) -> Guide {
+fn equal_f1(f: f64) -> Vec<(f64, f64)> {
     let least = f / (2.0 - f);
     let value = |k: u32| {
         let r = 1.0 + (least - 1.0) * f64::from(k) / 40.0;
         (r, (f * r / (2.0 * r - f)).min(1.0))
     };
-    Guide { values: (0..=40).rev().map(value).collect(), label: String::new() }
+    (0..=40).rev().map(value).collect()
 }
 
 /// F1 against the number of parameters: its mean over the cells that every parameterization defines, over all criteria
 /// and for each; the front of those that no other beats with as few parameters.
-pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> PanelFigure {
+pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
     let panel = |heading: &str, criteria: &[Criterion]| {
         let means = mean_f1(scores, criteria);
         let of = |name: &str| {
-            let own: Vec<_> = means.iter().filter(|(id, _)| id.family.name() == name).collect();
-            PanelSeries {
-                name: name.to_owned(),
-                mark: Mark::Points,
-                values: own.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect(),
-                labels: own.iter().map(|(id, _)| id.key.to_string()).collect(),
-            }
+            let own = means.iter().filter(|(id, _)| id.family.name() == name);
+            let values = own.map(|(id, mean)| {
+                let point = Value::from((id.parameter_count() as f64, *mean));
+                Value { label: id.key.to_string(), ..point }
+            });
+            Series { values: values.collect(), ..Series::new(name, &[Mark::Points], []) }
         };
         let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect();
-        let front = PanelSeries {
-            name: "no other is better with as few parameters".to_owned(),
-            mark: Mark::Line,
-            values: pareto_front(&points),
-            labels: Vec::new(),
-        };
-        Panel {
+        let front = "no other is better with as few parameters";
+        Plot {
             heading: heading.to_owned(),
-            x: "parameters beside the headway".to_owned(),
-            y: "mean F1".to_owned(),
-            x_range: Some((1.0, 8.0)),
-            y_range: Some((0.0, 1.05)),
-            series: vec![of("kinematic"), of("SVD"), front],
-            guides: Vec::new(),
+            x: PlotAxis::exactly("parameters beside the headway", 1.0, 8.0),
+            y: PlotAxis::exactly("mean F1", 0.0, 1.05),
+            layers: vec![
+                of("kinematic").into(),
+                of("SVD").into(),
+                Series::new(front, &[Mark::Line], pareto_front(&points)).into(),
+            ],
+            ..Plot::default()
         }
     };
-    let mut panels = vec![panel("all criteria", &Criterion::ALL)];
-    panels.extend(Criterion::ALL.map(|criterion| panel(criterion.label(), &[criterion])));
-    PanelFigure {
+    let mut plots = vec![panel("all criteria", &Criterion::ALL)];
+    plots.extend(Criterion::ALL.map(|criterion| panel(criterion.label(), &[criterion])));
+    Figure {
         title: format!("{}: F1 against the number of parameters", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: "Mean over the driver models (and criteria) whose F1 every parameterization defines. The fewer \
                   parameters, the fewer samples a density needs: of two that are equally good the simpler one is \
                   preferable."
             .to_owned(),
-        panels,
+        plots,
+        ..Figure::default()
     }
 }
 
@@ -226,46 +231,64 @@ fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// The mean scenario and the scenarios along the first directions of a decomposition, and what the directions explain.
-pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], data: &str) -> PanelFigure {
+pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
     let over_time = |values: &[f64]| {
         let last = values.len().saturating_sub(1).max(1) as f64;
         values.iter().enumerate().map(|(k, v)| (k as f64 / last, *v)).collect::<Vec<_>>()
     };
-    let line = |name: String, values: &[f64]| PanelSeries {
-        name,
-        mark: Mark::Line,
-        values: over_time(values),
-        labels: Vec::new(),
-    };
+    let line = |name: String, values: &[f64]| Series::new(name, &[Mark::Line], over_time(values)).into();
     let panel = |shape: &ModeShape| {
         let along = shape.along.iter().enumerate();
         let moved = along.map(|(j, values)| line(format!("one standard deviation along direction {}", j + 1), values));
-        Panel {
+        Plot {
             heading: shape.quantity.clone(),
-            x: "share of the duration T".to_owned(),
-            y: shape.unit.clone(),
-            x_range: Some((0.0, 1.0)),
-            series: std::iter::once(line("mean scenario".to_owned(), &shape.mean)).chain(moved).collect(),
-            ..Panel::default()
+            x: PlotAxis::exactly("share of the duration T", 0.0, 1.0),
+            y: PlotAxis::new(&shape.unit),
+            layers: std::iter::once(line("mean scenario".to_owned(), &shape.mean)).chain(moved).collect(),
+            ..Plot::default()
         }
     };
-    let shares = explained.iter().enumerate().map(|(k, share)| ((k + 1) as f64, 100.0 * share)).collect();
-    let share = Panel {
+    let shares = explained.iter().enumerate().map(|(k, share)| ((k + 1) as f64, 100.0 * share));
+    let share = Plot {
         heading: "explained variance".to_owned(),
-        x: "coefficients".to_owned(),
-        y: "share in %".to_owned(),
-        y_range: Some((0.0, 100.0)),
-        series: vec![PanelSeries { name: String::new(), mark: Mark::Bars(0.8), values: shares, labels: Vec::new() }],
-        ..Panel::default()
+        x: PlotAxis::new("coefficients"),
+        y: PlotAxis::exactly("share in %", 0.0, 100.0),
+        layers: vec![Series::new("", &[Mark::Bars(0.8)], shares).into()],
+        ..Plot::default()
     };
-    PanelFigure {
+    Figure {
         title: format!("{}: what the singular value decomposition keeps", scores.category.label()),
         subtitle: Some(data.to_owned()),
         caption:
             "Lines: the mean of the mined scenarios, and the scenario one standard deviation of a coefficient away \
                   from it. Bars: share of the scaled variance that the first coefficients explain together."
                 .to_owned(),
-        panels: shapes.iter().map(panel).chain([share]).collect(),
+        plots: shapes.iter().map(panel).chain([share]).collect(),
+        ..Figure::default()
+    }
+}
+
+/// The histograms of the parameters of mined scenarios.
+pub fn distributions(category: Category, histograms: &[ParameterHistogram], data: &str) -> Figure {
+    let plot = |histogram: &ParameterHistogram| {
+        let middle = |k: usize| histogram.low + (k as f64 + 0.5) * histogram.width;
+        let values = histogram.counts.iter().enumerate().map(|(k, count)| (middle(k), *count as f64));
+        Plot {
+            heading: histogram.name.clone(),
+            x: PlotAxis::new(&histogram.unit),
+            y: PlotAxis::new("scenarios"),
+            layers: vec![Series::new("", &[Mark::Bars(histogram.width)], values).into()],
+            ..Plot::default()
+        }
+    };
+    Figure {
+        title: format!("{}: parameters of the mined scenarios", category.label()),
+        subtitle: Some(data.to_owned()),
+        caption: "Scenarios that passed the filters; bins about as wide as the rule of Freedman and Diaconis has \
+                  them, at plain numbers."
+            .to_owned(),
+        plots: histograms.iter().map(plot).collect(),
+        ..Figure::default()
     }
 }
 
@@ -292,7 +315,7 @@ mod tests {
     #[test]
     fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {
         for f in [0.2, 0.5, 0.8] {
-            for (r, p) in equal_f1(f).values {
+            for (r, p) in equal_f1(f) {
                 assert!((0.0..=1.0 + 1e-12).contains(&r) && (0.0..=1.0).contains(&p));
                 assert!((2.0 * r * p / (r + p) - f).abs() < 1e-12);
             }

@@ -90,14 +90,7 @@ impl StudyReport {
         if !run.left_out.is_empty() {
             details.push((format!("{} parts left out", run.left_out.len()), run.left_out.join("\n")));
         }
-        Section {
-            id: "data".to_owned(),
-            title: "Data".to_owned(),
-            intro: sentence(&run.data),
-            tables: vec![counts],
-            details,
-            ..Section::default()
-        }
+        Section { intro: sentence(&run.data), tables: vec![counts], details, ..Section::new("data", "Data") }
     }
 
     fn failures(&self) -> Section {
@@ -107,12 +100,10 @@ impl StudyReport {
         }
         let rows = tables::failure_rows(&self.scores, self.published);
         Section {
-            id: "failures".to_owned(),
-            title: "Failures of the recorded scenarios".to_owned(),
             intro: "How often each driver model fails each criterion when the scenarios are replayed as recorded (S)."
                 .to_owned(),
             tables: vec![table("Failed simulations of S", &header, 2, rows)],
-            ..Section::default()
+            ..Section::new("failures", "Failures of the recorded scenarios")
         }
     }
 
@@ -174,13 +165,11 @@ impl StudyReport {
         let header = ["claim", "the paper says", "here it", "cells", "S fails", "difference [interval]"];
         let rows = self.claims.iter().map(row).collect();
         Section {
-            id: "claims".to_owned(),
-            title: "The paper's claims on this data".to_owned(),
             intro: "What de Gelder and Op den Camp found on highD, tested here: the mean over the cells (model and \
                     criterion) with enough failures, and each cell by itself. Files: claims.csv."
                 .to_owned(),
             tables: vec![table("Claims", &header, 4, rows)],
-            ..Section::default()
+            ..Section::new("claims", "The paper's claims on this data")
         }
     }
 
@@ -218,8 +207,6 @@ impl StudyReport {
             serde_json::from_str(&record).map_err(|e| Error::Internal(format!("run.json cannot be read: {e}")))?;
         let part = |key: &str| serde_json::to_string_pretty(&value[key]).unwrap_or_default();
         Ok(Section {
-            id: "reproduction".to_owned(),
-            title: "Reproduction".to_owned(),
             intro: "The same input, profile and seed give the same numbers, on any machine. run.json holds all of it; \
                     `lanesweep verify` compares a device with the CPU word by word."
                 .to_owned(),
@@ -230,7 +217,7 @@ impl StudyReport {
                 ("Options of the parameterizations".to_owned(), part("parameterization")),
                 ("Options of the scores".to_owned(), part("score")),
             ],
-            ..Section::default()
+            ..Section::new("reproduction", "Reproduction")
         })
     }
 }
@@ -265,10 +252,8 @@ fn variants_table(scores: &CategoryScores) -> PageTable {
 
 fn compared(comparison: &ReferenceComparison) -> Section {
     Section {
-        id: "reference".to_owned(),
-        title: "Lane arithmetic against double precision".to_owned(),
         details: vec![("Every lane in f32 and in f64".to_owned(), comparison.text())],
-        ..Section::default()
+        ..Section::new("reference", "Lane arithmetic against double precision")
     }
 }
 

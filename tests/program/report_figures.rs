@@ -1,9 +1,9 @@
 //! Sample figures of every kind, for looking at: what a test cannot see is whether a picture is clear.
 
-use lanesweep::report::axis::AxisScale;
 use lanesweep::report::convergence::{ConvergenceFigure, ConvergencePoint, ConvergenceSeries};
 use lanesweep::report::failure_map::{FailureMap, MapAxis};
 use lanesweep::report::forest::{ForestFigure, ForestGroup, ForestRow};
+use lanesweep::report::plot::AxisScale;
 use std::path::PathBuf;
 
 const MODELS: [&str; 4] = ["Reg157", "RSS", "CC human driver", "FSM"];
@@ -120,9 +120,9 @@ fn samples_of_every_figure() {
         ("long_names", named),
         ("empty", forest(AxisScale::Linear, 0, 0)),
     ];
-    let files = convergences.iter().map(|(name, f)| (format!("convergence_{name}.svg"), f.svg()));
-    let files = files.chain(maps.iter().map(|(name, f)| (format!("map_{name}.svg"), f.svg())));
-    for (name, svg) in files.chain(forests.iter().map(|(name, f)| (format!("forest_{name}.svg"), f.svg()))) {
+    let files = convergences.iter().map(|(name, f)| (format!("convergence_{name}.svg"), f.figure().svg()));
+    let files = files.chain(maps.iter().map(|(name, f)| (format!("map_{name}.svg"), f.figure().svg())));
+    for (name, svg) in files.chain(forests.iter().map(|(name, f)| (format!("forest_{name}.svg"), f.figure().svg()))) {
         std::fs::write(folder.join(name), svg).unwrap();
     }
     println!("figures written to {}", folder.display());

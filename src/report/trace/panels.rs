@@ -1,7 +1,7 @@
-//! What the figure of a case shows: its panels as curves, bands and marks in the units of their axes. Where they stand
-//! on the sheet is the figure's business.
+//! What the figure of a case shows: its panels as plots. Where they stand on the sheet is the figure's business.
 
-use super::axis::plain_end;
+use super::super::plot::plain_end;
+use super::super::plot::{GREY, Height, INK, Layer, Look, Mark as Drawn, Plot, PlotAxis, Rule, Series, Symbol, Value};
 use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
 
 /// One lane on the sheet.
@@ -21,98 +21,64 @@ const REST_S: f64 = 2.0;
 const TTC_SHOWN: f64 = 10.0;
 const BTN_SHOWN: f64 = 2.5;
 
-/// Ends of a vertical axis.
+/// A run of points, (time in s, value), without a gap.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Reach {
-    /// Around these values, with a little room.
-    Around(Vec<f64>),
-    /// Exactly from the first to the second; curves end where they leave.
-    Exactly(f64, f64),
+struct Curve {
+    /// Of another vehicle in a panel of the ego, or not looked at by the criteria.
+    is_thin: bool,
+    look: Look,
+    points: Vec<(f64, f64)>,
 }
 
-impl Reach {
-    /// Lower and upper end, different and finite.
-    pub fn ends(&self) -> (f64, f64) {
-        let (low, high) = match self {
-            Reach::Exactly(low, high) => (*low, *high),
-            Reach::Around(values) => {
-                let shown = || values.iter().copied().filter(|v| v.abs() <= 1e300);
-                let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
-                // Equal but for rounding counts as equal.
-                let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(0.05);
-                (low - room, high + room)
-            }
-        };
-        if low < high && low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 1.0) }
+impl From<Curve> for Layer {
+    fn from(curve: Curve) -> Self {
+        let line_px = if curve.is_thin && curve.look.colour != GREY { 1.0 } else { curve.look.line_px };
+        let look = Some(Look { line_px, ..curve.look });
+        Series { look, ..Series::new("", &[Drawn::Line], curve.points) }.into()
     }
 }
 
-/// A line through a panel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Level {
-    Zero,
-    /// Of a criterion.
-    Threshold,
-    LaneEdge,
-    EgoSide,
-}
-
-/// Whose a curve is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Owner {
-    /// That series'.
-    Series(usize),
-    /// All series' alike.
-    All,
-}
-
-/// A run of points, (time in s, value), without a gap.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Curve {
-    pub owner: Owner,
-    /// Of another vehicle in a panel of the ego, or not looked at by the criteria.
-    pub is_thin: bool,
-    pub points: Vec<(f64, f64)>,
-}
-
-/// An area between two runs of points of the same times: (time in s, lower, upper).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Band {
-    pub owner: Owner,
-    pub points: Vec<(f64, f64, f64)>,
-}
-
-/// A mark on a curve.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PanelMark {
-    pub series: usize,
-    pub mark: Mark,
-    /// Time, s, and value.
-    pub at: (f64, f64),
-}
-
 /// One panel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Panel {
-    /// What it shows, with unit.
-    pub title: &'static str,
     /// How to read it, in a few words.
     pub hint: String,
-    pub height_px: f64,
-    pub reach: Reach,
-    pub curves: Vec<Curve>,
-    pub bands: Vec<Band>,
-    /// Lines that run through the panel, and their values.
-    pub levels: Vec<(Level, f64)>,
-    pub marks: Vec<PanelMark>,
+    /// The heading says what it shows, with unit.
+    pub plot: Plot,
 }
 
 /// The panels of one other vehicle or of the ego, from top to bottom.
 pub(super) type Column = Vec<Panel>;
 
+/// A mark in the colour of its series; told apart by shape.
+pub(super) fn mark_look(mark: Mark, look: &Look) -> Look {
+    let symbol = match mark {
+        Mark::Reaction => Symbol::Ring,
+        Mark::Braking => Symbol::Polygon(3, 0.5),
+        Mark::Contact => Symbol::Cross,
+    };
+    Look { symbol, marker_px: 5.0, ..*look }
+}
+
+/// Dashes of the line through all panels at a mark.
+pub(super) fn mark_dash(mark: Mark) -> &'static str {
+    match mark {
+        Mark::Reaction => "2,3",
+        Mark::Braking => "7,3",
+        Mark::Contact => "",
+    }
+}
+
+/// A line through a panel.
+fn rule(ends: [(f64, f64); 2], colour: &'static str, width_px: f64, dash: &'static str) -> Rule {
+    Rule { runs: vec![ends.to_vec()], colour, width_px, dash, attributes: "class=\"level\"".to_owned() }
+}
+
 /// What all panels show: the series up to a time.
 pub(super) struct Shown<'a> {
     pub series: &'a [TraceSeries<'a>],
+    /// How they look.
+    pub looks: Vec<Look>,
     /// Last time that is shown, s.
     pub until_s: f64,
 }
@@ -123,7 +89,8 @@ impl<'a> Shown<'a> {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         let last_s = series.iter().map(|s| last_change_s(s.trace)).fold(0.0, f64::max) + REST_S;
         let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });
-        Shown { series, until_s: until_s.clamp(0.0, end_s) }
+        let looks = (0..series.len()).map(|k| Look::of(k, series.len())).collect();
+        Shown { series, looks, until_s: until_s.clamp(0.0, end_s) }
     }
 
     /// The columns of the sheet: one, or one per other vehicle where there are two.
@@ -137,8 +104,10 @@ impl<'a> Shown<'a> {
                 (_, 0) => "to the vehicle that cuts out",
                 _ => "to the vehicle ahead of it",
             };
-            [self.gap(vehicle, name), self.ttc(vehicle), self.btn(vehicle), self.pfs(vehicle), self.cfs(vehicle)]
+            [self.gap(vehicle, name), self.ttc(vehicle), self.btn(vehicle)]
                 .into_iter()
+                .chain([self.surrogate("PFS (–)", "proactive fuzzy surrogate", vehicle, &|other| other.pfs)])
+                .chain([self.surrogate("CFS (–)", "critical fuzzy surrogate", vehicle, &|other| other.cfs)])
                 .chain([self.lateral(vehicle)])
         };
         if vehicles == 1 {
@@ -159,69 +128,88 @@ impl<'a> Shown<'a> {
         &trace.steps[..trace.steps.partition_point(|step| step.time_s <= self.until_s)]
     }
 
+    /// A panel with axes and layers; where lanes have marks, a single lane's run through as lines.
+    fn panel(
+        &self,
+        title: &str,
+        hint: impl Into<String>,
+        height_px: f64,
+        ends: (f64, f64),
+        layers: Vec<Layer>,
+    ) -> Panel {
+        // A lane of one step has an axis too.
+        let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
+        let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
+            let attributes = format!("class=\"mark-line {}\"", mark.label());
+            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }.into()
+        });
+        let plot = Plot {
+            heading: title.to_owned(),
+            x: PlotAxis::exactly("Time (s)", 0.0, end_s),
+            y: PlotAxis::exactly("", ends.0, ends.1),
+            layers: through.chain(layers).collect(),
+            height: Height::Px(height_px),
+            ..Plot::default()
+        };
+        Panel { hint: hint.into(), plot }
+    }
+
+    fn level(&self, value: f64, colour: &'static str, width_px: f64, dash: &'static str) -> Layer {
+        rule([(0.0, value), (self.until_s.max(1.0), value)], colour, width_px, dash).into()
+    }
+
+    /// Where lines run through all panels: for a single lane only, more would be a thicket.
+    pub fn mark_lines(&self) -> Vec<(Mark, f64)> {
+        let [series] = self.series else { return Vec::new() };
+        let time = |mark: Mark| Some((mark, series.trace.time_s(series.trace.step_of(mark)?)));
+        Mark::ALL.into_iter().filter_map(time).filter(|mark| mark.1 <= self.until_s).collect()
+    }
+
     fn speed(&self, vehicles: usize) -> Panel {
         let mut curves = Vec::new();
         let mut is_shared = true;
         for vehicle in 0..vehicles {
-            for (owner, trace) in self.courses(vehicle, &|other| other.v_mps) {
-                is_shared &= owner == Owner::All;
+            for (look, trace) in self.courses(vehicle, &|other| other.v_mps) {
+                is_shared &= look.colour == GREY;
                 let speed = |other: &TracedVehicle| other.is_present.then_some((other.v_mps, true));
-                curves.extend(runs(owner, self.steps(trace), &|step| speed(&step.others[vehicle])));
+                curves.extend(runs(look, self.steps(trace), &|step| speed(&step.others[vehicle])));
             }
         }
         curves.extend(self.curves(&|step| Some((step.v_ego_mps, false))));
-        Panel {
-            title: "Speed (m/s)",
-            hint: match (vehicles, is_shared) {
-                (1, true) => "grey: the other vehicle".to_owned(),
-                (_, true) => "grey: the other vehicles".to_owned(),
-                (1, _) => "thin: the other vehicle".to_owned(),
-                _ => "thin: the other vehicles".to_owned(),
-            },
-            height_px: 92.0,
-            reach: around(&curves, &[]),
-            curves,
-            bands: Vec::new(),
-            levels: Vec::new(),
-            marks: self.marks(&Mark::ALL, &|step| Some(step.v_ego_mps)),
-        }
+        let hint = match (vehicles, is_shared) {
+            (1, true) => "grey: the other vehicle",
+            (_, true) => "grey: the other vehicles",
+            (1, _) => "thin: the other vehicle",
+            _ => "thin: the other vehicles",
+        };
+        let ends = around(values(&curves));
+        let marks = self.marks(&Mark::ALL, None, &|step| Some(step.v_ego_mps));
+        self.panel("Speed (m/s)", hint, 92.0, ends, layers(curves, marks))
     }
 
     fn acceleration(&self) -> Panel {
         let curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
-        Panel {
-            title: "Acceleration (m/s²)",
-            hint: "of the ego".to_owned(),
-            height_px: 92.0,
-            reach: around(&curves, &[0.0, -1.0]),
-            curves,
-            bands: Vec::new(),
-            levels: vec![(Level::Zero, 0.0)],
-            marks: self.marks(&Mark::ALL, &|step| Some(step.a_ego_mps2)),
-        }
+        let ends = around(values(&curves).chain([0.0, -1.0]));
+        let mut layers = layers(curves, self.marks(&Mark::ALL, None, &|step| Some(step.a_ego_mps2)));
+        layers.push(self.level(0.0, GREY, 1.1, ""));
+        self.panel("Acceleration (m/s²)", "of the ego", 92.0, ends, layers)
     }
 
     fn gap(&self, vehicle: usize, name: &str) -> Panel {
         let gap = |step: &TracedStep| Some(step.others[vehicle]).filter(|o| o.is_present).map(|o| o.gap_m);
         let curves = self.judged_curves(vehicle, &|other| other.gap_m);
-        let mut marks = self.marks(&[Mark::Reaction, Mark::Braking], &gap);
-        marks.extend(self.contacts(vehicle, &gap));
-        Panel {
-            title: "Gap (m)",
-            hint: name.to_owned(),
-            height_px: 92.0,
-            reach: around(&curves, &[0.0]),
-            curves,
-            bands: Vec::new(),
-            levels: vec![(Level::Zero, 0.0)],
-            marks,
-        }
+        let ends = around(values(&curves).chain([0.0]));
+        let mut marks = self.marks(&[Mark::Reaction, Mark::Braking], None, &gap);
+        marks.extend(self.marks(&[Mark::Contact], Some(vehicle), &gap));
+        let mut layers = layers(curves, marks);
+        layers.push(self.level(0.0, GREY, 1.1, ""));
+        self.panel("Gap (m)", name, 92.0, ends, layers)
     }
 
     fn ttc(&self, vehicle: usize) -> Panel {
         let threshold = self.first(|trace| trace.ttc_threshold_s);
         let curves = self.judged_curves(vehicle, &|other| other.ttc_s);
-        let largest = curves.iter().flat_map(|c| &c.points).map(|p| p.1).filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let largest = values(&curves).filter(|v| v.is_finite()).fold(0.0, f64::max);
         let top = plain_end(largest.clamp(2.0 * threshold, TTC_SHOWN * threshold));
         self.measure("TTC (s)", format!("dots: fails below {threshold} s"), top, threshold, curves)
     }
@@ -229,90 +217,50 @@ impl<'a> Shown<'a> {
     fn btn(&self, vehicle: usize) -> Panel {
         let threshold = self.first(|trace| trace.btn_threshold);
         let curves = self.judged_curves(vehicle, &|other| other.btn);
-        let largest = curves.iter().flat_map(|c| &c.points).map(|p| p.1).fold(0.0, f64::max);
+        let largest = values(&curves).fold(0.0, f64::max);
         let top = plain_end(largest.clamp(1.25 * threshold, BTN_SHOWN * threshold));
         self.measure("BTN (–)", format!("dots: fails above {threshold}"), top, threshold, curves)
     }
 
-    fn pfs(&self, vehicle: usize) -> Panel {
-        self.surrogate("PFS (–)", "proactive fuzzy surrogate", vehicle, &|other| other.pfs)
+    fn measure(&self, title: &str, hint: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Panel {
+        let mut layers = layers(curves.into_iter().flat_map(|curve| below(curve, top)), Vec::new());
+        layers.push(self.level(threshold, INK, 1.4, "2,3"));
+        self.panel(title, hint, 84.0, (-0.04 * top, top), layers)
     }
 
-    fn cfs(&self, vehicle: usize) -> Panel {
-        self.surrogate("CFS (–)", "critical fuzzy surrogate", vehicle, &|other| other.cfs)
-    }
-
-    fn surrogate(
-        &self,
-        title: &'static str,
-        hint: &str,
-        vehicle: usize,
-        value: &dyn Fn(&TracedVehicle) -> f64,
-    ) -> Panel {
+    fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Panel {
         let present = |step: &TracedStep| {
             let other = &step.others[vehicle];
             other.is_present.then(|| (value(other), false))
         };
         // A little beyond 0 and 1, where most of the curves are.
-        let reach = Reach::Exactly(-0.1, 1.1);
-        let curves = self.curves(&present);
-        Panel {
-            title,
-            hint: hint.to_owned(),
-            height_px: 58.0,
-            reach,
-            curves,
-            bands: Vec::new(),
-            levels: Vec::new(),
-            marks: Vec::new(),
-        }
-    }
-
-    fn measure(&self, title: &'static str, hint: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Panel {
-        let bottom = -0.04 * top;
-        Panel {
-            title,
-            hint,
-            height_px: 84.0,
-            reach: Reach::Exactly(bottom, top),
-            curves: curves.into_iter().flat_map(|curve| below(curve, top)).collect(),
-            bands: Vec::new(),
-            levels: vec![(Level::Threshold, threshold)],
-            marks: Vec::new(),
-        }
+        self.panel(title, hint, 58.0, (-0.1, 1.1), layers(self.curves(&present), Vec::new()))
     }
 
     fn lateral(&self, vehicle: usize) -> Panel {
         let (mut curves, mut bands) = (Vec::new(), Vec::new());
         let ego_half_m = self.first(|trace| trace.ego_width_m) / 2.0;
-        for (owner, trace) in self.courses(vehicle, &|other| other.y_m) {
+        let mut edges = vec![HALF_LANE_M, -HALF_LANE_M, ego_half_m, -ego_half_m];
+        for (look, trace) in self.courses(vehicle, &|other| other.y_m) {
             let half_m = trace.widths_m[vehicle] / 2.0;
             let centre = |step: &TracedStep| {
                 let other = &step.others[vehicle];
                 other.is_present.then_some((other.y_m, false))
             };
-            let runs = runs(owner, self.steps(trace), &centre);
-            let band = |run: &Curve| Band {
-                owner,
-                points: run.points.iter().map(|&(t, y)| (t, y - half_m, y + half_m)).collect(),
-            };
-            bands.extend(runs.iter().map(band));
-            curves.extend(runs);
+            for run in runs(look, self.steps(trace), &centre) {
+                let side = |&(x, y): &(f64, f64)| Value { interval: Some((y - half_m, y + half_m)), ..(x, y).into() };
+                let values: Vec<Value> = run.points.iter().map(side).collect();
+                edges.extend(run.points.iter().flat_map(|point| [point.1 - half_m, point.1 + half_m]));
+                bands.push(Series { values, look: Some(look), ..Series::new("", &[Drawn::Band], []) }.into());
+                curves.push(run);
+            }
         }
-        let edges = bands.iter().flat_map(|b| &b.points).flat_map(|&(_, low, high)| [low, high]);
-        let lane = [(Level::LaneEdge, HALF_LANE_M), (Level::EgoSide, ego_half_m)];
-        let levels: Vec<_> = lane.iter().flat_map(|&(level, y)| [(level, -y), (level, y)]).collect();
-        let reach = Reach::Around(edges.chain(levels.iter().map(|level| level.1)).collect());
-        Panel {
-            title: "Lateral position (m)",
-            hint: "grey lines: sides of the ego".to_owned(),
-            height_px: 110.0,
-            reach,
-            curves,
-            bands,
-            levels,
-            marks: self.contacts(vehicle, &|step| Some(step.others[vehicle].y_m)),
-        }
+        let contacts = self.marks(&[Mark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
+        let lane = [-HALF_LANE_M, HALF_LANE_M].map(|y| self.level(y, GREY, 1.1, "14,6"));
+        let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, ""));
+        let layers = lane.into_iter().chain(sides).chain(bands).chain(layers(curves, contacts));
+        let ends = around(edges.into_iter());
+        self.panel("Lateral position (m)", "grey lines: sides of the ego", 110.0, ends, layers.collect())
     }
 
     /// A value of the first series; the same for all of one sheet.
@@ -320,8 +268,8 @@ impl<'a> Shown<'a> {
         self.series.first().map_or(1.0, |s| value(s.trace))
     }
 
-    /// The different courses of a value of a vehicle and whose they are; where lanes share one, that of the longest.
-    fn courses(&self, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Vec<(Owner, &'a Trace)> {
+    /// The different courses of a value of a vehicle, grey where all lanes have one; where lanes share one, that of the longest.
+    fn courses(&self, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Vec<(Look, &'a Trace)> {
         let at = |step: &TracedStep| {
             let other = &step.others[vehicle];
             (value(other), other.is_present)
@@ -329,23 +277,23 @@ impl<'a> Shown<'a> {
         let is_one = |a: &Trace, b: &Trace| {
             a.widths_m[vehicle] == b.widths_m[vehicle] && a.steps.iter().zip(&b.steps).all(|(a, b)| at(a) == at(b))
         };
-        let mut found: Vec<(Owner, &Trace)> = Vec::new();
+        let mut found: Vec<(Look, &Trace)> = Vec::new();
         for (k, series) in self.series.iter().enumerate().filter(|(_, s)| s.trace.vehicles > vehicle) {
             match found.iter_mut().find(|(_, other)| is_one(other, series.trace)) {
                 Some((_, longest)) if longest.steps.len() < series.trace.steps.len() => *longest = series.trace,
                 Some(_) => {}
-                None => found.push((Owner::Series(k), series.trace)),
+                None => found.push((self.looks[k], series.trace)),
             }
         }
-        if let [(owner, _)] = &mut found[..] {
-            *owner = Owner::All;
+        if let [(look, _)] = &mut found[..] {
+            *look = Look { colour: GREY, dash: "", line_px: 2.0, ..*look };
         }
         found
     }
 
     fn curves(&self, value: &dyn Fn(&TracedStep) -> Option<(f64, bool)>) -> Vec<Curve> {
         let all = self.series.iter().enumerate();
-        all.flat_map(|(k, s)| runs(Owner::Series(k), self.steps(s.trace), value)).collect()
+        all.flat_map(|(k, s)| runs(self.looks[k], self.steps(s.trace), value)).collect()
     }
 
     fn judged_curves(&self, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Vec<Curve> {
@@ -355,23 +303,21 @@ impl<'a> Shown<'a> {
         })
     }
 
-    fn marks(&self, which: &[Mark], value: &dyn Fn(&TracedStep) -> Option<f64>) -> Vec<PanelMark> {
+    /// Marks of the lanes, as layers; contacts with one vehicle only where it is given.
+    fn marks(&self, which: &[Mark], vehicle: Option<usize>, value: &dyn Fn(&TracedStep) -> Option<f64>) -> Vec<Layer> {
         let mut marks = Vec::new();
-        for (series, of) in self.series.iter().enumerate() {
+        for (of, look) in self.series.iter().zip(&self.looks) {
+            if vehicle.is_some_and(|vehicle| usize::from(of.trace.outcome.contact_with) != vehicle) {
+                continue;
+            }
             for &mark in which {
                 let step = of.trace.step_of(mark).and_then(|step| self.steps(of.trace).get(step as usize));
-                if let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) {
-                    marks.push(PanelMark { series, mark, at: (step.time_s, value) });
-                }
+                let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) else { continue };
+                let attributes = format!("class=\"mark {}\" data-t=\"{}\"", mark.label(), step.time_s);
+                let series = Series::new("", &[Drawn::Points], [(step.time_s, value)]);
+                marks.push(Series { look: Some(mark_look(mark, look)), attributes, ..series }.into());
             }
         }
-        marks
-    }
-
-    /// The contacts with one vehicle.
-    fn contacts(&self, vehicle: usize, value: &dyn Fn(&TracedStep) -> Option<f64>) -> Vec<PanelMark> {
-        let mut marks = self.marks(&[Mark::Contact], value);
-        marks.retain(|mark| usize::from(self.series[mark.series].trace.outcome.contact_with) == vehicle);
         marks
     }
 }
@@ -398,7 +344,7 @@ fn last_change_s(trace: &Trace) -> f64 {
 }
 
 /// A value over time as runs without a gap, cut also where thin begins or ends; such neighbours share a point.
-fn runs(owner: Owner, steps: &[TracedStep], value: &dyn Fn(&TracedStep) -> Option<(f64, bool)>) -> Vec<Curve> {
+fn runs(look: Look, steps: &[TracedStep], value: &dyn Fn(&TracedStep) -> Option<(f64, bool)>) -> Vec<Curve> {
     let mut runs: Vec<Curve> = Vec::new();
     let mut open = false;
     for step in steps {
@@ -411,22 +357,36 @@ fn runs(owner: Owner, steps: &[TracedStep], value: &dyn Fn(&TracedStep) -> Optio
             Some(run) if run.is_thin == is_thin => run.points.push(point),
             Some(run) => {
                 let shared = run.points.last().copied();
-                runs.push(Curve { owner, is_thin, points: shared.into_iter().chain([point]).collect() });
+                runs.push(Curve { look, is_thin, points: shared.into_iter().chain([point]).collect() });
             }
-            None => runs.push(Curve { owner, is_thin, points: vec![point] }),
+            None => runs.push(Curve { look, is_thin, points: vec![point] }),
         }
         open = true;
     }
     runs
 }
 
-fn around(curves: &[Curve], including: &[f64]) -> Reach {
-    Reach::Around(curves.iter().flat_map(|c| &c.points).map(|p| p.1).chain(including.iter().copied()).collect())
+fn values(curves: &[Curve]) -> impl Iterator<Item = f64> {
+    curves.iter().flat_map(|curve| &curve.points).map(|point| point.1)
+}
+
+fn layers(curves: impl IntoIterator<Item = Curve>, marks: Vec<Layer>) -> Vec<Layer> {
+    curves.into_iter().map(Layer::from).chain(marks).collect()
+}
+
+/// Ends around values with a little room, different and finite.
+fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let shown = values.filter(|v| v.abs() <= 1e300);
+    let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    // Equal but for rounding counts as equal.
+    let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(0.05);
+    let (low, high) = (low - room, high + room);
+    if low < high && low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 1.0) }
 }
 
 /// The pieces of a curve that are not above `top`, with the points where it crosses it. Infinite values are above.
 fn below(curve: Curve, top: f64) -> Vec<Curve> {
-    let Curve { owner, is_thin, points } = curve;
+    let Curve { look, is_thin, points } = curve;
     let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     let crossing = |(t1, v1): (f64, f64), (t2, v2): (f64, f64)| {
         // Towards infinity it is the step's end that crosses.
@@ -448,5 +408,5 @@ fn below(curve: Curve, top: f64) -> Vec<Curve> {
         before = Some(point);
     }
     pieces.retain(|piece| !piece.is_empty());
-    pieces.into_iter().map(|points| Curve { owner, is_thin, points }).collect()
+    pieces.into_iter().map(|points| Curve { look, is_thin, points }).collect()
 }

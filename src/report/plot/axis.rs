@@ -1,13 +1,12 @@
 //! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
 
-use super::drawing::{GREY, GRID, TICK, line, text};
-use super::svg::{Canvas, TextAnchor};
 use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
     /// Equal differences are equally far apart.
+    #[default]
     Linear,
     /// Equal ratios are equally far apart; zero and what lies below it have no place.
     Logarithmic,
@@ -15,7 +14,7 @@ pub enum AxisScale {
 
 impl AxisScale {
     /// Whether the axis has a place for `value`. Beyond 1e±300 widths and ratios would leave the range of `f64`.
-    pub(super) fn shows(self, value: f64) -> bool {
+    pub(in crate::report) fn shows(self, value: f64) -> bool {
         match self {
             Self::Linear => value.abs() <= 1e300,
             Self::Logarithmic => (1e-300..=1e300).contains(&value),
@@ -33,7 +32,7 @@ impl AxisScale {
 
 /// An axis between two ends, both at a plain number.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Axis {
+pub(in crate::report) struct Axis {
     scale: AxisScale,
     /// Ends, as [`AxisScale::place`] gives them.
     low: f64,
@@ -44,7 +43,7 @@ pub(super) struct Axis {
 
 /// A place on the axis that is marked, and the number beside it, if there is room for one.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tick {
+pub(in crate::report) struct Tick {
     pub at_px: f64,
     pub label: Option<String>,
 }
@@ -81,6 +80,26 @@ impl Axis {
     /// The axis that ends exactly at `low` and `high` (finite, `low < high`), linear.
     pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
         Self { scale: AxisScale::Linear, low, high, from_px, to_px }
+    }
+
+    /// Whether `value` is between the ends.
+    pub fn holds(&self, value: f64) -> bool {
+        self.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
+    }
+
+    pub fn length_px(&self) -> f64 {
+        (self.to_px - self.from_px).abs()
+    }
+
+    /// How many numbers stand above one another without crowding.
+    pub fn vertical_numbers(&self) -> usize {
+        let most = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
+        (self.length_px() / 18.0).clamp(2.0, most) as usize
+    }
+
+    /// Whether the axis has a place for `value`.
+    pub fn shows(&self, value: f64) -> bool {
+        self.scale.shows(value)
     }
 
     /// Where `value` is; at the nearer end if the axis has no place for it.
@@ -142,37 +161,6 @@ impl Axis {
         }
         ticks
     }
-
-    /// The axis below a plot that reaches from `top` to `bottom`: grid, numbers. Returns the y below the numbers.
-    pub fn draw_below(&self, canvas: &mut Canvas, (top, bottom): (f64, f64), most: usize, grid: bool) -> f64 {
-        for tick in self.ticks(most) {
-            let Some(label) = &tick.label else {
-                line(canvas, (tick.at_px, bottom), (tick.at_px, bottom + 3.0), GREY, 0.8);
-                continue;
-            };
-            if grid {
-                line(canvas, (tick.at_px, top), (tick.at_px, bottom), GRID, 0.8);
-            }
-            line(canvas, (tick.at_px, bottom), (tick.at_px, bottom + 6.0), GREY, 1.0);
-            text(canvas, (tick.at_px, bottom + 20.0), label, TICK, TextAnchor::Middle);
-        }
-        bottom + 24.0
-    }
-
-    /// The axis at the left of a plot that reaches from `left` to `right`: grid, numbers.
-    pub fn draw_left(&self, canvas: &mut Canvas, (left, right): (f64, f64), most: usize, grid: bool) {
-        for tick in self.ticks(most) {
-            let Some(label) = &tick.label else {
-                line(canvas, (left - 3.0, tick.at_px), (left, tick.at_px), GREY, 0.8);
-                continue;
-            };
-            if grid {
-                line(canvas, (left, tick.at_px), (right, tick.at_px), GRID, 0.8);
-            }
-            line(canvas, (left - 6.0, tick.at_px), (left, tick.at_px), GREY, 1.0);
-            text(canvas, (left - 9.0, tick.at_px + 4.5), label, TICK, TextAnchor::End);
-        }
-    }
 }
 
 /// The values a logarithmic axis must have room for, of estimates and their intervals (estimate, lower, upper).
@@ -180,7 +168,7 @@ impl Axis {
 /// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than one decade
 /// below the smallest estimate or, where that is zero, upper end. Below an upper end that stands for a zero estimate
 /// there is room for an arrow.
-pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
+pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
     let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
     let Some(smallest) = middles.iter().copied().filter(shown).reduce(f64::min) else { return Vec::new() };
@@ -189,7 +177,7 @@ pub(super) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
 }
 
 /// A number with three digits in plain short form: `0.012`, `250`, `1.5e-6`; not finite in words.
-pub(super) fn number(value: f64) -> String {
+pub(in crate::report) fn number(value: f64) -> String {
     digits_text(value, 3)
 }
 
@@ -228,7 +216,7 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
 }
 
 /// A plain number not much above `value` (positive), at which an axis from zero can end.
-pub(super) fn plain_end(value: f64) -> f64 {
+pub(in crate::report) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
 }

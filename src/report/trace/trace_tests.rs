@@ -1,9 +1,7 @@
 //! What must hold for every figure and table of a case, the strangest ones too.
 
-use super::drawing::tests::words;
-use super::trace_figure::TraceFigure;
-use super::trace_panels::TraceSeries;
-use super::trace_table::csv;
+use super::super::plot::words;
+use super::{TraceFigure, TraceSeries, csv};
 use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, Mark, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -101,7 +99,7 @@ fn check(traces: &[Trace]) -> Panels {
     }
     // The marks of the speed panel stand where the traces say.
     let end_s = traces.iter().map(|t| t.steps.last().unwrap().time_s).fold(0.0, f64::max);
-    let until_s = super::trace_panels::Shown::of(&figure(traces).series, None).until_s;
+    let until_s = super::panels::Shown::of(&figure(traces).series, None).until_s;
     assert!(until_s <= end_s);
     let ([left, _, right, _], points, marks) = &panels[0];
     assert!(!points.is_empty());

@@ -1,0 +1,439 @@
+//! The layers of a plot: series (line, points, band, intervals, bars), rules and cells, and what each looks like.
+
+use std::f64::consts::TAU;
+
+use super::axis::{Axis, number};
+use super::cells::Cells;
+use super::svg::{Anchor, Canvas, GREY, Paint, Place, Type, WHITE, set};
+
+pub(in crate::report) const TICK: Type = set(13, false, GREY);
+
+/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, too pale as a line on white.
+const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9"];
+/// Line styles (SVG dash arrays); the empty one is solid.
+const DASHES: [&str; 7] = ["", "10,4", "3,3", "12,3,3,3", "18,5", "7,3,2,3,2,3", "5,6"];
+const SYMBOLS: [Symbol; 7] = [
+    Symbol::Disc,
+    Symbol::Polygon(4, 0.5),
+    Symbol::Polygon(3, 0.0),
+    Symbol::Polygon(4, 0.0),
+    Symbol::Polygon(3, 0.5),
+    Symbol::Polygon(5, 0.0),
+    Symbol::Polygon(6, 0.0),
+];
+/// With more values than this a line has no markers: they would hide it.
+const MAX_MARKERS: usize = 40;
+/// With more labelled values than this none is written out.
+const MAX_WORDS: usize = 8;
+
+/// Shape of a marker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Symbol {
+    /// A filled circle.
+    Disc,
+    /// An empty circle.
+    Ring,
+    /// Two strokes.
+    Cross,
+    /// So many corners; the first so many steps clockwise from the top.
+    Polygon(u32, f64),
+}
+
+/// How a series looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// `#rrggbb`.
+    pub colour: &'static str,
+    /// Lengths of dashes and gaps, px; solid where empty.
+    pub dash: &'static str,
+    /// Width of the line.
+    pub line_px: f64,
+    /// Marker.
+    pub symbol: Symbol,
+    /// Radius of the marker.
+    pub marker_px: f64,
+}
+
+impl Look {
+    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so no pair repeats
+    /// before 49 series. Lines run from thick to thin and markers from large to small: what lies below stays visible.
+    pub fn of(index: usize, count: usize) -> Self {
+        let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
+        Self {
+            colour: COLOURS[index % COLOURS.len()],
+            dash: DASHES[(index + index / COLOURS.len()) % DASHES.len()],
+            line_px: 2.6 - depth,
+            symbol: SYMBOLS[index % SYMBOLS.len()],
+            marker_px: 6.0 - 2.0 * depth,
+        }
+    }
+
+    pub(in crate::report) fn paint(&self) -> Paint<'static> {
+        Paint { dash: self.dash, ..Paint::line(self.colour, self.line_px) }
+    }
+
+    /// The marker around a point, with a white rim that parts it from the markers below.
+    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Place) {
+        let (r, colour) = (self.marker_px, self.colour);
+        let rimmed = Paint { stroke: Some((WHITE, 1.0)), ..Paint::fill(colour) };
+        match self.symbol {
+            Symbol::Disc => canvas.circle((x, y), r * 0.9, rimmed),
+            Symbol::Ring => {
+                canvas.circle((x, y), r * 0.8, Paint { fill: Some(WHITE), ..Paint::line(colour, 2.0) });
+            }
+            Symbol::Cross => {
+                let strokes = [vec![(x - r, y - r), (x + r, y + r)], vec![(x - r, y + r), (x + r, y - r)]];
+                canvas.path(&strokes, false, Paint::line(WHITE, 5.0));
+                canvas.path(&strokes, false, Paint::line(colour, 2.6));
+            }
+            Symbol::Polygon(corners, first) => {
+                let turn = |k: u32| TAU * (f64::from(k) + first) / f64::from(corners);
+                let outline = (0..corners).map(|k| on_circle((x, y), r * 1.1, turn(k))).collect();
+                canvas.path(&[outline], true, rimmed);
+            }
+        }
+    }
+}
+
+/// The point at `turn` (radians, clockwise from the top) on a circle.
+pub(super) fn on_circle((x, y): Place, radius: f64, turn: f64) -> Place {
+    (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
+}
+
+/// Where values are: on two axes, or at a turn (x) and radius (y) around a centre.
+pub(super) struct Axes {
+    pub x: Axis,
+    pub y: Axis,
+    pub centre: Option<Place>,
+}
+
+impl Axes {
+    pub fn at(&self, (x, y): (f64, f64)) -> Place {
+        let place = (self.x.at(x), self.y.at(y));
+        self.centre.map_or(place, |centre| on_circle(centre, place.1, place.0))
+    }
+
+    fn shows(&self, value: &Value) -> bool {
+        self.x.shows(value.x) && self.y.shows(value.y)
+    }
+}
+
+/// How the values of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mark {
+    /// A line through the values in their order, broken where one cannot be shown.
+    Line,
+    /// A marker per value.
+    Points,
+    /// The intervals of neighbouring values as an area, that of a single one as a line.
+    Band,
+    /// The interval of each value as a line with a bar at both ends; that of a zero on a logarithmic axis as an upper
+    /// limit with an arrow.
+    Intervals,
+    /// A bar from zero per value, so wide in the unit of x.
+    Bars(f64),
+}
+
+/// One value of a series.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Value {
+    /// Across.
+    pub x: f64,
+    /// Upwards.
+    pub y: f64,
+    /// Ends of its interval.
+    pub interval: Option<(f64, f64)>,
+    /// A word beside it.
+    pub label: String,
+    /// What a browser shows over its marker; name and numbers where empty.
+    pub tip: String,
+}
+
+impl From<(f64, f64)> for Value {
+    fn from((x, y): (f64, f64)) -> Self {
+        Value { x, y, ..Value::default() }
+    }
+}
+
+/// Values that belong together.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// Name in the legend; the same name looks the same in every plot. An empty one is not in the legend.
+    pub name: String,
+    /// How the values are drawn.
+    pub marks: Vec<Mark>,
+    /// The values. One that an axis cannot show is left out of the picture.
+    pub values: Vec<Value>,
+    /// A look of its own; otherwise that of its place in the legend.
+    pub look: Option<Look>,
+    /// Intervals are along x instead of y.
+    pub is_sideways: bool,
+    /// Attributes of each value's group; `class="value"` where empty.
+    pub attributes: String,
+}
+
+/// Lines to compare with, behind the series.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Rule {
+    /// The lines, inside the plot's ranges.
+    pub runs: Vec<Vec<(f64, f64)>>,
+    /// `#rrggbb`.
+    pub colour: &'static str,
+    /// Width.
+    pub width_px: f64,
+    /// Lengths of dashes and gaps, px; solid where empty.
+    pub dash: &'static str,
+    /// Attributes of the lines' group.
+    pub attributes: String,
+}
+
+/// One layer of a plot.
+#[derive(Debug, Clone)]
+pub enum Layer {
+    /// Values with marks.
+    Series(Series),
+    /// Lines to compare with.
+    Rule(Rule),
+    /// Rectangles.
+    Cells(Cells),
+}
+
+impl From<Series> for Layer {
+    fn from(series: Series) -> Self {
+        Layer::Series(series)
+    }
+}
+
+impl From<Rule> for Layer {
+    fn from(rule: Rule) -> Self {
+        Layer::Rule(rule)
+    }
+}
+
+impl From<Cells> for Layer {
+    fn from(cells: Cells) -> Self {
+        Layer::Cells(cells)
+    }
+}
+
+impl Rule {
+    pub(super) fn draw(&self, canvas: &mut Canvas, axes: &Axes) {
+        let runs: Vec<Vec<Place>> =
+            self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
+        let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
+        canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
+    }
+}
+
+impl Series {
+    /// Values without intervals, with marks.
+    pub fn new(name: impl Into<String>, marks: &[Mark], values: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let values = values.into_iter().map(Value::from).collect();
+        Series { name: name.into(), marks: marks.to_vec(), values, ..Series::default() }
+    }
+
+    fn has(&self, mark: Mark) -> bool {
+        self.marks.contains(&mark)
+    }
+
+    /// Runs of values without one between them that cannot be shown, and whether the run closes. Around a centre the
+    /// last value has the first as its neighbour.
+    fn runs<'a>(&'a self, axes: &Axes) -> Vec<(Vec<&'a Value>, bool)> {
+        let shown: Vec<Option<&Value>> =
+            self.values.iter().map(|value| Some(value).filter(|value| axes.shows(value))).collect();
+        let first_gap = shown.iter().position(Option::is_none);
+        let from = if axes.centre.is_some() { first_gap.unwrap_or(0) } else { 0 };
+        let closes = axes.centre.is_some() && first_gap.is_none();
+        let turned: Vec<Option<&Value>> = shown[from..].iter().chain(&shown[..from]).copied().collect();
+        let runs = turned.split(Option::is_none).filter(|run| !run.is_empty());
+        runs.map(|run| (run.iter().copied().flatten().collect(), closes)).collect()
+    }
+
+    /// The ends of a value's interval.
+    fn ends(&self, value: &Value, axes: &Axes) -> Option<(Place, Place)> {
+        let (lower, upper) = value.interval?;
+        let end = |v: f64| axes.at(if self.is_sideways { (v, value.y) } else { (value.x, v) });
+        Some((end(lower), end(upper)))
+    }
+
+    pub(super) fn bands(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
+        if !self.has(Mark::Band) {
+            return;
+        }
+        for (run, _) in self.runs(axes) {
+            let ends: Vec<(Place, Place)> = run.iter().filter_map(|value| self.ends(value, axes)).collect();
+            let outline = ends.iter().map(|ends| ends.1).chain(ends.iter().rev().map(|ends| ends.0)).collect();
+            let paint = match ends.len() {
+                1 => Paint::line(look.colour, 1.2),
+                _ => Paint { opacity: Some(0.16), ..Paint::fill(look.colour) },
+            };
+            canvas.path(&[outline], ends.len() > 1, paint);
+        }
+    }
+
+    pub(super) fn bars_and_line(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
+        for mark in &self.marks {
+            let Mark::Bars(width) = mark else { continue };
+            for value in self.values.iter().filter(|value| axes.shows(value) && value.y != 0.0) {
+                let (from, to) = ((value.x - width / 2.0, 0.0), (value.x + width / 2.0, value.y));
+                let paint = Paint { stroke: Some((WHITE, 0.8)), ..Paint::fill(look.colour) };
+                canvas.rect(axes.at(from), axes.at(to), paint);
+            }
+        }
+        let runs = self.runs(axes);
+        if !self.has(Mark::Line) || runs.is_empty() {
+            return;
+        }
+        // Round joins: a mitred corner of a thin spike would reach beyond its value.
+        canvas.group("class=\"series\" stroke-linejoin=\"round\"", "", |canvas| {
+            for (run, is_closed) in runs {
+                let places: Vec<Place> = run.iter().map(|value| axes.at((value.x, value.y))).collect();
+                match places[..] {
+                    [_] if self.has(Mark::Points) => {}
+                    [place] => canvas.circle(place, 1.0 + look.line_px / 2.0, Paint::fill(look.colour)),
+                    _ => canvas.path(&[without_inner_points(&places)], is_closed, look.paint()),
+                }
+            }
+        });
+    }
+
+    /// Intervals and markers. `taken`: where labels stand already, as left end, width and base line.
+    pub(super) fn markers(
+        &self,
+        canvas: &mut Canvas,
+        axes: &Axes,
+        look: &Look,
+        quantities: (&str, &str),
+        taken: &mut Vec<(f64, f64, f64)>,
+    ) {
+        let is_shown = |k: Option<usize>| k.and_then(|k| self.values.get(k)).is_some_and(|value| axes.shows(value));
+        let is_crowded = self.has(Mark::Line) && self.values.len() > MAX_MARKERS;
+        for (k, value) in self.values.iter().enumerate() {
+            let attributes = if self.attributes.is_empty() { "class=\"value\"" } else { &self.attributes };
+            let own = (if self.is_sideways { value.x } else { value.y }, value.interval.map_or(f64::NAN, |i| i.1));
+            if !axes.shows(value) {
+                let axis = if self.is_sideways { &axes.x } else { &axes.y };
+                if let Some((_, upper)) = self.ends(value, axes).filter(|_| own.0 == 0.0 && axis.shows(own.1)) {
+                    canvas.group("class=\"limit\"", &value.tip, |canvas| self.limit(canvas, upper, look));
+                }
+                continue;
+            }
+            let is_alone = !is_shown(k.checked_sub(1)) && !is_shown(Some(k + 1));
+            if !self.has(Mark::Points) || (is_crowded && !is_alone) {
+                continue;
+            }
+            let place = axes.at((value.x, value.y));
+            canvas.group(attributes, &self.tip(value, quantities), |canvas| {
+                if let Some(ends) = self.ends(value, axes).filter(|_| self.has(Mark::Intervals)) {
+                    let axis = if self.is_sideways { &axes.x } else { &axes.y };
+                    let reaches_lower = value.interval.is_some_and(|interval| axis.holds(interval.0));
+                    self.interval(canvas, ends, reaches_lower, look);
+                }
+                look.marker(canvas, place);
+            });
+            // A word per value of a few; with many they would cover one another.
+            if !value.label.is_empty() && self.values.len() <= MAX_WORDS {
+                label(canvas, place, &value.label, taken);
+            }
+        }
+    }
+
+    fn tip(&self, value: &Value, (x, y): (&str, &str)) -> String {
+        if !value.tip.is_empty() || !self.attributes.is_empty() {
+            return value.tip.clone();
+        }
+        let numbers = [format!("{x} {}", number(value.x)), format!("{y} {}", number(value.y))];
+        let words = [&self.name, &value.label, &numbers[0], &numbers[1]];
+        words.into_iter().filter(|word| !word.is_empty()).cloned().collect::<Vec<_>>().join("; ")
+    }
+
+    /// Without a bar at a lower end that is beyond the axis.
+    fn interval(&self, canvas: &mut Canvas, (lower, upper): (Place, Place), has_lower: bool, look: &Look) {
+        let bar = |(x, y): Place| match self.is_sideways {
+            true => vec![(x, y - 4.0), (x, y + 4.0)],
+            false => vec![(x - 4.0, y), (x + 4.0, y)],
+        };
+        let lower_bar = if has_lower { bar(lower) } else { Vec::new() };
+        canvas.path(&[vec![lower, upper], bar(upper), lower_bar], false, Paint::line(look.colour, look.line_px));
+    }
+
+    /// A short bar with an arrow towards lower values: the value is somewhere there.
+    fn limit(&self, canvas: &mut Canvas, (x, y): Place, look: &Look) {
+        // From the bar's middle so far towards lower values and so far beside it.
+        let at = |on: f64, beside: f64| if self.is_sideways { (x - on, y + beside) } else { (x + beside, y + on) };
+        // The lines drawn first are the wider ones: where limits coincide, as they do early on, each can be seen.
+        let half = 1.3 * look.marker_px;
+        let strokes = [vec![at(0.0, -half), at(0.0, half)], vec![at(0.0, 0.0), at(9.0, 0.0)]];
+        canvas.path(&strokes, false, Paint::line(look.colour, 1.6));
+        canvas.path(&[vec![at(8.0, -3.5), at(8.0, 3.5), at(15.0, 0.0)]], true, Paint::fill(look.colour));
+    }
+
+    /// A sample for the legend, of what the series draws.
+    pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Place, width_px: f64, look: &Look) {
+        if self.marks.iter().any(|mark| matches!(mark, Mark::Band | Mark::Bars(_))) {
+            let opacity = if self.has(Mark::Band) { Some(0.16) } else { None };
+            canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), Paint { opacity, ..Paint::fill(look.colour) });
+        }
+        if self.has(Mark::Line) || self.has(Mark::Intervals) {
+            canvas.path(&[vec![(x, y), (x + width_px, y)]], false, look.paint());
+        }
+        if self.has(Mark::Points) {
+            look.marker(canvas, (x + width_px / 2.0, y));
+        }
+    }
+}
+
+/// A word beside a place, where no other stands.
+fn label(canvas: &mut Canvas, place: Place, words: &str, taken: &mut Vec<(f64, f64, f64)>) {
+    let width = TICK.text_px(words);
+    let places = [(9.0, -7.0), (-9.0 - width, -7.0), (9.0, 14.0), (-9.0 - width, 14.0), (9.0, -21.0)];
+    let places = places.map(|(dx, dy)| (place.0 + dx, place.1 + dy));
+    let is_free = |(x, y): &Place| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
+    let (x, y) = places.into_iter().find(is_free).unwrap_or(places[0]);
+    taken.push((x, width, y));
+    canvas.text((x, y), words, TICK, Anchor::Start);
+}
+
+/// Without points between neighbours on whose line they lie: a lane has thousands of steps.
+fn without_inner_points(places: &[Place]) -> Vec<Place> {
+    let mut kept: Vec<Place> = Vec::new();
+    for (k, &(x, y)) in places.iter().enumerate() {
+        let is_inner = match (kept.last(), places.get(k + 1)) {
+            (Some(&(x0, y0)), Some(&(x1, y1))) if x1 > x0 => (y0 + (y1 - y0) * (x - x0) / (x1 - x0) - y).abs() < 0.004,
+            _ => false,
+        };
+        if !is_inner {
+            kept.push((x, y));
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::axis::AxisScale;
+    use super::*;
+
+    #[test]
+    fn no_two_series_look_alike() {
+        let looks: std::collections::BTreeSet<_> = (0..49).map(|i| (i % COLOURS.len(), Look::of(i, 49).dash)).collect();
+        assert_eq!(looks.len(), 49);
+    }
+
+    #[test]
+    fn around_a_centre_a_line_is_broken_at_every_gap_and_runs_over_the_top() {
+        let runs = |values: &[f64]| {
+            let values = values.iter().enumerate().map(|(k, v)| (k as f64, *v).into()).collect();
+            let series = Series { values, ..Series::default() };
+            let axis = Axis::around(AxisScale::Linear, &[0.0, 9.0], (0.0, 9.0)).unwrap();
+            let axes = Axes { x: axis, y: axis, centre: Some((0.0, 0.0)) };
+            let runs = series.runs(&axes).into_iter();
+            runs.map(|(run, closes)| (run.iter().map(|value| value.x).collect(), closes))
+                .collect::<Vec<(Vec<f64>, _)>>()
+        };
+        let gap = f64::NAN;
+        assert_eq!(runs(&[1.0, 1.0, 1.0, 1.0]), [(vec![0.0, 1.0, 2.0, 3.0], true)]);
+        assert_eq!(runs(&[1.0, gap, 1.0, gap, 1.0]), [(vec![2.0], false), (vec![4.0, 0.0], false)]);
+        assert!(runs(&[gap, gap]).is_empty());
+    }
+}

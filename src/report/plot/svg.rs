@@ -1,0 +1,313 @@
+//! SVG documents: shapes, groups and wrapped text. Layout belongs to the plots.
+//!
+//! Coordinates are in user units (px) with at most two decimals, so equal figures are equal bytes on every machine.
+
+use std::fmt::{Display, Write};
+
+use crate::support::plain_text::acts;
+
+pub(in crate::report) const INK: &str = "#1a1a1a";
+pub(in crate::report) const GREY: &str = "#5f5f5f";
+pub(in crate::report) const GRID: &str = "#bdbdbd";
+pub(in crate::report) const WHITE: &str = "#ffffff";
+const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
+
+/// A place on the page, px.
+pub(in crate::report) type Place = (f64, f64);
+
+/// How a shape is painted. Colours are `#rrggbb`.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::report) struct Paint<'a> {
+    pub fill: Option<&'a str>,
+    /// Of the fill, 0 to 1; 1 where absent.
+    pub opacity: Option<f64>,
+    /// Colour and width (px).
+    pub stroke: Option<(&'a str, f64)>,
+    /// Lengths of dashes and gaps, px; solid where empty.
+    pub dash: &'a str,
+}
+
+impl<'a> Paint<'a> {
+    pub fn fill(colour: &'a str) -> Self {
+        Paint { fill: Some(colour), ..Paint::default() }
+    }
+
+    pub fn line(colour: &'a str, width_px: f64) -> Self {
+        Paint { stroke: Some((colour, width_px)), ..Paint::default() }
+    }
+}
+
+/// How a text is set.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::report) struct Type {
+    pub size_px: u32,
+    pub bold: bool,
+    pub colour: &'static str,
+}
+
+pub(in crate::report) const fn set(size_px: u32, bold: bool, colour: &'static str) -> Type {
+    Type { size_px, bold, colour }
+}
+
+impl Type {
+    pub fn line_px(self) -> f64 {
+        f64::from(self.size_px) * 1.3
+    }
+
+    /// Upper estimate of a character's width. The reader's font is unknown, so this is the wide DejaVu Sans.
+    fn char_px(self, c: char) -> f64 {
+        let em = match c {
+            ' ' | '.' | ',' | ':' | ';' | '\'' | '|' | 'i' | 'l' | 'j' | 'I' | '!' => 0.35,
+            'm' | 'w' | 'M' | 'W' | '%' | '@' => 1.0,
+            'A'..='Z' => 0.74,
+            _ if c.is_ascii() => 0.63,
+            _ => 1.0,
+        };
+        em * f64::from(self.size_px) * if self.bold { 1.13 } else { 1.0 }
+    }
+
+    pub fn text_px(self, text: &str) -> f64 {
+        text.chars().map(|c| self.char_px(c)).sum()
+    }
+
+    /// `text` in lines no wider than `width_px`: broken at blanks, and inside a word only if it alone is too wide.
+    pub fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut line = String::new();
+        for word in text.split_whitespace() {
+            if !line.is_empty() && self.text_px(&line) + self.char_px(' ') + self.text_px(word) > width_px {
+                lines.push(std::mem::take(&mut line));
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            for c in word.chars() {
+                if !line.is_empty() && self.text_px(&line) + self.char_px(c) > width_px {
+                    lines.push(std::mem::take(&mut line));
+                }
+                line.push(c);
+            }
+        }
+        if !line.is_empty() {
+            lines.push(line);
+        }
+        lines
+    }
+
+    /// Height of `text` in lines no wider than `width_px`.
+    pub fn height_px(self, text: &str, width_px: f64) -> f64 {
+        self.wrap(text, width_px).len() as f64 * self.line_px()
+    }
+}
+
+/// Which end of a text its position is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::report) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// A document that is being drawn.
+#[derive(Debug)]
+pub(in crate::report) struct Canvas {
+    width_px: f64,
+    body: String,
+    depth: usize,
+}
+
+impl Canvas {
+    pub fn new(width_px: f64) -> Self {
+        Canvas { width_px, body: String::new(), depth: 1 }
+    }
+
+    /// The document, ending a little below `bottom`.
+    pub fn document(self, bottom: f64) -> String {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"{FONTS}\" \
+             fill=\"{INK}\">\n  <rect width=\"100%\" height=\"100%\" fill=\"white\" />\n{}</svg>\n",
+            Number(self.width_px),
+            Number((bottom + 20.0).ceil()),
+            self.body
+        )
+    }
+
+    fn element(&mut self, text: &str) {
+        self.body.extend(std::iter::repeat_n("  ", self.depth));
+        self.body += text;
+        self.body.push('\n');
+    }
+
+    fn shape(&mut self, mut text: String, paint: Paint) {
+        attribute(&mut text, "fill", Some(paint.fill.unwrap_or("none")));
+        attribute(&mut text, "fill-opacity", paint.opacity.map(Number));
+        attribute(&mut text, "stroke", paint.stroke.map(|stroke| stroke.0));
+        attribute(&mut text, "stroke-width", paint.stroke.map(|stroke| Number(stroke.1)));
+        attribute(&mut text, "stroke-dasharray", (!paint.dash.is_empty()).then_some(paint.dash));
+        self.element(&(text + " />"));
+    }
+
+    /// A rectangle from corner to corner, in either order.
+    pub fn rect(&mut self, (x1, y1): Place, (x2, y2): Place, paint: Paint) {
+        let (x, y, width, height) =
+            (Number(x1.min(x2)), Number(y1.min(y2)), Number((x2 - x1).abs()), Number((y2 - y1).abs()));
+        self.shape(format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), paint);
+    }
+
+    pub fn circle(&mut self, (x, y): Place, radius_px: f64, paint: Paint) {
+        self.shape(format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", Number(x), Number(y), Number(radius_px)), paint);
+    }
+
+    /// Runs of straight lines, as one path.
+    pub fn path(&mut self, runs: &[Vec<Place>], is_closed: bool, paint: Paint) {
+        let run = |points: &Vec<Place>| {
+            let corners: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
+            format!("M{}{}", corners.join(" L"), if is_closed { " Z" } else { "" })
+        };
+        let d: Vec<String> = runs.iter().filter(|points| !points.is_empty()).map(run).collect();
+        if !d.is_empty() {
+            self.shape(format!("<path d=\"{}\"", d.join(" ")), paint);
+        }
+    }
+
+    pub fn line(&mut self, from: Place, to: Place, colour: &str, width_px: f64) {
+        self.path(&[vec![from, to]], false, Paint::line(colour, width_px));
+    }
+
+    /// One line of text on its base line.
+    pub fn text(&mut self, (x, y): Place, line: &str, set: Type, anchor: Anchor) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let weight = if set.bold { " font-weight=\"bold\"" } else { "" };
+        self.element(&format!(
+            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\"{weight} fill=\"{}\">{}</text>",
+            Number(x),
+            Number(y),
+            set.size_px,
+            set.colour,
+            escaped(line)
+        ));
+    }
+
+    /// A wrapped text with its top at `y`; returns the y below it.
+    pub fn block(&mut self, (x, y): Place, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
+        let lines = set.wrap(words, width_px);
+        for (k, line) in lines.iter().enumerate() {
+            self.text((x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, anchor);
+        }
+        y + lines.len() as f64 * set.line_px()
+    }
+
+    pub fn paragraph(&mut self, at: Place, words: &str, set: Type, width_px: f64) -> f64 {
+        self.block(at, words, set, width_px, Anchor::Start)
+    }
+
+    /// Groups what `draw` draws. `attributes` are written as they are; browsers show `tip` over the group.
+    pub fn group(&mut self, attributes: &str, tip: &str, draw: impl FnOnce(&mut Self)) {
+        self.element(&format!("<g {attributes}>"));
+        self.depth += 1;
+        if !tip.is_empty() {
+            self.element(&format!("<title>{}</title>", escaped(tip)));
+        }
+        draw(self);
+        self.depth -= 1;
+        self.element("</g>");
+    }
+}
+
+fn attribute(text: &mut String, name: &str, value: Option<impl Display>) {
+    if let Some(value) = value {
+        // Writing to a String cannot fail.
+        let _ = write!(text, " {name}=\"{value}\"");
+    }
+}
+
+/// A number with at most two decimals.
+struct Number(f64);
+
+impl Display for Number {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let text = format!("{:.2}", self.0);
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        f.write_str(if text == "-0" { "0" } else { text })
+    }
+}
+
+/// Text as XML content holds it, without the characters that XML 1.0 allows in no form, not even escaped, and those
+/// that turn or hide others.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            '\'' => out += "&apos;",
+            '\u{FFFE}' | '\u{FFFF}' => out.push('\u{FFFD}'),
+            c if acts(c) => out.push('\u{FFFD}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// The words of the document's texts, lines joined, and a check that its tags nest.
+    pub fn words(svg: &str) -> String {
+        let (mut open, mut words) = (Vec::new(), Vec::new());
+        for part in svg.split('<').skip(1).filter(|part| !part.starts_with("!--")) {
+            let (tag, after) = part.split_once('>').expect("every tag ends");
+            assert!(!after.contains('>'), "bare > in {after}");
+            for entity in after.split('&').skip(1) {
+                assert!(["amp;", "lt;", "gt;", "quot;", "apos;"].iter().any(|e| entity.starts_with(e)), "bare &");
+            }
+            match tag.strip_prefix('/') {
+                Some(name) => assert_eq!(open.pop().as_deref(), Some(name)),
+                None if tag.ends_with('/') => {}
+                None => open.push(tag.split_whitespace().next().unwrap_or("").to_string()),
+            }
+            if tag.starts_with("text ") {
+                words.extend(after.split_whitespace().map(str::to_string));
+            }
+        }
+        assert!(open.is_empty(), "open tags {open:?}");
+        words.join(" ")
+    }
+
+    #[test]
+    fn numbers_have_at_most_two_decimals_and_no_negative_zero() {
+        let text = [0.0, -0.001, 12.0, 461.400_000_000_000_03, 0.125, 1e4, -3.5].map(|v| Number(v).to_string());
+        assert_eq!(text, ["0", "0", "12", "461.4", "0.12", "10000", "-3.5"]);
+    }
+
+    #[test]
+    fn a_document_nests_its_groups_and_escapes_its_texts() {
+        let mut canvas = Canvas::new(10.0);
+        canvas.group("class=\"x\"", "a < b", |canvas| {
+            canvas.text((1.0, 2.0), "S' & \"S\" \u{1}", set(12, true, "#0072b2"), Anchor::Middle);
+        });
+        assert_eq!(
+            canvas.document(0.0),
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"10\" height=\"20\" font-family=\"DejaVu Sans, Verdana, \
+             Arial, Helvetica, sans-serif\" fill=\"#1a1a1a\">\n  <rect width=\"100%\" height=\"100%\" fill=\"white\" \
+             />\n  <g class=\"x\">\n    <title>a &lt; b</title>\n    <text x=\"1\" y=\"2\" font-size=\"12\" \
+             text-anchor=\"middle\" font-weight=\"bold\" fill=\"#0072b2\">S&apos; &amp; &quot;S&quot; \
+             \u{FFFD}</text>\n  </g>\n</svg>\n"
+        );
+    }
+
+    #[test]
+    fn wrapped_lines_stay_within_their_width() {
+        let set = set(16, false, INK);
+        for words in ["SYNTHETIC DATA: ".repeat(40), "x".repeat(300), String::new()] {
+            assert!(set.wrap(&words, 900.0).iter().all(|line| set.text_px(line) <= 900.0));
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! One case step by step: the figure of everything that its driver models see and do, over one time axis, and every
+//! number of it as CSV.
+//!
+//! The sheet has the width of a column of a paper (two for a cut-out, whose vehicles stand side by side) and type that
+//! stays readable at that width. Series differ in colour, dashes and line width, marks in their shapes.
+
+mod panels;
+
+use std::fmt::Write;
+
+use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
+use super::plot::{Axis, number};
+use crate::Result;
+use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
+use crate::support::table::csv_field;
+pub use panels::TraceSeries;
+use panels::{Column, Panel, Shown, mark_dash, mark_look};
+
+/// Lanes of one case, or of variants of one, on one sheet.
+#[derive(Debug, Clone)]
+pub struct TraceFigure<'a> {
+    /// Heading; wrapped when long.
+    pub title: String,
+    /// Line below the heading; wrapped when long.
+    pub subtitle: Option<String>,
+    /// The lanes.
+    pub series: Vec<TraceSeries<'a>>,
+    /// Where time ends, s; otherwise 2 s after the last change.
+    pub until_s: Option<f64>,
+}
+
+/// Width of a column of the sheet, px: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
+const COLUMN_PX: f64 = 540.0;
+const MARGIN_PX: f64 = 14.0;
+/// From the column's edge to the plot: room for numbers.
+const LEFT_PX: f64 = 58.0;
+const TITLE: Type = set(17, true, INK);
+const NAME: Type = set(14, true, INK);
+const HINT: Type = TICK;
+const CELL: Type = set(13, false, INK);
+/// Width of a column of the table of marks, and of the line sample before a name.
+const CELL_PX: f64 = 76.0;
+const SAMPLE_PX: f64 = 38.0;
+const MARK_PX: f64 = 5.0;
+
+impl TraceFigure<'_> {
+    /// The figure as a complete SVG document, 540 px wide (1080 px for a cut-out) and as high as its panels need.
+    ///
+    /// A note says so where the lanes go on after the last time that is shown. TTC is shown up to ten times
+    /// its threshold, BTN up to 2.5 times. Texts are XML-escaped; control characters become U+FFFD. The same figure
+    /// gives the same bytes. Nothing fails: without lanes only the texts remain.
+    pub fn svg(&self) -> String {
+        let shown = Shown::of(&self.series, self.until_s);
+        let columns = shown.columns();
+        let width_px = COLUMN_PX * columns.len() as f64;
+        let across_px = width_px - 2.0 * MARGIN_PX;
+        let mut canvas = Canvas::new(width_px);
+        let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, across_px);
+        if let Some(subtitle) = &self.subtitle {
+            y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, CELL, across_px);
+        }
+        if self.series.iter().all(|s| s.trace.steps.is_empty()) {
+            y = canvas.paragraph((MARGIN_PX, y + 8.0), "There is no lane to draw.", CELL, across_px);
+            return canvas.document(y);
+        }
+        y = self.table(&mut canvas, &shown.looks, width_px, y + 8.0) + 6.0;
+        let lines = shown.mark_lines();
+        let bottoms = columns.iter().enumerate().map(|(k, panels)| {
+            let left = COLUMN_PX * k as f64;
+            column(&mut canvas, panels, (left + LEFT_PX, left + COLUMN_PX - MARGIN_PX), y, &lines)
+        });
+        y = bottoms.fold(y, f64::max) + 6.0;
+        for note in self.notes(&shown, &columns) {
+            y = canvas.paragraph((MARGIN_PX, y), &note, CELL, across_px) + 3.0;
+        }
+        canvas.document(y)
+    }
+
+    /// Names, marks and worst values of the series; returns the y below.
+    fn table(&self, canvas: &mut Canvas, looks: &[Look], width_px: f64, top: f64) -> f64 {
+        let columns = [Mark::Reaction.label(), Mark::Braking.label(), Mark::Contact.label(), "min TTC", "max BTN"];
+        let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
+        let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
+        let most = width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
+        let at = |column: usize| most.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
+        let mut y = top + CELL.line_px();
+        for (column, head) in columns.iter().enumerate() {
+            canvas.text((at(column), top + f64::from(CELL.size_px)), head, HINT, Anchor::Start);
+        }
+        for (series, look) in self.series.iter().zip(looks) {
+            let (baseline, middle) = (y + f64::from(CELL.size_px), y + CELL.line_px() / 2.0);
+            let sample = vec![(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)];
+            canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[sample], false, look.paint()));
+            let below = canvas.paragraph((name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
+            for (column, mark) in Mark::ALL.into_iter().enumerate() {
+                let Some(step) = series.trace.step_of(mark) else {
+                    canvas.text((at(column), baseline), "never", HINT, Anchor::Start);
+                    continue;
+                };
+                mark_look(mark, look).marker(canvas, (at(column) + MARK_PX, middle));
+                let time = format!("{} s", thousandths(series.trace.time_s(step)));
+                canvas.text((at(column) + 2.0 * MARK_PX + 5.0, baseline), &time, CELL, Anchor::Start);
+            }
+            let outcome = &series.trace.outcome;
+            canvas.text((at(3), baseline), &worst(outcome.min_ttc, " s"), CELL, Anchor::Start);
+            canvas.text((at(4), baseline), &worst(outcome.max_btn, ""), CELL, Anchor::Start);
+            y = below.max(y + CELL.line_px()) + 3.0;
+        }
+        y
+    }
+
+    fn notes(&self, shown: &Shown, columns: &[Column]) -> Vec<String> {
+        let mut notes = Vec::new();
+        if shown.has_unjudged() {
+            notes.push("Thin in gap, TTC, BTN: not looked at by the criteria.".to_owned());
+        }
+        let is_cut = |panel: &Panel| {
+            let Ends::Exactly(_, top) = panel.plot.y.ends else { return false };
+            panel.plot.series().flat_map(|series| &series.values).any(|value| value.y >= top)
+        };
+        if columns.iter().flatten().any(is_cut) {
+            notes.push("A curve that ends at the top edge goes on above it.".to_owned());
+        }
+        notes.push("Long dashes: edges of a lane 3.5 m wide.".to_owned());
+        let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
+        if end_s > shown.until_s {
+            let (until, end) = (thousandths(shown.until_s), thousandths(end_s));
+            notes.push(format!("The lanes go on after {until} s, the longest to {end} s."));
+        }
+        notes
+    }
+}
+
+/// One column of panels over one time axis; returns the y below.
+fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, lines: &[(Mark, f64)]) -> f64 {
+    let look = |series: &Series| series.look.unwrap_or_else(|| Look::of(0, 1));
+    let mut y = top;
+    for (k, Panel { hint, plot }) in panels.iter().enumerate() {
+        let title_bottom = y + NAME.line_px() + 3.0;
+        canvas.text((across.0, title_bottom - 6.0), &plot.heading, NAME, Anchor::Start);
+        canvas.text((across.1, title_bottom - 6.0), hint, HINT, Anchor::End);
+        let mut frame_top = title_bottom;
+        if let (0, Ends::Exactly(low, high)) = (k, &plot.x.ends) {
+            // The labels of the lines through all panels stand above the first plot, each in a row of its own.
+            frame_top += lines.len() as f64 * CELL.line_px();
+            let time = Axis::exactly((*low, *high), across);
+            lines.iter().enumerate().for_each(|(row, line)| {
+                let from = title_bottom + row as f64 * CELL.line_px();
+                mark_label(canvas, *line, time.at(line.1), (from, frame_top), across.1);
+            });
+        }
+        let Height::Px(height_px) = plot.height else { continue };
+        let down = (frame_top, frame_top + height_px);
+        plot.draw(canvas, &look, across, down, k + 1 == panels.len());
+        y = down.1 + 5.0;
+    }
+    canvas.text((across.1, y + 31.0), "Time (s)", NAME, Anchor::End);
+    y + 35.0
+}
+
+/// The label of a line, and the line from there down to the first plot; on the side that has room. Later lines pass
+/// behind: the label is on white.
+fn mark_label(canvas: &mut Canvas, (mark, at_s): (Mark, f64), x: f64, (top, bottom): (f64, f64), right: f64) {
+    let words = format!("{} {} s", mark.label(), thousandths(at_s));
+    let width = CELL.text_px(&words);
+    let stub = vec![(x, top + 2.0), (x, bottom)];
+    canvas.path(&[stub], false, Paint { dash: mark_dash(mark), ..Paint::line(INK, 1.0) });
+    let (from, anchor) =
+        if x + 4.0 + width <= right { (x + 4.0, Anchor::Start) } else { (x - 4.0 - width, Anchor::End) };
+    let below = top + CELL.line_px();
+    canvas.rect((from - 1.0, top + 1.0), (from + width + 1.0, below - 1.0), Paint::fill(WHITE));
+    let x = if anchor == Anchor::Start { from } else { from + width };
+    canvas.text((x, below - 4.0), &words, CELL, anchor);
+}
+
+fn thousandths(value: f64) -> String {
+    ((value * 1e3).round() / 1e3).to_string()
+}
+
+fn worst(value: f64, unit: &str) -> String {
+    if value.is_finite() { format!("{}{unit}", number(value)) } else { "∞".to_owned() }
+}
+
+const VEHICLES: [&str; 2] = ["other", "ahead"];
+const COLUMNS: [&str; 11] =
+    ["x_m", "y_m", "v_mps", "gap_m", "lateral_gap_m", "ttc_s", "btn", "pfs", "cfs", "present", "judged"];
+
+/// The traces as CSV, one row per step. Several traces stand one below the other, named by a first column `lane`; a
+/// single one does without. The last column names the marks of a step (`reaction`, `braking`, `contact`, joined by
+/// `+`). Infinite is `inf`; a vehicle that there is not leaves its columns empty.
+pub fn csv(traces: &[(String, &Trace)]) -> String {
+    let vehicles = traces.iter().map(|(_, trace)| trace.vehicles).max().unwrap_or(1);
+    let is_named = traces.len() > 1;
+    let mut text = if is_named { "lane,".to_owned() } else { String::new() };
+    text.push_str("t_s,x_ego_m,v_ego_mps,a_ego_mps2,unsafe,demand_mps2");
+    for prefix in &VEHICLES[..vehicles] {
+        for column in COLUMNS {
+            let _ = write!(text, ",{prefix}_{column}");
+        }
+    }
+    text.push_str(",mark\n");
+    for (name, trace) in traces {
+        let lane = if is_named { format!("{},", csv_field(name)) } else { String::new() };
+        let marks = Mark::ALL.map(|mark| (mark, trace.step_of(mark)));
+        for step in &trace.steps {
+            text.push_str(&lane);
+            write_step(&mut text, trace, step, vehicles);
+            let here = marks.iter().filter(|(_, at)| *at == Some(step.step));
+            let _ = writeln!(text, ",{}", here.map(|(mark, _)| mark.label()).collect::<Vec<_>>().join("+"));
+        }
+    }
+    text
+}
+
+/// The same rows as a list of objects.
+///
+/// # Errors
+/// None for what this program made.
+pub fn records(traces: &[(String, &Trace)]) -> Result<serde_json::Value> {
+    super::records::records(csv(traces).as_bytes())
+}
+
+fn write_step(text: &mut String, trace: &Trace, step: &TracedStep, vehicles: usize) {
+    let demand = step.demand_mps2.map_or(String::new(), |demand| demand.to_string());
+    let _ = write!(
+        text,
+        "{},{},{},{},{},{demand}",
+        step.time_s,
+        step.x_ego_m,
+        step.v_ego_mps,
+        step.a_ego_mps2,
+        u8::from(step.is_unsafe)
+    );
+    for (k, other) in step.others[..vehicles].iter().enumerate() {
+        if k < trace.vehicles {
+            write_vehicle(text, other);
+        } else {
+            text.push_str(&",".repeat(COLUMNS.len()));
+        }
+    }
+}
+
+fn write_vehicle(text: &mut String, other: &TracedVehicle) {
+    let TracedVehicle { x_m, y_m, v_mps, gap_m, lateral_gap_m, ttc_s, btn, pfs, cfs, is_present, is_judged } = other;
+    let (present, judged) = (u8::from(*is_present), u8::from(*is_judged));
+    let _ = write!(text, ",{x_m},{y_m},{v_mps},{gap_m},{lateral_gap_m},{ttc_s},{btn},{pfs},{cfs},{present},{judged}");
+}
+
+#[cfg(test)]
+mod trace_tests;
