@@ -30,7 +30,7 @@ impl GpuBackend {
     /// Opens the device with this index.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] where its driver refuses.
+    /// [`crate::Error::Device`] if its driver refuses.
     pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
         let adapter = adapters.take(index)?;
         let card = adapters.cards()[index].clone();
@@ -38,12 +38,12 @@ impl GpuBackend {
         Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
     }
 
-    /// What is known of the device.
+    /// Description of the device.
     pub fn card(&self) -> &AdapterCard {
         &self.card
     }
 
-    /// Float operations reach the driver as written, so that equality is promised and not only checked.
+    /// Float operations reach the driver unchanged, so that equality is guaranteed and not only checked.
     pub fn is_exact(&self) -> bool {
         self.exact
     }
@@ -51,7 +51,8 @@ impl GpuBackend {
 
 impl Drop for GpuBackend {
     fn drop(&mut self) {
-        // A session may outlive it, and holds its own sender: joining after the last sender would never return.
+        // A session may outlive the backend and holds a sender, so a join before the last sender is dropped would
+        // never return.
         let _ = self.commands.send(Command::End);
         if let Some(thread) = self.thread.take() {
             // Callers have already received the panic of that thread.

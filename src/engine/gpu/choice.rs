@@ -1,21 +1,20 @@
-//! Which device a user means: `--backend auto|cpu|gpu` and `--device INDEX|pci:BUS|NAME`.
+//! Selects the device of `--backend auto|cpu|gpu` and `--device INDEX|pci:BUS|NAME`.
 //!
-//! A software rasterizer runs on the same cores as the CPU backend, only slower; it is taken only when it is named.
+//! A software rasterizer runs on the same cores as the CPU backend, but slower, so it must be named.
 
 use super::adapters::{AdapterCard, DeviceKind};
 use crate::engine::device_choice::{BackendChoice, DeviceName};
 use crate::{Error, Place, Result};
 
-/// The index of the device to use, or `None` for the processor.
+/// The index of the device to use, or `None` for the CPU.
 ///
-/// `cards` in the order of [`super::Adapters`]. `visible` holds the PCI bus ids that the environment allows
-/// ([`super::visible()`]): where it is given, it hides every other GPU, also one without a bus id, and its order is
-/// the order of preference. Without it, discrete GPUs come before virtual ones before integrated ones. Software
-/// rasterizers and devices of unknown kind are taken only when named.
+/// `cards` have the order of [`super::Adapters`]. `visible` has the PCI bus ids that the environment allows
+/// ([`super::visible()`]), in order of preference; it hides every other GPU. Without it the order is discrete,
+/// virtual, integrated. Software rasterizers and devices of unknown kind must be named.
 ///
 /// # Errors
-/// [`Error::Usage`]: a device together with `Cpu`; a name that means no device or several. [`Error::Device`]:
-/// `Gpu` without a usable GPU; a named device that the environment hides.
+/// [`Error::Usage`]: a device together with `Cpu`; a name of no device or of several. [`Error::Device`]: `Gpu`
+/// without a usable GPU; a named device that the environment hides.
 pub fn choose(
     cards: &[AdapterCard],
     backend: BackendChoice,
@@ -71,8 +70,8 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[St
     Ok(first)
 }
 
-/// All cards that are meant, the preferred interface first. A name that is complete means no longer one: `NVIDIA L4`
-/// is not `NVIDIA L40`.
+/// All matching cards, the preferred interface first. A complete name has priority: `NVIDIA L4` does not match
+/// `NVIDIA L40`.
 fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a AdapterCard> {
     match device {
         DeviceName::Index(index) => cards.iter().filter(|card| card.index == *index).collect(),
@@ -88,8 +87,8 @@ fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a Adapte
     }
 }
 
-/// Whether two cards are one physical device: the bus id decides; where one has none, the same name under another
-/// interface (OpenGL appends to it: `NVIDIA L4/PCIe/SSE2`).
+/// Are two cards one physical device? The bus id decides, or the same name under another interface (OpenGL appends to
+/// it: `NVIDIA L4/PCIe/SSE2`).
 fn same_device(a: &AdapterCard, b: &AdapterCard) -> bool {
     match (&a.pci_bus_id, &b.pci_bus_id) {
         _ if a.index == b.index => true,

@@ -8,7 +8,7 @@ pub(super) struct Inputs {
     pub speed: wgpu::Buffer,
     pub lateral: wgpu::Buffer,
     pub cases: wgpu::Buffer,
-    /// Makes cases and tables, where the host does not.
+    /// Makes cases and tables, if the host does not.
     pub generator: Option<GeneratorInputs>,
 }
 

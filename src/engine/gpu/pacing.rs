@@ -1,10 +1,9 @@
-//! How many lanes a dispatch holds: so many that it takes about a tenth of a second. Longer ones would meet
-//! the time-outs of desktop drivers and freeze a screen, shorter ones would wait for the host. Pacing decides
-//! the cut only; results do not depend on it.
+//! Size of a dispatch: about a tenth of a second. Longer ones can exceed the time-outs of desktop drivers and freeze
+//! a screen; shorter ones wait for the host. Results do not depend on it.
 
-/// Seconds that the longest dispatch of a job should take.
+/// Target time of the longest dispatch of a job, s.
 const TARGET_S: f64 = 0.1;
-/// A step up or down is at most this factor, so that one odd measurement does no harm.
+/// Maximum factor of one change, so that one outlier has little effect.
 const MAX_CHANGE: f64 = 4.0;
 
 /// The size of the next job, from the time of the last.
@@ -14,7 +13,7 @@ pub(super) struct Pacer {
 }
 
 impl Pacer {
-    /// Begins carefully: `lanes` per model.
+    /// Starts with `lanes` per model.
     pub fn new(lanes: u64) -> Pacer {
         Pacer { lanes: lanes.max(1) }
     }
@@ -24,7 +23,7 @@ impl Pacer {
         if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
             return;
         }
-        // A small last piece says little about a large one: it costs the same start.
+        // A small last piece is not representative, because its start takes as long.
         let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
         let wanted = lanes as f64 * change;
         if change < 1.0 || wanted > self.lanes as f64 {
@@ -32,8 +31,7 @@ impl Pacer {
         }
     }
 
-    /// Units of a job where each has `lanes_per_unit` lanes per model; at least one, at most so many that
-    /// `max_lanes` are not exceeded.
+    /// Units of a job with `lanes_per_unit` lanes per model each: at least one, within `max_lanes`.
     pub fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
         (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
     }

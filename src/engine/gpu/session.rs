@@ -1,4 +1,5 @@
-//! A plan on the device: cuts units into jobs, keeps the ring filled, puts results back into the plan's order.
+//! A plan on the device: divides units into jobs, keeps the ring filled, and restores the plan's order in the
+//! results.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -16,11 +17,11 @@ use crate::engine::{CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, S
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
-/// A chunk is several jobs long, so that the ring stays full: about three seconds with four models. Until a job has been
-/// timed it is one job.
+/// Jobs per chunk, so that the ring stays full: about three seconds with four models. Before the first measurement a
+/// chunk is one job.
 const JOBS_PER_CHUNK: u64 = 8;
 
-/// Steps per model of the first job, should each lane make every step.
+/// Steps per model of the first job, if each lane makes every step.
 const FIRST_STEPS: u64 = 1 << 26;
 
 pub(super) struct GpuSession<'p> {
@@ -31,13 +32,13 @@ pub(super) struct GpuSession<'p> {
     /// One per block.
     constants: Vec<Constants<f32>>,
     pacer: Pacer,
-    /// The cases that the device holds: block, units of it, some of them with a second vehicle.
+    /// The cases on the device: block, its units, and whether one of them has a second vehicle.
     window: Option<(usize, Range<u64>, bool)>,
     /// Time of all dispatches so far, s.
     device_s: f64,
 }
 
-/// Part of a run that is under way.
+/// Part of a run in flight.
 struct Piece {
     block: usize,
     /// Units within the block.
@@ -76,7 +77,7 @@ impl<'p> GpuSession<'p> {
         self.prepared.max_lanes[wanted as usize]
     }
 
-    /// Sends one job of units from `units` on; says how far it reaches.
+    /// Sends one job of units from the start of `units`; returns its end.
     fn send(&mut self, block: usize, units: Range<u64>, wanted: Wanted) -> Result<Piece> {
         let plan = self.plan;
         let variants = plan.blocks[block].variants.len() as u64;
@@ -91,7 +92,7 @@ impl<'p> GpuSession<'p> {
         if !inside {
             let room = self.prepared.max_cases / variants;
             let end = (units.start + room).min(plan.blocks[block].units.held().end);
-            // Not beyond what is asked for: a generator's samples have no natural end.
+            // Within the requested units, because a generator's samples have no end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };
             let is_cut_out = plan.blocks[block].category == Category::CutOut;
             let paired = if plan.generator().is_some() {
@@ -124,7 +125,7 @@ impl<'p> GpuSession<'p> {
         Ok(Piece { block, units: units.start..end, answer })
     }
 
-    /// Waits for a piece and puts it where it belongs.
+    /// Waits for a piece and stores its results.
     fn collect(&mut self, piece: Piece, chunk: &mut Chunk, wanted: Wanted) -> Result<()> {
         let answer = piece.answer.recv().map_err(|_| owner::gone(&self.device))??;
         let plan = self.plan;
@@ -161,7 +162,7 @@ impl<'p> GpuSession<'p> {
         Ok(())
     }
 
-    /// Sends the jobs of an interval of units and collects what they give.
+    /// Sends the jobs of an interval of units and collects their results.
     fn run_jobs(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
@@ -197,7 +198,7 @@ impl Session for GpuSession<'_> {
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let chunk = self.run_jobs(units, wanted);
         if chunk.is_err() {
-            // Whether the job that failed has brought its cases to the device is not known.
+            // It is unknown whether the failed job copied its cases to the device.
             self.window = None;
         }
         chunk
@@ -216,7 +217,7 @@ impl Session for GpuSession<'_> {
 
 impl Drop for GpuSession<'_> {
     fn drop(&mut self) {
-        // Where the thread has ended, so has its session.
+        // If the thread has ended, its session has ended too.
         let _ = self.commands.send(Command::Close { session: self.prepared.session });
     }
 }

@@ -1,4 +1,4 @@
-//! Cut-in: another vehicle changes into the ego's lane and becomes its leader (method.md §3).
+//! Cut-in: another vehicle changes into the ego's lane and becomes its leader.
 //!
 //! | item | target | ego |
 //! |---|---|---|
@@ -46,7 +46,7 @@ pub(super) fn scenario(
     Some(scenario)
 }
 
-/// The filters of the paper, at t = 0: slower than the ego, and near.
+/// The filters of the paper at t = 0: the target is slower than the ego and its headway is short.
 fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     let (v_target, v_ego) = (scenario.target.v[0], scenario.ego.v0);
     let slower = v_target < options.max_speed_share * v_ego - TOLERANCE;
@@ -64,7 +64,7 @@ fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     }
 }
 
-/// The target's lane change, against the ego's lane, that is going on at t = 0.
+/// The target's lane change relative to the ego's lane that is in progress at t = 0.
 pub(super) fn lane_change_of<'a>(
     found: &FoundScenario<'a>,
     target_index: usize,
@@ -74,7 +74,7 @@ pub(super) fn lane_change_of<'a>(
     set.scene.activities[target_index].lane_change(set.ego.lane[found.start], j)
 }
 
-/// Provenance that cut-in and cut-out share.
+/// Sets the origin fields that cut-in and cut-out share.
 pub(super) fn describe(
     scenario: &mut Scenario,
     found: &FoundScenario,
@@ -89,8 +89,7 @@ pub(super) fn describe(
     scenario.end_cause = Some(end_cause.to_owned());
 }
 
-/// What ended a match: `change` is the lane change's tag, `leads` whether the target leads in the last
-/// item.
+/// The event that ended a match. `change` is the lane change's tag; `leads`: the target leads in the last item.
 pub(super) fn end_cause(tags: &[Tags], matched: &Match, change: Tags, leads: bool) -> &'static str {
     let at_end = tags[matched.end];
     if matched.clamped {

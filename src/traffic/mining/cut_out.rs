@@ -1,4 +1,4 @@
-//! Cut-out: the leader leaves the ego's lane and uncovers a slower vehicle (method.md §3; the mirror of
+//! Cut-out: the leader leaves the ego's lane and uncovers a slower vehicle (the mirror of
 //! the cut-in).
 //!
 //! | item | target | ego |
@@ -6,8 +6,8 @@
 //! | 1 | changes out of the ego's lane (`lo`, `ro`), is the leader | keeps its lane |
 //! | 2 | changes out of the ego's lane, is not the leader | keeps its lane |
 //!
-//! That is *found*. *Kept* besides if the nearest vehicle ahead of the target in the ego's lane at t = 0
-//! stays in that lane and in range until the end, and is slower than the ego at t = 0.
+//! That is *found*. A cut-out is *kept* if the nearest vehicle ahead of the target in the ego's lane at t = 0 stays
+//! in that lane and in range until the end, and is slower than the ego at t = 0.
 
 use super::cut_in::{describe, end_cause, lane_change_of};
 use super::data_set::DataSet;
@@ -58,8 +58,8 @@ pub(super) fn scenario(
     Some(scenario)
 }
 
-/// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to
-/// the end; else why there is none.
+/// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to the end;
+/// otherwise the reason.
 fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
     let set: &'a DataSet<'a> = found.set;
     let nobody = "no vehicle ahead of the target in the ego's lane";

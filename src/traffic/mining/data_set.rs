@@ -1,13 +1,12 @@
-//! The ego-centric data set (method.md §2): one ego, the part of its track that counts, who is in
-//! range, and who leads. Its extent is that of [`EgoView`]; neighbours come from the frame index instead
-//! of a walk over all vehicles.
+//! The ego-centric data set: one ego, the part of its track in the data set, the vehicles in range, and the leader.
+//! Its extent is that of [`EgoView`]; neighbours come from the frame index.
 
 use super::neighbours::Neighbours;
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
 use crate::traffic::trajectory::{Carriageway, EgoView, NO_LANE, Recording, Track};
 
-/// A recording with everything that is computed once for it.
+/// A recording with its activities and neighbours, which are computed once.
 pub(super) struct RecordingTags<'a> {
     pub recording: &'a Recording,
     pub options: &'a MiningOptions,
@@ -50,8 +49,7 @@ pub(super) struct Stretch {
 }
 
 impl<'a> DataSet<'a> {
-    /// The data set of the track with index `ego_index`; `None` where the vehicle travels less than the
-    /// end cut.
+    /// The data set of the track with index `ego_index`; `None` if the vehicle travels less than the end cut.
     pub fn new(scene: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
         let ego = &scene.recording.tracks[ego_index];
         let samples = EgoView::of(scene.recording, ego_index, &scene.options.ego_view)?.last_sample() + 1;
@@ -61,7 +59,7 @@ impl<'a> DataSet<'a> {
         Some(set)
     }
 
-    /// Everyone who is the leader at some sample, once, in the order of first leading.
+    /// All vehicles that lead at some sample, in the order of their first leading sample.
     pub fn leaders(&self) -> Vec<usize> {
         let mut leaders: Vec<usize> = Vec::new();
         let mut last = None;
@@ -117,7 +115,7 @@ impl<'a> DataSet<'a> {
             .map(|(track, _)| track as u32)
     }
 
-    /// The tags of the ego and the target with index `target`, wherever the target is in the data set.
+    /// The tags of the ego and the target with index `target`, where the target is in the data set.
     pub fn stretches(&self, target_index: usize) -> Vec<Stretch> {
         let target = &self.scene.recording.tracks[target_index];
         let offset = self.ego.first_frame - target.first_frame; // target's sample = ego's sample + offset

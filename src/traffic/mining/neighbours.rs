@@ -1,5 +1,4 @@
-//! Who is where at a frame: the vehicles of one carriageway, frame by frame, from rear to front. So an
-//! ego looks at its neighbours only, not at everyone who ever passed.
+//! The vehicles of one carriageway per frame, from rear to front, so that a search visits only the ego's neighbours.
 
 use crate::traffic::trajectory::Recording;
 
@@ -19,21 +18,21 @@ pub(super) struct Neighbours {
     /// First slot of each track of the recording (unused for tracks of other carriageways). A track has
     /// no gaps, so its sample `k` is in slot `base + k`.
     base: Vec<usize>,
-    /// Where each slot's entries begin; one more than there are slots.
+    /// Begin of each slot's entries; one more than the number of slots.
     begin: Vec<usize>,
     entries: Vec<Neighbour>,
 }
 
 impl Neighbours {
-    /// Sorts the tracks of a carriageway by frame and place. Memory is proportional to the samples,
-    /// however far apart the frame numbers are.
+    /// Sorts the tracks of a carriageway by frame and position. Memory is proportional to the samples, for any
+    /// distance of the frame numbers.
     pub fn new(recording: &Recording, carriageway: usize) -> Self {
         let tracks = &recording.tracks;
         let mut order: Vec<usize> =
             (0..tracks.len()).filter(|&i| tracks[i].carriageway == carriageway && !tracks[i].is_empty()).collect();
         order.sort_by_key(|&i| (tracks[i].first_frame, i));
 
-        // Frames that no vehicle has get no slot: consecutive tracks either overlap or start a new block.
+        // Frames without vehicles get no slot: consecutive tracks either overlap or start a new block.
         let mut base = vec![0; tracks.len()];
         let (mut slots, mut block_slot, mut block_frame, mut block_last) = (0, 0, 0, i64::MIN);
         for &i in &order {
@@ -69,8 +68,8 @@ impl Neighbours {
         Neighbours { base, begin, entries }
     }
 
-    /// Everyone on the carriageway at sample `k` of the track with index `track`, that vehicle included,
-    /// whose centre is ahead of `s_m` (by more than nothing) and at most at `s_max_m`; nearest first.
+    /// All vehicles on the carriageway at sample `k` of the track with index `track`, that vehicle included, whose
+    /// centre is ahead of `s_m` and at most at `s_max_m`; nearest first.
     pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &Neighbour> {
         let slot = self.base[track] + k;
         let entries = &self.entries[self.begin[slot]..self.begin[slot + 1]];

@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-/// Least value over `x[k − window ..= k]` for every `k`; over what there is for `k < window`, where a
-/// caller that needs a complete window must not look.
+/// Minimum over `x[k − window ..= k]` for every `k`. For `k < window` the window is incomplete.
 pub(super) fn trailing_min(x: &[f64], window: usize) -> Vec<f64> {
     let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window.min(x.len()) + 2);
     x.iter()

@@ -1,15 +1,15 @@
-//! Motion across the road: the lane change as a quintic, and the wander within a lane.
+//! Lateral motion: the lane change as a quintic, and the wander within a lane.
 
 use super::random::Stream;
 
-/// Published span of lane-change durations, s.
+/// Published range of lane-change durations, s.
 const DURATION_S: [f64; 2] = [2.9, 7.3];
-/// Median of the durations before the span cuts them off, s.
+/// Median of the durations before truncation to the range, s.
 const DURATION_MEDIAN_S: f64 = 5.0;
-/// Spread of the duration's logarithm.
+/// Standard deviation of the duration's logarithm.
 const DURATION_SIGMA: f64 = 0.28;
-/// Spread of the asymmetry: 0 is the symmetric quintic, and at ±1.5 the crossing comes
-/// about a tenth of the duration earlier or later.
+/// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
+/// duration earlier or later.
 const ASYMMETRY_SD: f64 = 0.7;
 
 /// One lane change, from start to end.
@@ -39,7 +39,7 @@ impl LaneChange {
         LaneChange { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
     }
 
-    /// Share of the duration that has passed, 0 to 1.
+    /// Elapsed fraction of the duration, 0 to 1.
     pub fn phase(&self) -> f64 {
         (self.elapsed_s / self.duration_s).min(1.0)
     }
@@ -57,7 +57,7 @@ impl LaneChange {
     }
 }
 
-/// Wander about the intended line: a damped oscillator driven by white noise.
+/// Wander around the intended position: a damped oscillator driven by white noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Wander {
     /// Deviation, m, left positive.
@@ -67,7 +67,7 @@ pub(super) struct Wander {
 }
 
 impl Wander {
-    /// Spread of the deviation, m.
+    /// Standard deviation of the deviation, m.
     const SD_M: f64 = 0.10;
     /// Natural frequency of a driver's steering corrections, rad/s.
     const FREQUENCY_RADPS: f64 = 0.5;
@@ -79,7 +79,7 @@ impl Wander {
         const W: f64 = Wander::FREQUENCY_RADPS;
         let drive = Self::SD_M * (4.0 * Self::DAMPING * W * W * W * dt_s).sqrt();
         let rate = self.rate_mps - (2.0 * Self::DAMPING * W * self.rate_mps + W * W * self.offset_m) * dt_s;
-        // Position uses the old rate, as the samples' speed is the one at their own time.
+        // Position uses the old rate, because a sample's speed belongs to the same instant.
         self.offset_m += self.rate_mps * dt_s;
         self.rate_mps = rate + drive * normal;
     }

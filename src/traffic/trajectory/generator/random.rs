@@ -1,12 +1,12 @@
-//! Random numbers of the generator: a counter-based stream cipher keyed by everything that names the
-//! draw's purpose, so that no recording depends on another, on the number of threads or on the machine.
+//! Random numbers of the generator: counter-based streams keyed by the purpose of the draw. No recording depends on
+//! another, on the number of threads or on the machine.
 //!
 //! Transcendentals come from `libm`: the system's own differ in their last bits between platforms.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// What a stream is for; streams of different purposes never share a number.
+/// Purpose of a stream; streams of different purposes never share a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Lane counts, flows and truck share of a recording.
@@ -66,7 +66,8 @@ impl Stream {
         radius * cos
     }
 
-    /// Normal with this mean and spread, redrawn until inside [low, high] (which must hold some mass).
+    /// Normal with this mean and standard deviation, redrawn until inside [low, high], which must have some
+    /// probability.
     pub fn normal_within(&mut self, mean: f64, sd: f64, low: f64, high: f64) -> f64 {
         self.redraw(low, high, |s| mean + sd * s.normal())
     }
@@ -81,7 +82,7 @@ impl Stream {
         -mean * libm::log(1.0 - self.uniform())
     }
 
-    /// Draws until inside; gives up after many tries and clamps, so that odd options cannot hang it.
+    /// Draws until inside; clamps after many tries, so that unusual options cannot cause an endless loop.
     fn redraw(&mut self, low: f64, high: f64, draw: impl Fn(&mut Stream) -> f64) -> f64 {
         let mut value = draw(self);
         for _ in 0..1000 {

@@ -1,5 +1,5 @@
-//! From the simulated carriageways to one recording: road, numbering, and the decimals of a highD file,
-//! so that a recording read back from its own files is the same to the last bit.
+//! Makes one recording of the simulated carriageways: road, numbering, and the decimals of a highD file, so that
+//! reading a written recording gives the same bits.
 
 use super::inflow::demand;
 use super::options::GeneratorOptions;
@@ -55,7 +55,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     Ok(recording)
 }
 
-/// Lanes by the centre as it is written: rounding may have moved it over a line.
+/// Lanes by the written centre, because rounding may move it over a line.
 fn label_lanes(recording: &mut Recording) {
     for track in &mut recording.tracks {
         let road = &recording.carriageways[track.carriageway];
@@ -64,8 +64,8 @@ fn label_lanes(recording: &mut Recording) {
     }
 }
 
-/// Lines as the internal model has them for a highD image with `y` down: the upper carriageway (`1`,
-/// towards −x) has d = y, the lower one (`2`) d = −y.
+/// Lane lines of the internal model for a highD image with `y` down: the upper carriageway (`1`, towards −x) has d =
+/// y, the lower one (`2`) d = −y.
 fn carriageways(lanes: [usize; 2], lane_width_m: f64) -> Vec<Carriageway> {
     let upper_end_m = VERGE_M + lanes[0] as f64 * lane_width_m;
     let lines = |first_m: f64, lanes: usize| (0..=lanes).map(|k| first_m - k as f64 * lane_width_m).collect();

@@ -10,16 +10,16 @@ use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::traffic::trajectory::{Carriageway, VehicleClass};
 use crate::{Error, Place, Result};
 
-/// What `recordingMeta` says.
+/// Content of `recordingMeta`.
 pub(super) struct RecordingMeta {
     pub frame_rate_hz: f64,
     pub lane_numbers: LaneNumbers,
-    /// Those of the two carriageways that have lane lines.
+    /// The carriageways with lane lines, at most two.
     pub carriageways: Vec<Carriageway>,
-    /// The line says that the program made the recording up.
+    /// The recording is synthetic.
     pub synthetic: bool,
     pub checksum: FileChecksum,
-    /// The line that says all this.
+    /// Line number of these values.
     place: Place,
 }
 
@@ -30,7 +30,7 @@ impl RecordingMeta {
     }
 }
 
-/// What `tracksMeta` says about one vehicle.
+/// Content of `tracksMeta` for one vehicle.
 pub(super) struct Vehicle {
     pub id: u32,
     pub class: VehicleClass,
@@ -38,7 +38,7 @@ pub(super) struct Vehicle {
     pub width_m: f64,
     pub direction: Direction,
     pub carriageway: usize,
-    /// Number of lines it must have in `tracks`, where the file says so.
+    /// Required number of lines in `tracks`, if given.
     pub samples: Option<u64>,
 }
 
@@ -126,7 +126,7 @@ fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
 /// Lane lines of the image, from top to bottom, as a carriageway.
 fn carriageway(direction: Direction, lines_y: &[f64]) -> Carriageway {
     let mut lane_lines_m: Vec<f64> = lines_y.iter().map(|&y| direction.leftward(y)).collect();
-    // Leftmost first: against the order of the image where the travel is against x.
+    // Leftmost first, so in reverse order of the image for travel against x.
     if direction == Direction::Upper {
         lane_lines_m.reverse();
     }
@@ -184,7 +184,7 @@ pub(super) fn read_tracks_meta(
             "remove the three files of this recording from the folder, or copy them again",
         ));
     }
-    // Stable, so that of two lines with one id the later one is called the surplus one.
+    // Stable, so that the error names the later one of two lines with one id.
     vehicles.sort_by_key(|(vehicle, _)| vehicle.id);
     if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.id == b.id) {
         return Err(Error::input(
@@ -210,7 +210,7 @@ impl MetaColumns {
     fn of(table: &Table) -> Result<Self> {
         Ok(MetaColumns {
             id: table.column("id")?,
-            // highD's box is that of the image: its width is the vehicle's length.
+            // The box belongs to the image: its width is the vehicle's length.
             length: table.column("width")?,
             width: table.column("height")?,
             class: table.column("class")?,
@@ -251,7 +251,7 @@ impl MetaColumns {
         })
     }
 
-    /// How many lines the vehicle has in `tracks`: as counted, or as follows from its first and last frame.
+    /// Number of lines of the vehicle in `tracks`: as given, or from its first and last frame.
     fn samples(&self, table: &Table) -> Result<Option<u64>> {
         let (column, count) = match (self.samples, self.first_and_last_frame) {
             (Some(column), _) => (column, table.integer(column)?),
@@ -269,7 +269,7 @@ impl MetaColumns {
     }
 }
 
-/// highD knows `Car` and `Truck`; the names of its sibling formats are understood too.
+/// highD has `Car` and `Truck`; names of related formats are accepted too.
 fn class(table: &Table, column: Column) -> Result<VehicleClass> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "car" | "van" | "motorcycle" => Ok(VehicleClass::Car),

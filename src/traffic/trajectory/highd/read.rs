@@ -1,5 +1,4 @@
-//! One recording's three files into the internal model. Only the columns that the model needs are
-//! looked at, each line once, and nothing is kept but the model itself.
+//! Reads one recording's three files into the internal model, in one pass, from the needed columns only.
 
 use std::path::Path;
 
@@ -11,7 +10,7 @@ use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Result};
 
-/// A recording as read, with what a run's record says about its files.
+/// A recording with the facts about its files for the run record.
 #[derive(Debug)]
 pub struct Loaded {
     /// The recording.
@@ -22,11 +21,11 @@ pub struct Loaded {
     pub rows: u64,
     /// Size of the three files together, bytes.
     pub bytes: u64,
-    /// What the data leaves open or what looks wrong without being an error, as sentences.
+    /// Warnings about the data, as sentences.
     pub notes: Vec<String>,
 }
 
-/// As [`read_judged`], where implausible values are accepted.
+/// As [`read_judged`], but accepts implausible values.
 ///
 /// # Errors
 /// As [`read_judged`].
@@ -41,7 +40,7 @@ pub fn read(files: &HighdFiles) -> Result<Loaded> {
 /// `laneId` or, where that column is absent, from position and lane lines.
 ///
 /// # Errors
-/// Anything that is not as it must be, with file, line and column or vehicle.
+/// Any violation of the format, with file, line and column or vehicle.
 pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
@@ -80,7 +79,7 @@ struct TrackColumns {
 impl TrackColumns {
     fn of(table: &Table) -> Result<Self> {
         let lane = match table.optional_column("laneId")? {
-            // The geometry can stand in for an absent column, but not for a misspelt one.
+            // The geometry replaces an absent column, but not a misspelt one.
             None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
             lane => lane,
         };
@@ -97,8 +96,7 @@ impl TrackColumns {
     }
 }
 
-/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file
-/// announces with no sample.
+/// Fills the empty tracks, one per vehicle, and returns those with samples, ascending by id.
 fn read_tracks(
     table: &mut Table,
     columns: &TrackColumns,
@@ -108,7 +106,7 @@ fn read_tracks(
     doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
     let judge = SampleJudge::new(meta.frame_rate_hz);
-    // Sums of the accelerations of each vehicle's last second: single samples are noisy.
+    // Sums of the accelerations over each vehicle's last second, because single samples are noisy.
     let mut sums_mps2 = vec![0.0; vehicles.len()];
     let mut at = 0;
     while table.next_row()? {
@@ -131,7 +129,7 @@ fn read_tracks(
     Ok(tracks)
 }
 
-/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any
+/// Is the tracks file large enough for all samples that the meta file claims? A damaged meta file can claim any
 /// number.
 fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
     let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
@@ -139,7 +137,7 @@ fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
     announced <= bytes / MIN_ROW_BYTES
 }
 
-/// A track without samples; `reserve` gives it room for the announced ones.
+/// A track without samples; `reserve` allocates memory for the claimed ones.
 fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
     let samples = if reserve { vehicle.samples.unwrap_or(0) as usize } else { 0 };
     Track {
@@ -158,8 +156,8 @@ fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
     }
 }
 
-/// Index of the present line's vehicle. Lines come grouped by vehicle or by frame, so it is mostly the
-/// same as before or the next one.
+/// Index of the present line's vehicle. Lines are grouped by vehicle or by frame, so it is mostly the same or the
+/// next one.
 fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
     let id = table.integer(column)?;
     let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
@@ -197,7 +195,7 @@ fn add_sample(
     }
     let direction = vehicle.direction;
     let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
-    // Everything is parsed before anything is stored: the series keep the same length.
+    // All fields are parsed before any is stored, so that the series keep equal lengths.
     let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
     let text = || table.field(columns.velocity_x).to_string();
     let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), text);
@@ -232,7 +230,7 @@ struct SampleJudge {
     inverse_window: f64,
 }
 
-/// What is judged of one sample; a quantity that it does not have yet is 0.
+/// The judged quantities of one sample; 0 if not yet defined.
 struct JudgedSample {
     speed_mps: f64,
     lateral_speed_mps: f64,
@@ -281,10 +279,10 @@ impl JudgedSample {
     }
 }
 
-/// Counts what is implausible about a sample.
+/// Counts the implausible values of a sample.
 ///
 /// # Errors
-/// A value beyond the physical range, unless such are accepted.
+/// A value outside the physical range, unless such values are accepted.
 #[cold]
 fn report(
     sample: &JudgedSample,
@@ -325,7 +323,7 @@ fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
     Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
 }
 
-/// The meta file says how many lines each vehicle has: the only way to notice a file that ends early.
+/// Compares the number of lines per vehicle with the meta file, which detects truncated files.
 fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
     let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
         Some(samples) => samples != track.len() as u64,
@@ -346,7 +344,7 @@ fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result
     ))
 }
 
-/// What a user should hear of although the data can be used.
+/// Warnings about usable data.
 fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
     let mut notes = Vec::new();
     if columns.lane.is_none() {
@@ -371,5 +369,5 @@ fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<
 /// Bytes of the shortest line: eight columns of one digit.
 const MIN_ROW_BYTES: u64 = 16;
 
-/// Way backwards, in metres, that is more than noise of a standing vehicle.
+/// Minimum backward distance, m, that is not noise of a stationary vehicle.
 const BACKWARDS_M: f64 = 5.0;

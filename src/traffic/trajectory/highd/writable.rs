@@ -1,4 +1,4 @@
-//! What a recording must be so that the format can hold it, and what of it the format keeps.
+//! Requirements of the format on a recording, and the values that it preserves.
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
@@ -7,11 +7,10 @@ use super::precision::Precision;
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
-/// Changes a recording into what would be read back from its own files: with `q` the quantized recording,
-/// reading what [`write`](super::write) wrote of `q` gives `q` bit for bit, at the same precision.
+/// Rounds a recording to the values that its own files hold: writing the quantized recording with
+/// [`write`](super::write) and reading it gives the same bits, at the same precision.
 ///
-/// Every value goes the writer's and the reader's way (transform, round to the decimals, transform back)
-/// until that changes nothing more.
+/// Every value is transformed, rounded to the decimals and transformed back until it no longer changes.
 ///
 /// # Errors
 /// If the format cannot hold the recording, see [`write`](super::write).
@@ -49,7 +48,7 @@ pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
     Ok(())
 }
 
-/// The image a recording becomes: which half each carriageway is, and its lane lines from top to bottom.
+/// The image of a recording: the half of each carriageway, and its lane lines from top to bottom.
 pub(super) struct Layout {
     /// By index of the carriageway.
     pub directions: Vec<Direction>,
@@ -120,8 +119,7 @@ impl Layout {
         Ok(layout)
     }
 
-    /// `laneId` of a lane; for [`NO_LANE`] a number that is read as no lane, the true count of lines above
-    /// where possible.
+    /// `laneId` of a lane; for [`NO_LANE`] a number that reads as no lane, if possible the number of lines above.
     pub fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
         self.lane_numbers.id_of(direction, lane).unwrap_or_else(|| {
             let y = direction.leftward(d_m);
@@ -133,7 +131,7 @@ impl Layout {
 }
 
 fn in_range(value: f64) -> bool {
-    // Half, so that a position plus half a length stays readable; false for NaN.
+    // Half of the maximum, so that a position plus half a length stays valid; false for NaN.
     value.abs() <= 0.5 * REAL_LIMIT
 }
 

@@ -1,5 +1,5 @@
-//! A recording as the three highD files, with every column that the format has. What the internal model
-//! does not hold is computed (neighbours, headways, sight distances) or given by [`RecordingInfo`].
+//! Writes a recording as the three highD files with every column of the format. Neighbours, headways and sight
+//! distances are computed; [`RecordingInfo`] has the other missing values.
 
 use std::fs;
 use std::path::Path;
@@ -14,11 +14,10 @@ use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
 
-/// What the files say about a recording beyond its content. The texts must hold no comma, quotation mark
-/// or line end.
+/// Metadata of a recording for its files. The texts must not contain commas, quotation marks or line ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingInfo {
-    /// Number of the place.
+    /// Number of the location.
     pub location_id: u32,
     /// Speed limit, m/s; `None` without limit.
     pub speed_limit_mps: Option<f64>,
@@ -28,7 +27,7 @@ pub struct RecordingInfo {
     pub week_day: String,
     /// Time of day of the first frame, hours and minutes.
     pub start_time: String,
-    /// Decimals of the measured values. Columns computed for the format's sake have two at any precision.
+    /// Decimals of the measured values. Computed columns always have two.
     pub precision: Precision,
 }
 
@@ -48,8 +47,8 @@ impl Default for RecordingInfo {
 /// Writes a recording into `dir` (made if it is not there) as `NN_tracks.csv`, `NN_tracksMeta.csv` and
 /// `NN_recordingMeta.csv` with NN the recording's id, in place of files of these names.
 ///
-/// [`read`](super::read) gives the recording back up to the decimals of `info.precision`, and bit for bit
-/// after [`quantize`](super::quantize). All three files are complete before the first gets its name.
+/// [`read`](super::read) returns the recording rounded to the decimals of `info.precision`, and bit for bit after
+/// [`quantize`](super::quantize). All three files are complete before the first gets its name.
 ///
 /// `dhw` is the gap from bumper to bumper (never negative), `thw` = dhw / speed, `ttc` = dhw / closing
 /// speed (negative where the gap opens); all 0 without a preceding vehicle.
@@ -59,8 +58,8 @@ impl Default for RecordingInfo {
 /// that are not finite, …) or the system refuses to write.
 pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<()> {
     let staged = stage(dir, recording, info)?;
-    // An older recording of the same name loses its main file first and the new one gets it last: a crash
-    // in between leaves a recording that is incomplete for everyone to see, never a mixture.
+    // The main file of an older recording with the same name is removed first, and the new one is written last. A
+    // crash in between leaves a visibly incomplete recording, never a mixture.
     let tracks = HighdFiles::named(dir, &recording.id).tracks;
     if tracks.exists() {
         fs::remove_file(&tracks).map_err(|source| Error::io(&tracks, "replace", source))?;
@@ -68,7 +67,7 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
     staged.into_iter().try_for_each(StagedFile::publish)
 }
 
-/// The three files of a recording, complete, without their names; that of the tracks comes last.
+/// The three complete temporary files of a recording; that of the tracks comes last.
 ///
 /// # Errors
 /// As [`write`].
@@ -104,7 +103,7 @@ struct Writer<'a> {
     extent: Extent,
 }
 
-/// The stretch of the image that the boxes of all vehicles cover, m.
+/// The range of the image that the boxes of all vehicles cover, m.
 struct Extent {
     left: f64,
     right: f64,
@@ -125,7 +124,7 @@ impl Extent {
     }
 }
 
-/// Headways of one instant. What is not defined is written as 0, as highD does without a preceding vehicle.
+/// Headways of one instant. Undefined ones are written as 0, as in highD without a preceding vehicle.
 #[derive(Default)]
 struct Headways {
     dhw_m: f64,
@@ -136,7 +135,7 @@ struct Headways {
     preceding_v_s_mps: f64,
 }
 
-/// Least headways of one vehicle; `None` if it never follows another.
+/// Minimum headways of one vehicle; `None` if it never follows another.
 #[derive(Default, Clone)]
 struct Summary {
     min_dhw_m: Option<f64>,
@@ -182,8 +181,7 @@ impl Writer<'_> {
         let (s_m, d_m) = (track.s_m[sample], track.d_m[sample]);
         line.integer(track.first_frame + sample as i64);
         line.integer(i64::from(track.id));
-        // The format's box is that of the image: its width is the vehicle's length, which is the rounded
-        // one to whoever reads it.
+        // The box belongs to the image: its width is the vehicle's length, rounded as a reader sees it.
         let length_m = self.info.precision.rounded(track.length_m);
         let width_m = self.info.precision.rounded(track.width_m);
         line.measured(direction.x_of(s_m, length_m));
@@ -217,7 +215,7 @@ impl Writer<'_> {
         line.integer(self.layout.lane_id(direction, track.lane[sample], d_m));
     }
 
-    /// Slope of the lateral speed over the samples beside this one, m/s².
+    /// Slope of the lateral speed between the neighbouring samples, m/s².
     fn leftward_acceleration(&self, track: &Track, sample: usize) -> f64 {
         let (from, to) = (sample.saturating_sub(1), (sample + 1).min(track.len() - 1));
         if from == to {
@@ -275,7 +273,7 @@ impl Writer<'_> {
         let last = tracks.iter().map(Track::last_frame).max().unwrap_or(0);
         let trucks = tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
         let mut line = Line::new(self.info.precision);
-        // The format's id is a number; the name of the files is what identifies the recording.
+        // The format's id is a number; the file name identifies the recording.
         line.integer(id.parse::<u32>().map_or(1, i64::from));
         line.text(&frame_rate_hz.to_string());
         line.integer(i64::from(self.info.location_id));
@@ -303,14 +301,14 @@ impl Writer<'_> {
     }
 }
 
-/// Speeds below this give no headway in time: a division by them would say nothing. m/s.
+/// Minimum speed of a time headway, m/s.
 const STANDSTILL_MPS: f64 = 1e-3;
 
 fn driven_m(track: &Track) -> f64 {
     track.s_m.last().zip(track.s_m.first()).map_or(0.0, |(last, first)| (last - first).abs())
 }
 
-/// One line of a file, field by field; its buffer is used again.
+/// One line of a file, written field by field into a reused buffer.
 struct Line {
     bytes: Vec<u8>,
     precision: Precision,
@@ -322,7 +320,7 @@ impl Line {
         Line { bytes: Vec::with_capacity(256), precision, ended: true }
     }
 
-    /// The place for the next field.
+    /// The buffer at the next field.
     fn field(&mut self) -> &mut Vec<u8> {
         if self.ended {
             self.bytes.clear();
@@ -351,7 +349,7 @@ impl Line {
         }
     }
 
-    /// A value that only completes the format.
+    /// A value that is not read back.
     fn computed(&mut self, value: f64) {
         Precision::Hundredths.push(self.field(), value);
     }
