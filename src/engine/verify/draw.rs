@@ -1,12 +1,12 @@
-//! Random access to random numbers: one stream per (purpose, seed, category, unit, variant), so a case does
-//! not depend on how many others were asked for, nor on threads.
+//! Random numbers: one stream per (purpose, seed, category, unit, variant), so a case depends neither on other cases
+//! nor on threads.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
 use crate::scenario::Category;
 
-/// What a stream is for; streams of different purposes never share a number.
+/// Purpose of a stream; streams of different purposes never share a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// The series that the cases share.
@@ -52,7 +52,7 @@ impl Draw {
         self.uniform() < probability
     }
 
-    /// An index below `count`; 0 where there is nothing to choose from.
+    /// An index below `count`; 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }

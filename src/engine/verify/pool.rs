@@ -1,5 +1,5 @@
-//! The series that all cases of a set share: some hundred random speeds and lateral motions of at most
-//! [`LONGEST`] steps. A case points into them, so a set of any size has the same tables.
+//! The series that all cases of a set share: some hundred random speeds and lateral motions of at most [`LONGEST`]
+//! steps. A case refers to them, so a set of any size has the same tables.
 
 use super::draw::{Draw, Purpose};
 use crate::scenario::{Category, Lateral, Speed, Tables};
@@ -18,7 +18,7 @@ pub(super) struct Slice {
     pub len: u32,
 }
 
-/// How a vehicle moves across the road, by its part in the scenario.
+/// Lateral motion of a vehicle by its role in the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Across {
     /// From the next lane into the ego's.
@@ -31,11 +31,11 @@ pub(super) enum Across {
 
 /// The shared series.
 pub(super) struct Pool {
-    /// All of them, one after the other.
+    /// All series in sequence.
     pub tables: Tables<f64>,
-    /// Speeds that change at will.
+    /// Random speeds.
     varied: Vec<Slice>,
-    /// Speeds that are held, then braked down.
+    /// Speeds that are constant, then decrease.
     braked: Vec<Slice>,
     /// Lateral motions, in the order of [`Across`].
     across: [Vec<Slice>; 3],
@@ -45,7 +45,7 @@ impl Pool {
     /// The pool of a seed at a time step.
     pub fn new(seed: u64, dt_s: f64) -> Pool {
         let mut tables = Tables::default();
-        // The category only keeps the kinds' streams apart here.
+        // Here the category only separates the streams of the kinds.
         let draw = |kind: usize, k: u64| Draw::new(Purpose::Pool, seed, Category::CutIn, k, kind);
         let mut speeds = |kind: usize, make: fn(&mut Draw, f64) -> Vec<f64>| -> Vec<Slice> {
             let mut one = |k| {
@@ -102,18 +102,18 @@ fn part(draw: &mut Draw, series: &[Slice]) -> Slice {
     Slice { offset: whole.offset + from, len }
 }
 
-/// Mostly long; one in eight is a handful of steps, down to a single one.
+/// Mostly long; one in eight has a few steps, down to a single one.
 fn length(draw: &mut Draw) -> usize {
     if draw.chance(0.125) { 1 + draw.below(8) } else { 40 + draw.below(LONGEST - 39) }
 }
 
-/// 3t² − 2t³: from 0 to 1 without a kink, and without a transcendental that platforms round differently.
+/// 3t² − 2t³: smooth from 0 to 1, without a transcendental function that platforms round differently.
 fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Between 0 and 38 m/s: smooth between random marks, or a random walk with jerks.
+/// Between 0 and 38 m/s: smooth between random points, or a random walk with jerks.
 fn varied_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
     let len = length(draw);
     let mut speed = draw.between(2.0, 34.0);
@@ -135,7 +135,7 @@ fn varied_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
     series
 }
 
-/// Held, then braked at up to 9 m/s², often to standstill.
+/// Constant, then braking at up to 9 m/s², often to standstill.
 fn braked_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
     let len = length(draw);
     let start = draw.between(6.0, 36.0);
@@ -162,7 +162,7 @@ fn lateral(draw: &mut Draw, across: Across, dt_s: f64) -> Vec<[f64; 2]> {
                 + noise * draw.between(-1.0, 1.0)
         })
         .collect();
-    // Towards the ego is towards y = 0; the first speed is the second one, as in recorded scenarios.
+    // Towards the ego means towards y = 0; the first speed equals the second one, as in recorded scenarios.
     let towards = |k: usize| -(position[k].abs() - position[k - 1].abs()) / dt_s;
     (0..len).map(|k| [position[k], towards(k.max(1))]).collect()
 }

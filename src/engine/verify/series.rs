@@ -1,17 +1,16 @@
-//! The motions of the threshold set: their first step has exactly a number of the lane arithmetic, whether it
-//! is read from a table or worked out.
+//! The motions of the threshold set: their first step is exactly a given f32, from a table or by arithmetic.
 
 use super::draw::{Draw, Purpose};
 use crate::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
 
-/// Neighbour of 0 on either side: far below what a step moves, and so far from the subnormals, which devices
-/// may flush, that neither its third power (a form of the BTN) nor a quotient of its squares becomes one.
+/// Neighbour of 0: far below the change of one step, and large enough that neither its third power (a form of the
+/// BTN) nor a quotient of its squares is subnormal, which devices may flush.
 pub(super) const TINY: f32 = 1.0 / (1_u64 << 32) as f32;
 
 /// Series per kind.
 const PER_KIND: usize = 32;
 
-/// Where a vehicle is across the road at the first step, and how it moves there.
+/// Lateral position and motion of a vehicle at the first step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Across {
     /// In the ego's lane.
@@ -22,17 +21,17 @@ pub(super) enum Across {
     Beside,
 }
 
-/// The series of the set and what motions are made of.
+/// The series of the set and the tables of its motions.
 pub(super) struct Series {
     dt_s: f64,
     /// All series.
     pub tables: Tables<f64>,
-    /// As lanes read them.
+    /// The tables for lanes.
     pub lane_tables: Tables<f32>,
     /// Begin and length of each speed series.
     speeds: Vec<[u32; 2]>,
-    /// Begin and length of each lateral series, in the order of [`Across`]. Those of `Beside` stand in
-    /// threes: lateral speed 0, −2⁻³², 2⁻³².
+    /// Begin and length of each lateral series, in the order of [`Across`]. Those of `Beside` are in groups of three:
+    /// lateral speed 0, −2⁻³², 2⁻³².
     across: [Vec<[u32; 2]>; 3],
 }
 
@@ -103,7 +102,7 @@ impl Series {
         motion
     }
 
-    /// The same motion with another speed along the road, worked out.
+    /// The same motion with another kinematic speed along the road.
     pub fn with_speed(
         &self,
         motion: Motion<f64>,
@@ -123,7 +122,7 @@ impl Series {
         }
     }
 
-    /// The same motion with another one across the road, worked out.
+    /// The same motion with another kinematic motion across the road.
     pub fn with_lateral(&self, motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
         let other = Motion::encode(&Speed::constant(0.0), lateral, self.dt_s, &mut Tables::default());
         Motion {

@@ -69,7 +69,7 @@ pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
     "synthetic",
 ];
 
-/// Kind of a header line.
+/// Returns the header line of a file.
 pub(super) fn header(columns: &[&str]) -> String {
     columns.join(",") + "\n"
 }
