@@ -1,12 +1,32 @@
 //! The generator on the device: its inputs, and the dispatch that fills a session's cases and tables.
 
 use super::device::Device;
-use super::inputs::{GeneratorInputs, Inputs};
 use super::records::Generation;
 use crate::Result;
 use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
 use crate::stats::random::normal_table;
+
+/// The tables of a session.
+pub(super) struct Inputs {
+    pub starts: wgpu::Buffer,
+    pub speed: wgpu::Buffer,
+    pub lateral: wgpu::Buffer,
+    pub cases: wgpu::Buffer,
+    /// Makes cases and tables, if the host does not.
+    pub generator: Option<GeneratorInputs>,
+}
+
+/// The generator's buffers of one session.
+pub(super) struct GeneratorInputs {
+    pub template: Generation,
+    pub generation: wgpu::Buffer,
+    pub recipe: wgpu::Buffer,
+    pub numbers: wgpu::Buffer,
+    pub aliases: wgpu::Buffer,
+    pub sobol: wgpu::Buffer,
+    pub normal: wgpu::Buffer,
+}
 
 /// Inputs of the generator on a device.
 pub(super) struct GeneratorSetup {

@@ -5,13 +5,10 @@
 //! the command line, lanes from a plan; chunks are returned as by any backend.
 
 mod adapters;
-mod backend;
 mod choice;
 mod device;
 mod generator;
-mod inputs;
 mod owner;
-mod pacing;
 mod records;
 mod ring;
 mod session;
@@ -20,10 +17,10 @@ mod spirv;
 mod visible;
 
 pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
-pub use backend::GpuBackend;
 pub use choice::choose;
 pub use device::{Fault, FaultKind, GpuOptions};
 pub use records::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};
+pub use session::GpuBackend;
 pub use spirv::{Checks, exact_spirv};
 pub use visible::{visible, visible_here};

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
+use super::generator::Inputs;
 use super::generator::{GeneratorSetup, generate};
-use super::inputs::Inputs;
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::engine::LaneCase;
@@ -69,7 +69,7 @@ pub(super) struct Prepared {
 
 /// Description of the open device.
 #[derive(Debug, Clone)]
-pub(super) struct Opened {
+pub(super) struct OpenedDevice {
     pub exact: bool,
 }
 
@@ -78,14 +78,14 @@ pub(super) fn start(
     adapter: wgpu::Adapter,
     card: AdapterCard,
     options: GpuOptions,
-) -> Result<(Sender<Command>, Opened, JoinHandle<()>)> {
+) -> Result<(Sender<Command>, OpenedDevice, JoinHandle<()>)> {
     let (sender, commands) = mpsc::channel();
     let (opened_sender, opened) = mpsc::channel();
     let name = card.name.clone();
     let work = move || match Device::open(&adapter, &card, options) {
         Ok(device) => {
-            let _ = opened_sender.send(Ok(Opened { exact: device.exact }));
-            Owner::new(device).serve(&commands);
+            let _ = opened_sender.send(Ok(OpenedDevice { exact: device.exact }));
+            DeviceOwner::new(device).serve(&commands);
         }
         Err(error) => {
             let _ = opened_sender.send(Err(error));
@@ -106,7 +106,7 @@ pub(super) fn gone(device: &str) -> Error {
     Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
 }
 
-struct Owner {
+struct DeviceOwner {
     device: Device,
     sessions: HashMap<u64, Inputs>,
     next_session: u64,
@@ -119,11 +119,11 @@ struct Owner {
     dead: Option<String>,
 }
 
-impl Owner {
-    fn new(device: Device) -> Owner {
+impl DeviceOwner {
+    fn new(device: Device) -> DeviceOwner {
         let free = (0..RING).map(|_| Slot::default()).collect();
         let (sessions, flying) = (HashMap::new(), VecDeque::new());
-        Owner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
+        DeviceOwner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
     }
 
     fn serve(&mut self, commands: &Receiver<Command>) {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
-use super::inputs::Inputs;
+use super::generator::Inputs;
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
 use crate::engine::Wanted;
 use crate::{Error, Result};
@@ -79,16 +79,16 @@ struct Buffers {
 
 /// Offset of each part of the results in the read-back buffer, bytes.
 #[derive(Clone, Copy)]
-struct Parts {
+struct ResultOffsets {
     verdicts: u64,
     outcomes: u64,
     counts: u64,
     times: u64,
 }
 
-impl Parts {
-    fn of(job: &Job, models: usize) -> Parts {
-        Parts {
+impl ResultOffsets {
+    fn of(job: &Job, models: usize) -> ResultOffsets {
+        ResultOffsets {
             verdicts: (models * job.words() * 4) as u64,
             outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
             counts: ((models + models * job.cells() * CELL_WORDS) * 4) as u64,
@@ -105,7 +105,7 @@ impl Parts {
 /// A job in flight.
 pub(super) struct Flight {
     job: Job,
-    parts: Parts,
+    parts: ResultOffsets,
     submission: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
     since: Instant,
@@ -115,7 +115,7 @@ impl Slot {
     /// Submits a job to the device.
     pub fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
         let models = job.pipelines.len();
-        let parts = Parts::of(&job, models);
+        let parts = ResultOffsets::of(&job, models);
         self.grow(device, &parts, models);
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
@@ -235,7 +235,7 @@ impl Slot {
         Ok(answer)
     }
 
-    fn grow(&mut self, device: &Device, parts: &Parts, models: usize) {
+    fn grow(&mut self, device: &Device, parts: &ResultOffsets, models: usize) {
         use wgpu::BufferUsages as Use;
         let enough = self.buffers.as_ref().is_some_and(|b| {
             b.models == models

@@ -1,19 +1,21 @@
-//! A plan on the device: divides units into jobs, keeps the ring filled, and restores the plan's order in the
-//! results.
+//! The GPU as a backend, opened once and used by any number of sessions. A session is a plan on the device: it divides
+//! units into jobs, keeps the ring filled, and restores the plan's order in the results.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::JoinHandle;
 
 use rayon::prelude::*;
 
+use super::adapters::{AdapterCard, Adapters};
+use super::device::{GpuOptions, PipelineSpec};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
-use super::pacing::Pacer;
 use super::records::{CELL_WORDS, StartRecord, from_ordered};
 use super::ring::{Answer, Job, RING};
-use super::{device::PipelineSpec, shader};
-use crate::engine::{CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use super::shader;
+use crate::engine::{Backend, CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
@@ -256,5 +258,144 @@ fn counts(cell: &[u32; CELL_WORDS]) -> CellCounts {
         capped: cell[4].into(),
         min_ttc_s: smallest(cell[5]),
         min_gap_m: smallest(cell[6]),
+    }
+}
+
+/// Lanes as invocations of a WGSL kernel on one device.
+#[derive(Debug)]
+pub struct GpuBackend {
+    card: AdapterCard,
+    exact: bool,
+    options: GpuOptions,
+    commands: Sender<Command>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl std::fmt::Debug for Command {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Command")
+    }
+}
+
+impl GpuBackend {
+    /// Opens the device with this index.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if its driver refuses.
+    pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
+        let adapter = adapters.take(index)?;
+        let card = adapters.cards()[index].clone();
+        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
+        Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
+    }
+
+    /// Description of the device.
+    pub fn card(&self) -> &AdapterCard {
+        &self.card
+    }
+
+    /// Float operations reach the driver unchanged, so that equality is guaranteed and not only checked.
+    pub fn is_exact(&self) -> bool {
+        self.exact
+    }
+}
+
+impl Drop for GpuBackend {
+    fn drop(&mut self) {
+        // A session may outlive the backend and holds a sender, so a join before the last sender is dropped would
+        // never return.
+        let _ = self.commands.send(Command::End);
+        if let Some(thread) = self.thread.take() {
+            // Callers have already received the panic of that thread.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Backend for GpuBackend {
+    fn describe(&self) -> String {
+        let path = if self.exact { "exact" } else { "plain" };
+        let driver = [&self.card.driver[..], &self.card.driver_info].join(" ").trim().to_owned();
+        format!("GPU {} ({}, {driver}), binary32, {path} path", self.card.name, self.card.api)
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        let commands = self.commands.clone();
+        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, self.options.first_lanes)?))
+    }
+}
+
+/// Target time of the longest dispatch of a job, s.
+const TARGET_S: f64 = 0.1;
+/// Maximum factor of one change, so that one outlier has little effect.
+const MAX_CHANGE: f64 = 4.0;
+
+/// The size of the next job, from the time of the last: a dispatch of about a tenth of a second. Longer ones can exceed
+/// the time-outs of desktop drivers; shorter ones wait for the host. Results do not depend on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pacer {
+    lanes: u64,
+}
+
+impl Pacer {
+    /// Starts with `lanes` per model.
+    pub fn new(lanes: u64) -> Pacer {
+        Pacer { lanes: lanes.max(1) }
+    }
+
+    /// Takes a job into account: lanes per model and the time of its slowest dispatch, s.
+    pub fn observe(&mut self, lanes: u64, slowest_s: f64) {
+        if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
+            return;
+        }
+        // A small last piece is not representative, because its start takes as long.
+        let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
+        let wanted = lanes as f64 * change;
+        if change < 1.0 || wanted > self.lanes as f64 {
+            self.lanes = (wanted as u64).max(1);
+        }
+    }
+
+    /// Units of a job with `lanes_per_unit` lanes per model each: at least one, within `max_lanes`.
+    pub fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
+        (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
+    }
+
+    /// Lanes per model of the next job.
+    pub fn lanes(&self) -> u64 {
+        self.lanes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jobs_grow_to_the_target_and_no_further() {
+        let mut pacer = Pacer::new(1 << 14);
+        for _ in 0..20 {
+            let lanes = pacer.lanes();
+            // A device of a hundred million lanes per second.
+            pacer.observe(lanes, lanes as f64 / 1e8);
+        }
+        assert!((pacer.lanes() as f64 / 1e8 - TARGET_S).abs() < 0.01 * TARGET_S, "{}", pacer.lanes());
+    }
+
+    #[test]
+    fn a_slow_job_makes_the_next_one_smaller_and_a_small_last_piece_does_not() {
+        let mut pacer = Pacer::new(1 << 20);
+        pacer.observe(1 << 20, 10.0);
+        assert_eq!(pacer.lanes(), 1 << 18);
+        pacer.observe(100, 0.05);
+        assert_eq!(pacer.lanes(), 1 << 18);
+    }
+
+    #[test]
+    fn a_job_holds_at_least_one_unit_and_never_more_than_the_device_can() {
+        let pacer = Pacer::new(1000);
+        assert_eq!(pacer.units(5000, u64::MAX), 1);
+        assert_eq!(pacer.units(10, u64::MAX), 100);
+        assert_eq!(pacer.units(10, 50), 5);
     }
 }

@@ -32,7 +32,7 @@ const KEPT: usize = 10;
 
 /// Results of the lanes of one category and model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tally {
+pub struct GroupComparison {
     /// Kind of scenario.
     pub category: Category,
     /// The ego's driver.
@@ -53,7 +53,7 @@ pub struct Tally {
     pub reference_differing: u64,
 }
 
-impl Tally {
+impl GroupComparison {
     /// Fraction of the lanes that fail a criterion.
     pub fn share(&self, criterion: Criterion) -> f64 {
         self.failed[criterion.index()] as f64 / self.lanes.max(1) as f64
@@ -98,7 +98,7 @@ pub struct Comparison {
     /// Hash of its plan.
     pub plan_sha256: String,
     /// Per category and model.
-    pub tallies: Vec<Tally>,
+    pub tallies: Vec<GroupComparison>,
     /// The worst lanes that differ, worst first.
     pub worst: Vec<DifferingLane>,
     /// Verdicts or counts that differ if only these are requested.
@@ -180,9 +180,9 @@ pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
 }
 
 /// One empty tally per category and model.
-fn tallies(plan: &LanePlan) -> Vec<Tally> {
+fn tallies(plan: &LanePlan) -> Vec<GroupComparison> {
     let models = |category| {
-        plan.models.iter().map(move |&model| Tally {
+        plan.models.iter().map(move |&model| GroupComparison {
             category,
             model,
             lanes: 0,

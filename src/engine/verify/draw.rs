@@ -22,18 +22,18 @@ pub(super) enum Purpose {
 }
 
 /// A stream of random numbers.
-pub(super) struct Draw(ChaCha8Rng);
+pub(super) struct CaseRandom(ChaCha8Rng);
 
-impl Draw {
+impl CaseRandom {
     /// The stream of one thing.
-    pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> Draw {
+    pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> CaseRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&unit.to_le_bytes());
         key[16..20].copy_from_slice(&(variant as u32).to_le_bytes());
         key[20] = category as u8;
         key[21] = purpose as u8;
-        Draw(ChaCha8Rng::from_seed(key))
+        CaseRandom(ChaCha8Rng::from_seed(key))
     }
 
     /// Uniform in [0, 1), 53 bits.

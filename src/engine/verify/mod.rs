@@ -8,14 +8,14 @@
 mod comparison;
 mod decision;
 mod draw;
+mod first_step;
 mod pool;
 mod random;
-mod scene;
 mod series;
 mod solve;
 mod thresholds;
 
-pub use comparison::{Comparison, DifferingLane, SelfCheck, Tally, WORDS, compare, self_check};
+pub use comparison::{Comparison, DifferingLane, GroupComparison, SelfCheck, WORDS, compare, self_check};
 pub use decision::Threshold;
 pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
 pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};

@@ -1,6 +1,6 @@
 //! The motions of the threshold set: their first step is exactly a given f32, from a table or by arithmetic.
 
-use super::draw::{Draw, Purpose};
+use super::draw::{CaseRandom, Purpose};
 use crate::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
 
 /// Neighbour of 0: far below the change of one step, and large enough that neither its third power (a form of the
@@ -12,7 +12,7 @@ const PER_KIND: usize = 32;
 
 /// Lateral position and motion of a vehicle at the first step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Across {
+pub(super) enum LateralStart {
     /// In the ego's lane.
     Ahead,
     /// In the next lane, coming in.
@@ -22,7 +22,7 @@ pub(super) enum Across {
 }
 
 /// The series of the set and the tables of its motions.
-pub(super) struct Series {
+pub(super) struct ThresholdSeries {
     dt_s: f64,
     /// All series.
     pub tables: Tables<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Series {
     pub lane_tables: Tables<f32>,
     /// Begin and length of each speed series.
     speeds: Vec<[u32; 2]>,
-    /// Begin and length of each lateral series, in the order of [`Across`]. Those of `Beside` are in groups of three:
+    /// Begin and length of each lateral series, in the order of [`LateralStart`]. Those of `Beside` are in groups of three:
     /// lateral speed 0, −2⁻³², 2⁻³².
     across: [Vec<[u32; 2]>; 3],
 }
@@ -40,10 +40,10 @@ pub(super) fn rounded(x: f64) -> f32 {
     x as f32
 }
 
-impl Series {
-    pub fn new(seed: u64, dt_s: f64) -> Series {
+impl ThresholdSeries {
+    pub fn new(seed: u64, dt_s: f64) -> ThresholdSeries {
         let (mut tables, mut speeds, mut across) = (Tables::default(), Vec::new(), [const { Vec::new() }; 3]);
-        let draw = |kind, k| Draw::new(Purpose::ThresholdPool, seed, Category::CutIn, k as u64, kind);
+        let draw = |kind, k| CaseRandom::new(Purpose::ThresholdPool, seed, Category::CutIn, k as u64, kind);
         for k in 0..PER_KIND {
             let mut draw = draw(0, k);
             let (start, acceleration) = (f64::from(rounded(draw.between(2.0, 30.0))), draw.between(-6.0, 2.0));
@@ -51,12 +51,12 @@ impl Series {
             speeds.push([tables.speed.len() as u32, len as u32]);
             tables.speed.extend((0..len).map(|i| (start + acceleration * dt_s * i as f64).max(0.0)));
         }
-        for kind in [Across::Ahead, Across::Coming, Across::Beside] {
+        for kind in [LateralStart::Ahead, LateralStart::Coming, LateralStart::Beside] {
             for k in 0..PER_KIND {
                 let mut draw = draw(1 + kind as usize, k);
                 let (y, w) = place(&mut draw, kind);
                 let len = 1 + draw.below(90);
-                let every = if kind == Across::Beside { vec![0.0, -TINY, TINY] } else { vec![w] };
+                let every = if kind == LateralStart::Beside { vec![0.0, -TINY, TINY] } else { vec![w] };
                 for w in every.into_iter().map(f64::from) {
                     across[kind as usize].push([tables.lateral.len() as u32, len as u32]);
                     let y = f64::from(y);
@@ -64,13 +64,13 @@ impl Series {
                 }
             }
         }
-        Series { dt_s, lane_tables: tables.cast(), tables, speeds, across }
+        ThresholdSeries { dt_s, lane_tables: tables.cast(), tables, speeds, across }
     }
 
     /// A motion of a kind ([`Motion::kind`]).
-    pub fn motion(&self, draw: &mut Draw, kind: u32, across: Across) -> Motion<f64> {
+    pub fn motion(&self, draw: &mut CaseRandom, kind: u32, across: LateralStart) -> Motion<f64> {
         let (y, w) = place(draw, across);
-        let lateral = if across == Across::Ahead && draw.chance(0.5) {
+        let lateral = if across == LateralStart::Ahead && draw.chance(0.5) {
             Lateral::Centred
         } else {
             let (start_m, rate_mps) = (f64::from(y), -f64::from(y.signum() * w));
@@ -89,7 +89,7 @@ impl Series {
         }
         if kind & LATERAL_SAMPLED != 0 {
             let every = &self.across[across as usize];
-            let step = if across == Across::Beside { 3 } else { 1 };
+            let step = if across == LateralStart::Beside { 3 } else { 1 };
             [motion.lateral_offset, motion.lateral_len] = every[step * draw.below(every.len() / step)];
         }
         motion
@@ -138,12 +138,12 @@ impl Series {
 }
 
 /// Position and speed towards the ego, each a number of the lane arithmetic.
-fn place(draw: &mut Draw, across: Across) -> (f32, f32) {
+fn place(draw: &mut CaseRandom, across: LateralStart) -> (f32, f32) {
     let side = draw.sign();
     let (y, w) = match across {
-        Across::Ahead => (draw.between(0.05, 0.4), 0.0),
-        Across::Coming => (draw.between(1.8, 4.8), draw.between(0.3, 2.0)),
-        Across::Beside => (draw.between(1.8, 4.8), 0.0),
+        LateralStart::Ahead => (draw.between(0.05, 0.4), 0.0),
+        LateralStart::Coming => (draw.between(1.8, 4.8), draw.between(0.3, 2.0)),
+        LateralStart::Beside => (draw.between(1.8, 4.8), 0.0),
     };
     (rounded(side * y), rounded(w))
 }

@@ -4,11 +4,11 @@
 
 use super::check_categories;
 use super::decision::{HEADWAYS, Threshold};
-use super::scene::Scenes;
-use crate::engine::{Block, CaseSource, LaneCase, LanePlan};
+use super::first_step::ThresholdCases;
+use crate::engine::{Block, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Category, Tables};
+use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
 /// Variants of every unit: on the threshold (`S`), and the deciding quantity one ULP smaller and larger. Around 0 the
@@ -63,18 +63,6 @@ pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<L
         first_lane: 0,
     };
     let blocks = options.categories.iter().map(block).collect();
-    let source = ThresholdCases(Scenes::new(profile, options.seed, &options.categories));
+    let source = ThresholdCases::new(profile, options.seed, &options.categories);
     LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Box::new(source))
-}
-
-struct ThresholdCases(Scenes);
-
-impl CaseSource for ThresholdCases {
-    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.0.case(block, unit, variant)
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        self.0.tables()
-    }
 }

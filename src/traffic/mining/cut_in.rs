@@ -32,7 +32,7 @@ pub(super) fn scenario(
     first: usize,
     tags: &[Tags],
 ) -> Option<Scenario> {
-    let target = &set.scene.recording.tracks[target_index];
+    let target = &set.recording_tags.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
     let found = FoundScenario { set, target, category: Category::CutIn, start, end };
     let change = lane_change_of(&found, target_index)?;
@@ -41,7 +41,7 @@ pub(super) fn scenario(
         LaneChangeKind::LeftIn | LaneChangeKind::RightOut => Side::Right,
     };
     let mut scenario = found.scenario(side)?;
-    (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_in);
+    (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_in);
     describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_IN, true));
     Some(scenario)
 }
@@ -71,7 +71,7 @@ pub(super) fn lane_change_of<'a>(
 ) -> Option<&'a super::lateral::LaneChange> {
     let set: &'a DataSet<'a> = found.set;
     let j = found.sample_of(found.target, found.start)?;
-    set.scene.activities[target_index].lane_change(set.ego.lane[found.start], j)
+    set.recording_tags.activities[target_index].lane_change(set.ego.lane[found.start], j)
 }
 
 /// Sets the origin fields that cut-in and cut-out share.

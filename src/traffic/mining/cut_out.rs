@@ -34,7 +34,7 @@ pub(super) fn scenario(
     first: usize,
     tags: &[Tags],
 ) -> Option<Scenario> {
-    let target = &set.scene.recording.tracks[target_index];
+    let target = &set.recording_tags.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
     let found = FoundScenario { set, target, category: Category::CutOut, start, end };
     let change = lane_change_of(&found, target_index)?;
@@ -51,7 +51,7 @@ pub(super) fn scenario(
             scenario.lead_id = Some(lead.id);
             scenario.lead = Some(found.other(lead, side)?);
             scenario.lead_gap = Some(micrometres(lead_gap));
-            (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_out);
+            (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_out);
         }
         Err(reason) => scenario.reason = reason.to_owned(),
     }
@@ -66,7 +66,7 @@ fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
     let j = found.sample_of(found.target, found.start).ok_or(nobody)?;
     let lane = set.ego.lane[found.start];
     let (index, _) = set.ahead_in_lane(found.start, found.target.s_m[j]).next().ok_or(nobody)?;
-    let lead = &set.scene.recording.tracks[index];
+    let lead = &set.recording_tags.recording.tracks[index];
     let stays = (found.start..=found.end)
         .all(|k| found.sample_of(lead, k).is_some_and(|l| set.in_lane(lane, lead.d_m[l]) && set.in_range(k, lead, l)));
     if stays { Ok(lead) } else { Err("vehicle ahead does not stay in the lane and in range") }

@@ -35,13 +35,13 @@ impl FoundScenario<'_> {
     /// The scenario with `y > 0` on `side`, not kept, without what only some categories have. `None` if the target is
     /// not always in view or the ego is in no lane, which cannot occur in a match.
     pub fn scenario(&self, side: Side) -> Option<Scenario> {
-        let DataSet { ego, scene, .. } = self.set;
+        let DataSet { ego, recording_tags, .. } = self.set;
         let lane = self.lane()?;
         let (first, last) = (self.sample_of(self.target, self.start)?, self.sample_of(self.target, self.end)?);
         let v0 = speed(ego.v_s_mps[self.start]);
         let gap0 = micrometres(self.set.gap_m(self.start, self.target, first));
         let frame0 = self.frame(self.start);
-        let (recording, key) = (&scene.recording.id, self.category.key());
+        let (recording, key) = (&recording_tags.recording.id, self.category.key());
         Some(Scenario {
             id: format!("{recording}_{key}_{}_{}_{frame0}", ego.id, self.target.id),
             category: self.category,
@@ -51,7 +51,7 @@ impl FoundScenario<'_> {
             lead_id: None,
             frame0,
             frame1: self.frame(self.end),
-            fps: scene.recording.frame_rate_hz,
+            fps: recording_tags.recording.frame_rate_hz,
             kept: false,
             reason: String::new(),
             ego: Ego { v0, length: ego.length_m, width: ego.width_m },
@@ -67,7 +67,7 @@ impl FoundScenario<'_> {
             end_cause: None,
             frame_switch: None,
             tag_frames: None,
-            synthetic: scene.recording.synthetic,
+            synthetic: recording_tags.recording.synthetic,
         })
     }
 

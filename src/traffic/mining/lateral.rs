@@ -3,8 +3,8 @@
 //! The lane is fixed. For each of the four changes, `s` is the distance past the crossed line: negative before, zero
 //! at the crossing, positive after. So one detector serves all four, and left and right are symmetric.
 
+use super::longitudinal::trailing_min;
 use super::options::{LaneChangeEnd, LateralOptions, TOLERANCE, samples, window_samples};
-use super::window::trailing_min;
 use crate::traffic::trajectory::Lane;
 
 /// The four lane changes relative to one lane.
@@ -64,7 +64,7 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
             continue; // already changing
         }
         let s: Vec<f64> = d_m.iter().map(|&d| kind.past_line(d, lane)).collect();
-        let profile = Profile::new(&s, lane.width_m(), frame_rate_hz, options);
+        let profile = LineDistance::new(&s, lane.width_m(), frame_rate_hz, options);
         if let Some(end) = profile.end(k) {
             let start = profile.start(k, free_from).unwrap_or(free_from);
             found.push(LaneChange { kind, start, crossing: k, end });
@@ -92,7 +92,7 @@ fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
 }
 
 /// `s` over the track, and the limits that determine begin and end of the change.
-struct Profile<'a> {
+struct LineDistance<'a> {
     s: &'a [f64],
     least: Vec<f64>,
     window: usize,
@@ -103,10 +103,10 @@ struct Profile<'a> {
     lc_end: LaneChangeEnd,
 }
 
-impl<'a> Profile<'a> {
+impl<'a> LineDistance<'a> {
     fn new(s: &'a [f64], lane_width_m: f64, frame_rate_hz: f64, options: &LateralOptions) -> Self {
         let window = window_samples(options.window_s, frame_rate_hz);
-        Profile {
+        LineDistance {
             s,
             least: trailing_min(s, window),
             window,

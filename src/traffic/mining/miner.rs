@@ -40,10 +40,10 @@ impl Mined {
 /// Finds every cut-in, cut-out and leader deceleration of a recording. The result
 /// depends on the recording and the options only.
 pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
-    let scene = RecordingTags::new(recording, options);
+    let recording_tags = RecordingTags::new(recording, options);
     let mut mined = Mined::default();
     for ego_index in 0..recording.tracks.len() {
-        let Some(set) = DataSet::new(&scene, ego_index) else { continue };
+        let Some(set) = DataSet::new(&recording_tags, ego_index) else { continue };
         mined.data_sets += 1;
         for target_index in set.leaders() {
             mine_pair(&set, target_index, &mut mined.scenarios);
@@ -56,12 +56,12 @@ pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
 /// All scenarios of one ego with one target. In every category the target leads at some time, so other targets are
 /// skipped.
 fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) {
-    let activities = &set.scene.activities[target_index];
+    let activities = &set.recording_tags.activities[target_index];
     if !activities.decelerates() && !activities.changes_lane() {
         return;
     }
-    let options = set.scene.options;
-    let rate = set.scene.recording.frame_rate_hz;
+    let options = set.recording_tags.options;
+    let rate = set.recording_tags.recording.frame_rate_hz;
     let stretches = set.stretches(target_index);
     if activities.changes_lane() {
         let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - TOLERANCE;

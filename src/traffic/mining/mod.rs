@@ -19,15 +19,14 @@ pub mod cut_in;
 pub mod cut_out;
 mod data_set;
 mod found;
+mod frame_index;
 pub mod lateral;
 pub mod longitudinal;
 pub mod lvd;
 mod miner;
-mod neighbours;
 mod options;
 pub mod search;
 pub mod tags;
-mod window;
 
 pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated};
 pub use miner::{CategoryCount, Mined, mine};

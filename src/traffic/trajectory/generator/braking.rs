@@ -1,7 +1,7 @@
 //! Scheduled braking of a leader without a cause in the traffic: one or two phases, each with a rise, a hold and a
 //! release.
 
-use super::random::Stream;
+use super::random::TrafficRandom;
 
 /// Minimum peak of a scheduled braking, m/s². Weaker braking occurs in the traffic anyway, so the rate factor does
 /// not apply to it.
@@ -64,7 +64,7 @@ pub(super) struct Braking {
 
 impl Braking {
     /// Draws peak and shape.
-    pub fn draw(stream: &mut Stream) -> Braking {
+    pub fn draw(stream: &mut TrafficRandom) -> Braking {
         let excess = if stream.chance(HARD_SHARE) { HARD_EXCESS_MPS2 } else { PEAK_EXCESS_MPS2 };
         let peak = (WEAKEST_PEAK_MPS2 + stream.exponential(excess)).min(HARDEST_PEAK_MPS2);
         let first = Self::phase(peak, 0.0, stream);
@@ -76,7 +76,7 @@ impl Braking {
         Braking { first, second, elapsed_s: 0.0 }
     }
 
-    fn phase(peak_mps2: f64, start_s: f64, stream: &mut Stream) -> Phase {
+    fn phase(peak_mps2: f64, start_s: f64, stream: &mut TrafficRandom) -> Phase {
         let rise_s = stream.lognormal_within(0.7, 0.4, 0.3, 2.5);
         let hold_s = stream.exponential(1.6).min(5.0) + 0.04;
         let release_s = stream.lognormal_within(1.3, 0.4, 0.5, 4.0);
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_braking_rises_to_its_peak_without_jumps_and_ends() {
-        let mut stream = Stream::new(5, 0, 0, Purpose::Decision);
+        let mut stream = TrafficRandom::new(5, 0, 0, Purpose::Decision);
         for _ in 0..500 {
             let mut braking = Braking::draw(&mut stream);
             let (mut before, mut peak) = (0.0, 0.0_f64);

@@ -7,7 +7,7 @@
 use super::braking::Braking;
 use super::hazards::{DECISION_S, Hazards};
 use super::lane_change::{Way, acceptance, motive_per_s};
-use super::lateral::LaneChange;
+use super::lateral::LaneChangeMotion;
 use super::traffic::{Traffic, centre_of};
 use super::vehicle::draw_line;
 use crate::traffic::trajectory::VehicleClass;
@@ -90,7 +90,7 @@ impl Traffic {
         let width = self.setting.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
-        let change = LaneChange::draw(own.lane, to, own.line_m, target_m, &mut self.decisions);
+        let change = LaneChangeMotion::draw(own.lane, to, own.line_m, target_m, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);

@@ -1,7 +1,7 @@
 //! The upstream end of the road: the arrivals per lane.
 
 use super::options::GeneratorOptions;
-use super::random::Stream;
+use super::random::TrafficRandom;
 use super::vehicle::Vehicle;
 use crate::traffic::trajectory::VehicleClass;
 
@@ -67,7 +67,13 @@ pub(super) struct Inflow {
 
 impl Inflow {
     /// An empty lane's first vehicle.
-    pub fn new(demand: LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Inflow {
+    pub fn new(
+        demand: LaneDemand,
+        lane: usize,
+        centre_m: f64,
+        lane_width_m: f64,
+        stream: &mut TrafficRandom,
+    ) -> Inflow {
         let next = draw(&demand, lane, centre_m, lane_width_m, stream);
         let due_s = stream.between(0.0, 2.0 * demand.mean_headway_s);
         Inflow { demand, lane, centre_m, lane_width_m, due_s, next }
@@ -80,7 +86,7 @@ impl Inflow {
         now_s: f64,
         entrance_m: f64,
         last: Option<(f64, f64)>,
-        stream: &mut Stream,
+        stream: &mut TrafficRandom,
     ) -> Option<Vehicle> {
         if now_s < self.due_s {
             return None;
@@ -106,7 +112,7 @@ impl Inflow {
 
     /// Time from one arrival to the next: the following headway, plus an exponential part for free arrivals that
     /// restores the mean.
-    fn headway_s(&self, speed_mps: f64, stream: &mut Stream) -> f64 {
+    fn headway_s(&self, speed_mps: f64, stream: &mut TrafficRandom) -> f64 {
         let own_s = |driver_s: f64, length_m: f64| driver_s + (length_m + 3.4) / speed_mps.max(10.0);
         let following_s = own_s(self.next.driver.time_headway_s, self.next.length_m);
         let share = self.demand.truck_share;
@@ -118,7 +124,7 @@ impl Inflow {
     }
 }
 
-fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Vehicle {
+fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) -> Vehicle {
     let class = if stream.chance(demand.truck_share) { VehicleClass::Truck } else { VehicleClass::Car };
     let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, stream);
     vehicle.place(lane, centre_m, lane_width_m, stream);

@@ -1,6 +1,6 @@
 //! Lateral motion: the lane change as a quintic, and the wander within a lane.
 
-use super::random::Stream;
+use super::random::TrafficRandom;
 
 /// Published range of lane-change durations, s.
 const DURATION_S: [f64; 2] = [2.9, 7.3];
@@ -17,7 +17,7 @@ const ASYMMETRY_SD: f64 = 0.7;
 /// `d(t) = from + (to − from) q(φ(t/T))` with the quintic `q(τ) = 10τ³ − 15τ⁴ + 6τ⁵` (rest to rest in
 /// speed and acceleration) and a mild distortion of time `φ(τ) = τ + κ τ²(1−τ)²`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LaneChange {
+pub(super) struct LaneChangeMotion {
     /// Lane it leaves.
     pub from_lane: usize,
     /// Lane it enters.
@@ -31,12 +31,18 @@ pub(super) struct LaneChange {
     asymmetry: f64,
 }
 
-impl LaneChange {
+impl LaneChangeMotion {
     /// Draws duration and shape of a change between two lateral positions.
-    pub fn draw(from_lane: usize, to_lane: usize, from_m: f64, to_m: f64, stream: &mut Stream) -> LaneChange {
+    pub fn draw(
+        from_lane: usize,
+        to_lane: usize,
+        from_m: f64,
+        to_m: f64,
+        stream: &mut TrafficRandom,
+    ) -> LaneChangeMotion {
         let duration_s = stream.lognormal_within(DURATION_MEDIAN_S, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
-        LaneChange { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
+        LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
     }
 
     /// Elapsed fraction of the duration, 0 to 1.
@@ -92,9 +98,9 @@ mod tests {
 
     #[test]
     fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
-        let mut stream = Stream::new(3, 0, 0, Purpose::Decision);
+        let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
-            let mut change = LaneChange::draw(1, 0, -5.6, -1.9, &mut stream);
+            let mut change = LaneChangeMotion::draw(1, 0, -5.6, -1.9, &mut stream);
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;
@@ -114,7 +120,7 @@ mod tests {
 
     #[test]
     fn wander_keeps_its_spread() {
-        let mut stream = Stream::new(3, 0, 0, Purpose::Noise);
+        let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Noise);
         let mut wander = Wander::default();
         let (mut squares, n) = (0.0, 200_000);
         for _ in 0..n {

@@ -3,8 +3,8 @@
 
 use super::inflow::demand;
 use super::options::GeneratorOptions;
-use super::random::{Purpose, Stream};
-use super::traffic::{Setting, Traffic};
+use super::random::{Purpose, TrafficRandom};
+use super::traffic::{RoadSetup, Traffic};
 use super::vehicle::Vehicle;
 use crate::support::error::Result;
 use crate::traffic::trajectory::highd::{self, Precision};
@@ -16,7 +16,7 @@ const MEDIAN_M: f64 = 4.5;
 
 /// One recording. `index` counts from 0. An error means that a highD file could not hold it.
 pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recording> {
-    let mut site = Stream::new(options.seed, index, 0, Purpose::Site);
+    let mut site = TrafficRandom::new(options.seed, index, 0, Purpose::Site);
     // Two of three recordings have three lanes per direction.
     let lanes = if index % 3 == 2 { 2 } else { 3 };
     let lane_width_m = [3.5, 3.75, 3.6][(site.uniform() * 3.0) as usize % 3];
@@ -24,7 +24,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     let speed_level = site.normal_within(1.0, 0.03, 0.92, 1.08);
     let truck_level = site.normal_within(1.0, 0.15, 0.6, 1.4);
     let steps_per_sample = options.steps_per_sample();
-    let setting = Setting {
+    let setting = RoadSetup {
         lane_width_m,
         window_m: options.window_m,
         step_s: 1.0 / (options.frame_rate_hz * steps_per_sample as f64),

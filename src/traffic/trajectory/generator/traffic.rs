@@ -6,7 +6,7 @@ use super::hazards::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
-use super::random::{Purpose, Stream};
+use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
@@ -32,7 +32,7 @@ const LEAVING_HEADWAY: f64 = 0.5;
 
 /// Dimensions of a simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Setting {
+pub(super) struct RoadSetup {
     /// m.
     pub lane_width_m: f64,
     /// m.
@@ -47,15 +47,15 @@ pub(super) struct Setting {
 
 /// One carriageway.
 pub(super) struct Traffic {
-    pub(super) setting: Setting,
+    pub(super) setting: RoadSetup,
     pub(super) lanes: usize,
     pub(super) vehicles: Vec<Vehicle>,
     /// Vehicles on the road, front first.
     pub(super) order: Vec<usize>,
     inflows: Vec<Inflow>,
-    arrivals: Stream,
-    noise: Stream,
-    pub(super) decisions: Stream,
+    arrivals: TrafficRandom,
+    noise: TrafficRandom,
+    pub(super) decisions: TrafficRandom,
     pub(super) step: usize,
     pub(super) decision_steps: usize,
     pub(super) hazards_in_view: Hazards,
@@ -69,8 +69,8 @@ pub(super) struct Traffic {
 
 impl Traffic {
     /// An empty road. `key` is (seed, recording, carriageway).
-    pub fn new(setting: Setting, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
-        let stream = |purpose| Stream::new(key.0, key.1, key.2, purpose);
+    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
+        let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
         let width = setting.lane_width_m;

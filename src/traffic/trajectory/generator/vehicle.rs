@@ -2,8 +2,8 @@
 
 use super::braking::Braking;
 use super::idm::DriverParameters;
-use super::lateral::{LaneChange, Wander};
-use super::random::Stream;
+use super::lateral::{LaneChangeMotion, Wander};
+use super::random::TrafficRandom;
 use crate::traffic::trajectory::VehicleClass;
 
 /// Standard deviation of the drivers' lateral positions in their lane, m.
@@ -62,7 +62,7 @@ pub(super) struct Vehicle {
     /// Deviation from it.
     pub wander: Wander,
     /// Lane change in progress.
-    pub change: Option<LaneChange>,
+    pub change: Option<LaneChangeMotion>,
     /// Scheduled braking in progress.
     pub braking: Option<Braking>,
     /// Time until the next lane change is possible, s.
@@ -73,7 +73,7 @@ pub(super) struct Vehicle {
 
 impl Vehicle {
     /// Draws size and driver. `lane_speed_mps` is the mean desired speed of cars in this lane.
-    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut Stream) -> Vehicle {
+    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut TrafficRandom) -> Vehicle {
         let (length_m, width_m) = match class {
             VehicleClass::Car => (stream.normal_within(4.6, 0.5, 3.4, 6.4), stream.normal_within(1.9, 0.09, 1.6, 2.2)),
             // Articulated and other trucks: two peaks that give the published 12 ± 4.7 m.
@@ -125,7 +125,7 @@ impl Vehicle {
     }
 
     /// Places it in a lane at a random lateral position.
-    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) {
+    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) {
         self.lane = lane;
         self.occupied = 1 << lane;
         self.line_m = draw_line(centre_m, lane_width_m, self.width_m, stream);
@@ -162,7 +162,7 @@ pub(super) const TRUCK_HEADWAY_S: f64 = 1.7;
 pub(super) const HEADWAY_SIGMA: f64 = 0.5;
 
 /// The intended lateral position in a lane: near the middle, with the whole body inside the lane.
-pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut Stream) -> f64 {
+pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut TrafficRandom) -> f64 {
     let room_m = (0.5 * (lane_width_m - width_m) - 0.3).max(0.05);
     centre_m + stream.normal_within(0.0, LINE_SD_M, -room_m, room_m)
 }

@@ -30,15 +30,15 @@ pub struct FileChecksum {
 
 /// A column that the header has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
+pub(super) struct CsvColumn {
     index: usize,
     name: &'static str,
 }
 
 /// An open table, positioned on one of its lines.
-pub(super) struct Table {
+pub(super) struct CsvTable {
     path: PathBuf,
-    reader: Reader<Hashing<File>>,
+    reader: Reader<HashingReader<File>>,
     known: &'static [&'static str],
     header: Vec<String>,
     record: ByteRecord,
@@ -55,7 +55,7 @@ const READ_AHEAD_BYTES: usize = 1 << 18;
 /// open quotation mark.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
-impl Table {
+impl CsvTable {
     /// Opens a file and reads its header. `known` are the column names of the format: they are never reported as
     /// misspelt.
     ///
@@ -69,8 +69,8 @@ impl Table {
             // Not CRLF, with which the line number is one too small in files with Windows line ends.
             .terminator(Terminator::Any(b'\n'))
             .buffer_capacity(READ_AHEAD_BYTES)
-            .from_reader(Hashing::new(file));
-        let mut table = Table {
+            .from_reader(HashingReader::new(file));
+        let mut table = CsvTable {
             path: path.to_path_buf(),
             reader,
             known,
@@ -116,7 +116,7 @@ impl Table {
     ///
     /// # Errors
     /// If the header has none, or two; names the most similar column.
-    pub fn column(&self, name: &'static str) -> Result<Column> {
+    pub fn column(&self, name: &'static str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
             let problem = format!("the column is missing{}", self.strange_names_for_message());
             let help = match self.similar_name(name) {
@@ -131,9 +131,9 @@ impl Table {
     ///
     /// # Errors
     /// If the header has it twice.
-    pub fn optional_column(&self, name: &'static str) -> Result<Option<Column>> {
+    pub fn optional_column(&self, name: &'static str) -> Result<Option<CsvColumn>> {
         let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
-        let first = found.next().map(|(index, _)| Column { index, name });
+        let first = found.next().map(|(index, _)| CsvColumn { index, name });
         if found.next().is_some() {
             return Err(Error::input(
                 Place::file(&self.path).row(1).column(name),
@@ -150,7 +150,7 @@ impl Table {
     }
 
     /// The bytes of a field.
-    pub fn bytes(&self, column: Column) -> &[u8] {
+    pub fn bytes(&self, column: CsvColumn) -> &[u8] {
         // Every line has as many fields as the header, so the field exists.
         let field = self.record.get(column.index).unwrap_or_default();
         // Windows line ends leave this in the last field.
@@ -161,7 +161,7 @@ impl Table {
     ///
     /// # Errors
     /// If it is not UTF-8.
-    pub fn text(&self, column: Column) -> Result<&str> {
+    pub fn text(&self, column: CsvColumn) -> Result<&str> {
         match std::str::from_utf8(self.bytes(column)) {
             Ok(text) => Ok(text.trim()),
             Err(_) => Err(self.bad(
@@ -176,7 +176,7 @@ impl Table {
     ///
     /// # Errors
     /// If it is not a number, infinite, NaN or out of range.
-    pub fn real(&self, column: Column) -> Result<f64> {
+    pub fn real(&self, column: CsvColumn) -> Result<f64> {
         match number::real(self.bytes(column)) {
             Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
             Some(value) if value.is_finite() => {
@@ -195,7 +195,7 @@ impl Table {
     ///
     /// # Errors
     /// If it is not such a number.
-    pub fn positive(&self, column: Column) -> Result<f64> {
+    pub fn positive(&self, column: CsvColumn) -> Result<f64> {
         let value = self.real(column)?;
         if value > 0.0 {
             return Ok(value);
@@ -207,17 +207,17 @@ impl Table {
     ///
     /// # Errors
     /// If it is not a whole number.
-    pub fn integer(&self, column: Column) -> Result<i64> {
+    pub fn integer(&self, column: CsvColumn) -> Result<i64> {
         number::integer(self.bytes(column)).ok_or_else(|| self.not_a_number(column, "a whole number"))
     }
 
     /// The error for a field of the present line.
-    pub fn bad(&self, column: Column, problem: impl Into<String>, help: impl Into<String>) -> Error {
+    pub fn bad(&self, column: CsvColumn, problem: impl Into<String>, help: impl Into<String>) -> Error {
         Error::input(self.field(column), problem, help)
     }
 
     /// The place of a field of the present line.
-    pub fn field(&self, column: Column) -> Place {
+    pub fn field(&self, column: CsvColumn) -> Place {
         self.place().column(column.name)
     }
 
@@ -232,7 +232,7 @@ impl Table {
     }
 
     /// A field as messages show it.
-    pub fn shown(&self, column: Column) -> String {
+    pub fn shown(&self, column: CsvColumn) -> String {
         quoted(&String::from_utf8_lossy(self.bytes(column)))
     }
 
@@ -351,7 +351,7 @@ impl Table {
         }
     }
 
-    fn not_a_number(&self, column: Column, expected: &str) -> Error {
+    fn not_a_number(&self, column: CsvColumn, expected: &str) -> Error {
         let field = self.bytes(column);
         if field.trim_ascii().is_empty() {
             return self.bad(column, format!("the field is empty; expected {expected}"), "fill in the value");
@@ -388,7 +388,7 @@ pub(super) fn quoted(text: &str) -> String {
 }
 
 /// Hashes and counts the bytes read, so that no file is read twice.
-struct Hashing<R> {
+struct HashingReader<R> {
     inner: R,
     hash: Sha256,
     bytes: u64,
@@ -399,13 +399,13 @@ struct Hashing<R> {
     is_endless: bool,
 }
 
-impl<R> Hashing<R> {
+impl<R> HashingReader<R> {
     fn new(inner: R) -> Self {
-        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
+        HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
     }
 }
 
-impl<R: Read> Read for Hashing<R> {
+impl<R: Read> Read for HashingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         // The line has no end so far, and memory would have to hold all of it.
         if self.bytes - self.line_from.min(self.bytes) > MAX_LINE_BYTES {

@@ -1,7 +1,7 @@
 //! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
 //! (size, class and direction of each vehicle).
 
-use super::columns::{Column, FileChecksum, Table, quoted};
+use super::columns::{CsvColumn, CsvTable, FileChecksum, quoted};
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TRACKS_META_COLUMNS};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
@@ -31,7 +31,7 @@ impl RecordingMeta {
 }
 
 /// Content of `tracksMeta` for one vehicle.
-pub(super) struct Vehicle {
+pub(super) struct VehicleMeta {
     pub id: u32,
     pub class: VehicleClass,
     pub length_m: f64,
@@ -44,7 +44,7 @@ pub(super) struct Vehicle {
 
 /// Reads `recordingMeta`.
 pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
-    let mut table = Table::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
+    let mut table = CsvTable::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
     let frame_rate = table.column("frameRate")?;
     let upper_column = table.column(Direction::Upper.markings_column())?;
     let lower_column = table.column(Direction::Lower.markings_column())?;
@@ -97,12 +97,12 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
 }
 
-fn judge(table: &Table, column: Column, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
+fn judge(table: &CsvTable, column: CsvColumn, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
     let judged = doubts.judge(quantity, value, || table.field(column).to_string());
     judged.map_err(|problem| table.bad(column, problem, HELP))
 }
 
-fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
+fn yes_or_no(table: &CsvTable, column: CsvColumn) -> Result<bool> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "1" | "true" | "yes" => Ok(true),
         "" | "0" | "false" | "no" => Ok(false),
@@ -110,7 +110,7 @@ fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
     }
 }
 
-fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
+fn frames_per_second(table: &CsvTable, column: CsvColumn) -> Result<f64> {
     let frame_rate_hz = table.real(column)?;
     if FRAME_RATES_HZ.contains(&frame_rate_hz) {
         return Ok(frame_rate_hz);
@@ -137,7 +137,7 @@ const MARKINGS_HELP: &str =
     "give the y of the lane lines in metres from top to bottom, separated by semicolons, such as 8.51;12.59;16.43";
 
 /// The lane lines of one cell, from top to bottom; none for an empty cell.
-fn markings(table: &Table, column: Column) -> Result<Vec<f64>> {
+fn markings(table: &CsvTable, column: CsvColumn) -> Result<Vec<f64>> {
     let text = table.text(column)?;
     if text.is_empty() {
         return Ok(Vec::new());
@@ -167,10 +167,10 @@ pub(super) fn read_tracks_meta(
     files: &HighdFiles,
     recording: &RecordingMeta,
     doubts: &mut Doubts,
-) -> Result<(Vec<Vehicle>, FileChecksum)> {
-    let mut table = Table::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
+) -> Result<(Vec<VehicleMeta>, FileChecksum)> {
+    let mut table = CsvTable::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
     let columns = MetaColumns::of(&table)?;
-    let mut vehicles: Vec<(Vehicle, Place)> = Vec::new();
+    let mut vehicles: Vec<(VehicleMeta, Place)> = Vec::new();
     while table.next_row()? {
         let vehicle = columns.vehicle(&table, recording)?;
         judge(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
@@ -197,17 +197,17 @@ pub(super) fn read_tracks_meta(
 }
 
 struct MetaColumns {
-    id: Column,
-    length: Column,
-    width: Column,
-    class: Column,
-    direction: Column,
-    samples: Option<Column>,
-    first_and_last_frame: Option<(Column, Column)>,
+    id: CsvColumn,
+    length: CsvColumn,
+    width: CsvColumn,
+    class: CsvColumn,
+    direction: CsvColumn,
+    samples: Option<CsvColumn>,
+    first_and_last_frame: Option<(CsvColumn, CsvColumn)>,
 }
 
 impl MetaColumns {
-    fn of(table: &Table) -> Result<Self> {
+    fn of(table: &CsvTable) -> Result<Self> {
         Ok(MetaColumns {
             id: table.column("id")?,
             // The box belongs to the image: its width is the vehicle's length.
@@ -220,7 +220,7 @@ impl MetaColumns {
         })
     }
 
-    fn vehicle(&self, table: &Table, recording: &RecordingMeta) -> Result<Vehicle> {
+    fn vehicle(&self, table: &CsvTable, recording: &RecordingMeta) -> Result<VehicleMeta> {
         let id = table.integer(self.id)?;
         let id = u32::try_from(id).map_err(|_| {
             table.bad(self.id, format!("{id} is no vehicle id; expected 0 to {}", u32::MAX), "correct the id")
@@ -240,7 +240,7 @@ impl MetaColumns {
                 MARKINGS_HELP,
             )
         })?;
-        Ok(Vehicle {
+        Ok(VehicleMeta {
             id,
             class: class(table, self.class)?,
             length_m: table.positive(self.length)?,
@@ -252,7 +252,7 @@ impl MetaColumns {
     }
 
     /// Number of lines of the vehicle in `tracks`: as given, or from its first and last frame.
-    fn samples(&self, table: &Table) -> Result<Option<u64>> {
+    fn samples(&self, table: &CsvTable) -> Result<Option<u64>> {
         let (column, count) = match (self.samples, self.first_and_last_frame) {
             (Some(column), _) => (column, table.integer(column)?),
             (None, Some((first, last))) => {
@@ -270,7 +270,7 @@ impl MetaColumns {
 }
 
 /// highD has `Car` and `Truck`; names of related formats are accepted too.
-fn class(table: &Table, column: Column) -> Result<VehicleClass> {
+fn class(table: &CsvTable, column: CsvColumn) -> Result<VehicleClass> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "car" | "van" | "motorcycle" => Ok(VehicleClass::Car),
         "truck" | "bus" | "trailer" => Ok(VehicleClass::Truck),

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::columns::{Column, FileChecksum, Table};
+use super::columns::{CsvColumn, CsvTable, FileChecksum};
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
 use super::inventory::{HighdFiles, folder_of, made_up};
-use super::meta::{self, RecordingMeta, Vehicle};
+use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Result};
@@ -45,7 +45,7 @@ pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loade
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
-    let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let mut table = CsvTable::open(&files.tracks, &TRACKS_COLUMNS)?;
     let columns = TrackColumns::of(&table)?;
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
@@ -66,18 +66,18 @@ pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loade
 }
 
 struct TrackColumns {
-    frame: Column,
-    id: Column,
-    x: Column,
-    y: Column,
-    velocity_x: Column,
-    velocity_y: Column,
-    acceleration_x: Column,
-    lane: Option<Column>,
+    frame: CsvColumn,
+    id: CsvColumn,
+    x: CsvColumn,
+    y: CsvColumn,
+    velocity_x: CsvColumn,
+    velocity_y: CsvColumn,
+    acceleration_x: CsvColumn,
+    lane: Option<CsvColumn>,
 }
 
 impl TrackColumns {
-    fn of(table: &Table) -> Result<Self> {
+    fn of(table: &CsvTable) -> Result<Self> {
         let lane = match table.optional_column("laneId")? {
             // The geometry replaces an absent column, but not a misspelt one.
             None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
@@ -98,10 +98,10 @@ impl TrackColumns {
 
 /// Fills the empty tracks, one per vehicle, and returns those with samples, ascending by id.
 fn read_tracks(
-    table: &mut Table,
+    table: &mut CsvTable,
     columns: &TrackColumns,
     meta: &RecordingMeta,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleMeta],
     mut tracks: Vec<Track>,
     doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
@@ -131,14 +131,14 @@ fn read_tracks(
 
 /// Is the tracks file large enough for all samples that the meta file claims? A damaged meta file can claim any
 /// number.
-fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
+fn can_hold(tracks: &Path, vehicles: &[VehicleMeta]) -> bool {
     let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
     let bytes = std::fs::metadata(tracks).map_or(0, |file| file.len());
     announced <= bytes / MIN_ROW_BYTES
 }
 
 /// A track without samples; `reserve` allocates memory for the claimed ones.
-fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
+fn empty_track(vehicle: &VehicleMeta, reserve: bool) -> Track {
     let samples = if reserve { vehicle.samples.unwrap_or(0) as usize } else { 0 };
     Track {
         id: vehicle.id,
@@ -158,7 +158,7 @@ fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
 
 /// Index of the present line's vehicle. Lines are grouped by vehicle or by frame, so it is mostly the same or the
 /// next one.
-fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
+fn find_vehicle(table: &CsvTable, column: CsvColumn, vehicles: &[VehicleMeta], before: usize) -> Result<usize> {
     let id = table.integer(column)?;
     let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
     if is(before) {
@@ -177,10 +177,10 @@ fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usi
 }
 
 fn add_sample(
-    table: &Table,
+    table: &CsvTable,
     columns: &TrackColumns,
     meta: &RecordingMeta,
-    vehicle: &Vehicle,
+    vehicle: &VehicleMeta,
     track: &mut Track,
     doubts: &mut Doubts,
 ) -> Result<()> {
@@ -286,7 +286,7 @@ impl JudgedSample {
 #[cold]
 fn report(
     sample: &JudgedSample,
-    table: &Table,
+    table: &CsvTable,
     columns: &TrackColumns,
     track: &Track,
     doubts: &mut Doubts,
@@ -302,7 +302,7 @@ fn report(
 }
 
 /// The error for a frame that is not the one after the vehicle's last.
-fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
+fn out_of_step(table: &CsvTable, track: &Track, frame: i64) -> Error {
     let (first, last) = (track.first_frame, track.last_frame());
     let (problem, help) = if (first..=last).contains(&frame) {
         (
@@ -324,7 +324,7 @@ fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
 }
 
 /// Compares the number of lines per vehicle with the meta file, which detects truncated files.
-fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
+fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) -> Result<()> {
     let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
         Some(samples) => samples != track.len() as u64,
         None => track.is_empty(),
@@ -345,7 +345,7 @@ fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result
 }
 
 /// Warnings about usable data.
-fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
+fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track]) -> Vec<String> {
     let mut notes = Vec::new();
     if columns.lane.is_none() {
         notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());

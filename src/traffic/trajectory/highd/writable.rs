@@ -15,7 +15,7 @@ use crate::{Error, Place, Result};
 /// # Errors
 /// If the format cannot hold the recording, see [`write`](super::write).
 pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
-    let layout = Layout::of(recording, precision)?;
+    let layout = ImageLayout::of(recording, precision)?;
     let settle = |values: &mut [f64], to_file: &dyn Fn(f64) -> f64, from_file: &dyn Fn(f64) -> f64| {
         for value in values {
             // Twice is enough: fl(fl(a + h) − h) is a fixed point of its own repetition (Knuth, The Art of
@@ -49,7 +49,7 @@ pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
 }
 
 /// The image of a recording: the half of each carriageway, and its lane lines from top to bottom.
-pub(super) struct Layout {
+pub(super) struct ImageLayout {
     /// By index of the carriageway.
     pub directions: Vec<Direction>,
     /// y of the upper lane lines, rounded, ascending; empty without that carriageway.
@@ -60,14 +60,14 @@ pub(super) struct Layout {
     pub lane_numbers: LaneNumbers,
 }
 
-impl Layout {
+impl ImageLayout {
     /// The layout of a recording that the format can hold.
     ///
     /// # Errors
     /// The first reason why it cannot.
     pub fn of(recording: &Recording, precision: Precision) -> Result<Self> {
         check_frame(recording)?;
-        let mut layout = Layout {
+        let mut layout = ImageLayout {
             directions: Vec::new(),
             upper_y: Vec::new(),
             lower_y: Vec::new(),

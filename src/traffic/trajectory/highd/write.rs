@@ -9,7 +9,7 @@ use super::frame::Direction;
 use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
 use super::precision::{Precision, push_integer};
-use super::writable::Layout;
+use super::writable::ImageLayout;
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
@@ -72,7 +72,7 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
 /// # Errors
 /// As [`write`].
 pub(crate) fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
-    let layout = Layout::of(recording, info.precision)?;
+    let layout = ImageLayout::of(recording, info.precision)?;
     check_texts(info)?;
     fs::create_dir_all(dir).map_err(|source| Error::io(dir, "create the folder", source))?;
     let files = HighdFiles::named(dir, &recording.id);
@@ -98,7 +98,7 @@ fn check_texts(info: &RecordingInfo) -> Result<()> {
 
 struct Writer<'a> {
     recording: &'a Recording,
-    layout: Layout,
+    layout: ImageLayout,
     info: &'a RecordingInfo,
     extent: Extent,
 }
@@ -162,7 +162,7 @@ impl Writer<'_> {
         file.append(header(&TRACKS_COLUMNS).as_bytes())?;
         let around = neighbours(self.recording);
         let mut summaries = vec![Summary::default(); self.recording.tracks.len()];
-        let mut line = Line::new(self.info.precision);
+        let mut line = CsvLine::new(self.info.precision);
         for ((track, around), summary) in self.recording.tracks.iter().zip(&around).zip(&mut summaries) {
             for (sample, around) in around.iter().enumerate() {
                 let headways = self.headways(track, sample, around);
@@ -176,7 +176,7 @@ impl Writer<'_> {
         Ok((file.stage()?, summaries))
     }
 
-    fn track_line(&self, line: &mut Line, track: &Track, sample: usize, around: &Around, headways: &Headways) {
+    fn track_line(&self, line: &mut CsvLine, track: &Track, sample: usize, around: &Around, headways: &Headways) {
         let direction = self.direction(track);
         let (s_m, d_m) = (track.s_m[sample], track.d_m[sample]);
         line.integer(track.first_frame + sample as i64);
@@ -239,7 +239,7 @@ impl Writer<'_> {
     fn tracks_meta(&self, path: &Path, summaries: &[Summary]) -> Result<StagedFile> {
         let mut file = AtomicFile::create_inside(path)?;
         file.append(header(&TRACKS_META_COLUMNS).as_bytes())?;
-        let mut line = Line::new(self.info.precision);
+        let mut line = CsvLine::new(self.info.precision);
         for (track, summary) in self.recording.tracks.iter().zip(summaries) {
             line.integer(i64::from(track.id));
             line.measured(track.length_m);
@@ -272,7 +272,7 @@ impl Writer<'_> {
         let first = tracks.iter().map(|track| track.first_frame).min().unwrap_or(0);
         let last = tracks.iter().map(Track::last_frame).max().unwrap_or(0);
         let trucks = tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
-        let mut line = Line::new(self.info.precision);
+        let mut line = CsvLine::new(self.info.precision);
         // The format's id is a number; the file name identifies the recording.
         line.integer(id.parse::<u32>().map_or(1, i64::from));
         line.text(&frame_rate_hz.to_string());
@@ -309,15 +309,15 @@ fn driven_m(track: &Track) -> f64 {
 }
 
 /// One line of a file, written field by field into a reused buffer.
-struct Line {
+struct CsvLine {
     bytes: Vec<u8>,
     precision: Precision,
     ended: bool,
 }
 
-impl Line {
+impl CsvLine {
     fn new(precision: Precision) -> Self {
-        Line { bytes: Vec::with_capacity(256), precision, ended: true }
+        CsvLine { bytes: Vec::with_capacity(256), precision, ended: true }
     }
 
     /// The buffer at the next field.

@@ -2,10 +2,10 @@
 //! and the lane records that begin with these numbers.
 
 use super::decision::{HEADWAYS, Threshold};
-use super::draw::{Draw, Purpose};
-use super::series::{Across, Series, TINY, rounded};
+use super::draw::{CaseRandom, Purpose};
+use super::series::{LateralStart, TINY, ThresholdSeries, rounded};
 use super::solve::{hit, next_other, turn};
-use crate::engine::{Constants, LaneCase, LaneOther, NO_STEP, Start};
+use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP, Start};
 use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::model::driver::{DriverModel, MODELS, View};
 use crate::model::flag::Flag;
@@ -20,13 +20,13 @@ const TRIES: usize = 64;
 const FAR: f32 = 600.0;
 
 /// Cases of all units.
-pub(super) struct Scenes {
+pub(super) struct ThresholdCases {
     seed: u64,
     profile: Profile,
     categories: Vec<Category>,
     /// One per category.
     constants: Vec<Constants<f32>>,
-    series: Series,
+    series: ThresholdSeries,
 }
 
 /// The first step of a lane, with the data of later ones.
@@ -49,35 +49,37 @@ struct FirstStep {
     pairing: u64,
 }
 
-impl Scenes {
-    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> Scenes {
-        Scenes {
+impl CaseSource for ThresholdCases {
+    /// A pure function of seed, category, unit and side.
+    fn case(&self, block: usize, unit: u64, side: usize) -> LaneCase<f64> {
+        let draw = |attempt| CaseRandom::new(Purpose::Threshold, self.seed, self.categories[block], unit, attempt);
+        let exact = (0..TRIES).find_map(|attempt| {
+            let cases = self.cases(&mut draw(attempt), block, unit)?;
+            let offsets = cases.map(|first_step| self.gap_offset(&first_step, block));
+            offsets.iter().all(Option::is_some).then_some(())?;
+            Some(self.record(&cases[side], offsets[side]?))
+        });
+        // Without an exact solution the unit is still an ordinary lane.
+        exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, LateralStart::Ahead), 10.0))
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.series.tables
+    }
+}
+
+impl ThresholdCases {
+    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> ThresholdCases {
+        ThresholdCases {
             seed,
             profile: profile.clone(),
             categories: categories.to_vec(),
             constants: categories.iter().map(|&c| Constants::resolve(profile, c)).collect(),
-            series: Series::new(seed, profile.frame.dt_s),
+            series: ThresholdSeries::new(seed, profile.frame.dt_s),
         }
     }
 
-    pub fn tables(&self) -> &Tables<f64> {
-        &self.series.tables
-    }
-
-    /// A pure function of seed, category, unit and side.
-    pub fn case(&self, block: usize, unit: u64, side: usize) -> LaneCase<f64> {
-        let draw = |attempt| Draw::new(Purpose::Threshold, self.seed, self.categories[block], unit, attempt);
-        let exact = (0..TRIES).find_map(|attempt| {
-            let scenes = self.scenes(&mut draw(attempt), block, unit)?;
-            let offsets = scenes.map(|scene| self.gap_offset(&scene, block));
-            offsets.iter().all(Option::is_some).then_some(())?;
-            Some(self.record(&scenes[side], offsets[side]?))
-        });
-        // Without an exact solution the unit is still an ordinary lane.
-        exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, Across::Ahead), 10.0))
-    }
-
-    fn base(&self, draw: &mut Draw, unit: u64, across: Across) -> FirstStep {
+    fn base(&self, draw: &mut CaseRandom, unit: u64, across: LateralStart) -> FirstStep {
         let turn = unit / Threshold::ALL.len() as u64;
         let motion = self.series.motion(draw, (turn % 4) as u32, across);
         let v_other = motion.cast::<f32>().speed(&self.series.lane_tables, 0);
@@ -100,19 +102,19 @@ impl Scenes {
     }
 
     /// The case on its threshold and its two neighbours; `None` if these numbers have no exact solution.
-    fn scenes(&self, draw: &mut Draw, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
+    fn cases(&self, draw: &mut CaseRandom, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
         let threshold = Threshold::of_unit(unit);
         let across = match threshold {
             Threshold::Reg157Gate | Threshold::CchdmGate | Threshold::RssLateral => {
-                [Across::Coming, Across::Beside][draw.below(2)]
+                [LateralStart::Coming, LateralStart::Beside][draw.below(2)]
             }
-            Threshold::LateralGap | Threshold::EgoWidth => [Across::Coming, Across::Beside][draw.below(2)],
-            Threshold::FsmGate | Threshold::LateralEvent => Across::Coming,
-            Threshold::LateralSpeed => Across::Beside,
-            Threshold::Centres => [Across::Ahead, Across::Beside][draw.below(2)],
-            _ => Across::Ahead,
+            Threshold::LateralGap | Threshold::EgoWidth => [LateralStart::Coming, LateralStart::Beside][draw.below(2)],
+            Threshold::FsmGate | Threshold::LateralEvent => LateralStart::Coming,
+            Threshold::LateralSpeed => LateralStart::Beside,
+            Threshold::Centres => [LateralStart::Ahead, LateralStart::Beside][draw.below(2)],
+            _ => LateralStart::Ahead,
         };
-        let scene = self.base(draw, unit, across);
+        let first_step = self.base(draw, unit, across);
         match threshold {
             Threshold::Attention
             | Threshold::Appearance
@@ -120,25 +122,31 @@ impl Scenes {
             | Threshold::SpeedEvent
             | Threshold::LateralEvent
             | Threshold::Horizon
-            | Threshold::StepCap => self.in_time(draw, block, threshold, scene),
+            | Threshold::StepCap => self.in_time(draw, block, threshold, first_step),
             Threshold::Reg157Gate
             | Threshold::CchdmGate
             | Threshold::RssLateral
             | Threshold::LateralSpeed
             | Threshold::LateralGap
-            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, scene),
-            _ => self.along_the_road(draw, block, threshold, scene),
+            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, first_step),
+            _ => self.along_the_road(draw, block, threshold, first_step),
         }
     }
 
     /// Thresholds that are reached by the gap or the ego's speed.
-    fn along_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
+    fn along_the_road(
+        &self,
+        draw: &mut CaseRandom,
+        block: usize,
+        on: Threshold,
+        mut s: FirstStep,
+    ) -> Option<[FirstStep; 3]> {
         let constants = &self.constants[block];
         let criteria = &constants.criteria;
         let dv = s.v_ego - s.v_other;
         // The smallest relevant gap: centres side by side.
         let nearest = -s.half_lengths;
-        let signed = |draw: &mut Draw, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
+        let signed = |draw: &mut CaseRandom, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
         let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv, true);
         let fsm = &constants.fsm;
         s.gap = match on {
@@ -231,7 +239,7 @@ impl Scenes {
     /// Thresholds that are reached by a width or a lateral speed.
     fn across_the_road(
         &self,
-        draw: &mut Draw,
+        draw: &mut CaseRandom,
         block: usize,
         on: Threshold,
         mut s: FirstStep,
@@ -281,7 +289,7 @@ impl Scenes {
     }
 
     /// Thresholds that are reached by a step index.
-    fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
+    fn in_time(&self, draw: &mut CaseRandom, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
         let (dt, dt_s) = (self.constants[block].frames[0].dt, self.profile.frame.dt_s);
         let dv = s.v_ego - s.v_other;
         let step = 1 + draw.below(5) as u32;

@@ -4,7 +4,7 @@ use crate::traffic::trajectory::Recording;
 
 /// One vehicle at one frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbour {
+pub(super) struct VehicleAtFrame {
     /// Centre along the road, m.
     pub s_m: f64,
     /// Index into [`Recording::tracks`].
@@ -14,16 +14,16 @@ pub(super) struct Neighbour {
 }
 
 /// The vehicles of one carriageway at every frame, ascending by position along the road.
-pub(super) struct Neighbours {
+pub(super) struct FrameIndex {
     /// First slot of each track of the recording (unused for tracks of other carriageways). A track has
     /// no gaps, so its sample `k` is in slot `base + k`.
     base: Vec<usize>,
     /// Begin of each slot's entries; one more than the number of slots.
     begin: Vec<usize>,
-    entries: Vec<Neighbour>,
+    entries: Vec<VehicleAtFrame>,
 }
 
-impl Neighbours {
+impl FrameIndex {
     /// Sorts the tracks of a carriageway by frame and position. Memory is proportional to the samples, for any
     /// distance of the frame numbers.
     pub fn new(recording: &Recording, carriageway: usize) -> Self {
@@ -54,23 +54,23 @@ impl Neighbours {
             begin[slot + 1] += begin[slot];
         }
         let mut fill = begin.clone();
-        let mut entries = vec![Neighbour { s_m: 0.0, track: 0, sample: 0 }; begin[slots]];
+        let mut entries = vec![VehicleAtFrame { s_m: 0.0, track: 0, sample: 0 }; begin[slots]];
         for &i in &order {
             for (k, &s_m) in tracks[i].s_m.iter().enumerate() {
                 let slot = base[i] + k;
-                entries[fill[slot]] = Neighbour { s_m, track: i as u32, sample: k as u32 };
+                entries[fill[slot]] = VehicleAtFrame { s_m, track: i as u32, sample: k as u32 };
                 fill[slot] += 1;
             }
         }
         for slot in 0..slots {
             entries[begin[slot]..begin[slot + 1]].sort_by(|a, b| a.s_m.total_cmp(&b.s_m).then(a.track.cmp(&b.track)));
         }
-        Neighbours { base, begin, entries }
+        FrameIndex { base, begin, entries }
     }
 
     /// All vehicles on the carriageway at sample `k` of the track with index `track`, that vehicle included, whose
     /// centre is ahead of `s_m` and at most at `s_max_m`; nearest first.
-    pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &Neighbour> {
+    pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &VehicleAtFrame> {
         let slot = self.base[track] + k;
         let entries = &self.entries[self.begin[slot]..self.begin[slot + 1]];
         let from = entries.partition_point(|n| n.s_m <= s_m);
@@ -117,7 +117,7 @@ mod tests {
                 track(5, (1 << 60) + 1, vec![7.0]),
             ],
         };
-        let neighbours = Neighbours::new(&recording, 0);
+        let neighbours = FrameIndex::new(&recording, 0);
         let ids = |track: usize, k: usize, s: f64, max: f64| -> Vec<u32> {
             neighbours.ahead(track, k, s, max).map(|n| recording.tracks[n.track as usize].id).collect()
         };
