@@ -121,8 +121,7 @@ impl<'a> Seen<'a> {
         let visible = match &self.visible {
             Ok(visible) => visible.as_deref(),
             Err(_) => {
-                return "--backend auto takes nothing: the environment cannot be understood (see the error)."
-                    .to_owned();
+                return "--backend auto selects no device: the environment is invalid (see the error).".to_owned();
             }
         };
         let real = self.cards.iter().filter(|card| card.is_real()).count();
@@ -131,10 +130,10 @@ impl<'a> Seen<'a> {
             Some(card) => {
                 let why = match (visible, real - hidden) {
                     (_, 1) => "the only GPU",
-                    (Some(_), _) => "the first that the environment allows",
+                    (Some(_), _) => "the first one that the environment allows",
                     (None, _) => "the first GPU, discrete before virtual before integrated",
                 };
-                format!("--backend auto takes {}: {why}.", card.one_line())
+                format!("--backend auto selects {}: {why}.", card.one_line())
             }
             None => {
                 let why = match (real, hidden, self.cards.first()) {
@@ -142,7 +141,7 @@ impl<'a> Seen<'a> {
                     (0, _, Some(_)) => "no GPU; other devices are used only when --device names one",
                     _ => "the environment hides every GPU",
                 };
-                format!("--backend auto takes the processor: {why}.")
+                format!("--backend auto selects the CPU: {why}.")
             }
         };
         if let Some(visible) = visible {
@@ -157,7 +156,7 @@ impl<'a> Seen<'a> {
             );
             let shown = |bus: &String| self.cards.iter().any(|card| card.pci_bus_id.as_ref() == Some(bus));
             for bus in visible.iter().filter(|bus| !shown(bus)) {
-                let _ = write!(text, "\nNo driver shows pci:{bus} here: a driver for CUDA alone brings no Vulkan.");
+                let _ = write!(text, "\nNo driver shows pci:{bus} here: a CUDA driver alone does not include Vulkan.");
             }
         }
         text
@@ -182,9 +181,8 @@ impl<'a> Seen<'a> {
     }
 }
 
-const LEGEND: &str =
-    "limits: largest buffer; largest part of one that a shader sees; workgroups along an axis; lanes in a workgroup.
-exact: the shader reaches the driver with every rounding pinned, so results can equal the processor's bit for bit;
+const LEGEND: &str = "limits: maximum buffer; maximum buffer binding; workgroups along an axis; lanes in a workgroup.
+exact: no float operation may be contracted or reordered, so results equal the CPU's bit for bit;
 elsewhere the self-check decides. self-check: random lanes and lanes on thresholds, word for word.
 timing: the device can time its own work.
 ";

@@ -298,7 +298,7 @@ fn duplicates_disorder_and_gaps_in_a_vehicles_frames_are_told_apart() {
     let with = |more: [&'static str; 2]| [place.as_slice(), more.as_slice()].concat();
     refused(
         |t| t.tracks = with_field(&t.tracks, 5, "frame", "3"),
-        &with(["line 5", "frame 3 of this vehicle is there twice"]),
+        &with(["line 5", "frame 3 of this vehicle occurs twice"]),
     );
     refused(|t| t.tracks = with_field(&t.tracks, 5, "frame", "0"), &with(["line 5", "out of order"]));
     refused(|t| t.tracks = without_line(&t.tracks, 5), &with(["line 5", "gap"]));

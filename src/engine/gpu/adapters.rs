@@ -219,7 +219,7 @@ impl Adapters {
     /// [`Error::Internal`] if there is no card with this index.
     pub fn take(&self, index: usize) -> Result<wgpu::Adapter> {
         let adapter = self.adapters.get(index).cloned();
-        adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was asked for", self.adapters.len())))
+        adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was requested", self.adapters.len())))
     }
 }
 

@@ -48,7 +48,7 @@ fn first_real<'a>(cards: &'a [AdapterCard], visible: Option<&[String]>) -> Optio
 fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[String]>) -> Result<&'a AdapterCard> {
     let all = matching(cards, device);
     let Some(&any) = all.first() else {
-        let problem = format!("no device of this machine is meant by `{device}`");
+        let problem = format!("no device of this machine matches `{device}`");
         return Err(Error::usage(Place::item("--device"), problem, list(cards.iter())));
     };
     let usable: Vec<&AdapterCard> = all.iter().copied().filter(|card| !card.is_hidden_by(visible)).collect();
@@ -64,7 +64,7 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[St
         ));
     };
     if usable.iter().any(|card| !same_device(first, card)) {
-        let problem = format!("`{device}` means more than one device");
+        let problem = format!("`{device}` matches more than one device");
         return Err(Error::usage(Place::item("--device"), problem, list(usable.into_iter())));
     }
     Ok(first)
@@ -114,8 +114,8 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
         };
         return Error::device(
             "--backend gpu",
-            "this machine has no GPU that its drivers show",
-            format!("`lanesweep verify devices` shows what there is; use --backend cpu{named}"),
+            "the drivers of this machine show no GPU",
+            format!("`lanesweep verify devices` lists all devices; use --backend cpu{named}"),
         );
     }
     Error::device(

@@ -257,7 +257,7 @@ impl Device {
         let limits = self.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes.len() as u64 > most {
-            let problem = format!("the {label} take {} bytes, and it can hold {most} at once", bytes.len());
+            let problem = format!("the {label} take {} bytes, but the device holds at most {most}", bytes.len());
             return Err(Error::device(&self.name, problem, "use --backend cpu, or split the data"));
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;

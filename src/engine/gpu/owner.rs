@@ -103,7 +103,7 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "it is closed, or its driver failed and took its thread along", "use --backend cpu")
+    Error::device(device, "it is closed, or its driver failed and ended its thread", "use --backend cpu")
 }
 
 struct DeviceOwner {
@@ -248,7 +248,7 @@ impl DeviceOwner {
     fn alive(&self) -> Result<()> {
         match &self.dead {
             None => Ok(()),
-            Some(why) => Err(self.device.failed(format!("it failed before ({why})"))),
+            Some(why) => Err(self.device.failed(format!("it failed earlier ({why})"))),
         }
     }
 
@@ -262,7 +262,7 @@ impl DeviceOwner {
                     self.device.device.destroy();
                     Ok(())
                 }
-                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory left for this job")),
+                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory for this job")),
             },
             _ => Ok(()),
         }

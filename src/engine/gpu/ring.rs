@@ -214,7 +214,9 @@ impl Slot {
             timeout: Some(device.options.timeout),
         };
         device.device.poll(wait).map_err(|error| match error {
-            wgpu::PollError::Timeout => device.failed(format!("it gave no answer for {:?}", device.options.timeout)),
+            wgpu::PollError::Timeout => {
+                device.failed(format!("it did not respond within {:?}", device.options.timeout))
+            }
             error => device.failed(error.to_string()),
         })?;
         device.untroubled()?;
@@ -223,7 +225,7 @@ impl Slot {
         let wall_s = began.elapsed().as_secs_f64();
         let mapped = flight.mapped.recv_timeout(device.options.timeout);
         mapped
-            .map_err(|_| device.failed("its results did not come back"))?
+            .map_err(|_| device.failed("its results were not returned"))?
             .map_err(|e| device.failed(e.to_string()))?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let answer = {
@@ -293,8 +295,8 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let (done, cells) = counts.split_at(models);
     if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
         let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
-        let problem = format!("it computed {} of {lanes} lanes of {name} to their end", done[model]);
-        let help = "use --backend cpu; where lanes have very many steps, a larger time step (--dt) may do as well";
+        let problem = format!("it completed {} of {lanes} lanes of {name}", done[model]);
+        let help = "use --backend cpu; if lanes have very many steps, a larger time step (--dt) may help";
         return Err(Error::device(&device.name, problem, help));
     }
     let per_model = |part: &[u8], model: usize| {

@@ -58,7 +58,7 @@ impl<'p> GpuSession<'p> {
             pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));
         }
         if pipelines.is_empty() {
-            return Err(Error::Internal("a plan without lanes has nothing to do on a device".to_owned()));
+            return Err(Error::Internal("a plan without lanes cannot run on a device".to_owned()));
         }
         let setup = Box::new(Setup {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
@@ -86,7 +86,7 @@ impl<'p> GpuSession<'p> {
         let per_unit = variants * plan.headways.len() as u64;
         let most = self.max_lanes(wanted);
         if per_unit > most || variants > self.prepared.max_cases {
-            let problem = format!("one scenario has {per_unit} lanes per model, and it can hold {most} at once");
+            let problem = format!("one scenario has {per_unit} lanes per model, but the device holds at most {most}");
             return Err(Error::device(&self.device, problem, "use --backend cpu, or fewer headways"));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
@@ -156,7 +156,7 @@ impl<'p> GpuSession<'p> {
                     .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
                     .collect();
                 let outcomes = outcomes
-                    .ok_or_else(|| Error::device(&self.device, "it left a lane unwritten", "use --backend cpu"))?;
+                    .ok_or_else(|| Error::device(&self.device, "it did not write a lane", "use --backend cpu"))?;
                 // Pieces come in the plan's order.
                 chunk.outcomes.extend(outcomes);
             }

@@ -110,7 +110,10 @@ impl ParameterizationId {
         options: &ParameterizationOptions,
     ) -> Result<Case> {
         if self.kind != Kind::Kinematic || scenario.category != self.category {
-            return Err(Error::Internal(format!("{} is no kinematic parameterization of {}", self.key, scenario.id)));
+            return Err(Error::Internal(format!(
+                "{} is not a kinematic parameterization of {}",
+                self.key, scenario.id
+            )));
         }
         let sizes = Sizes::of(scenario);
         match self.category {

@@ -266,8 +266,8 @@ impl CsvTable {
         match error.into_kind() {
             csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
                 Place::file(&self.path).row(self.last_line + 1),
-                format!("no line ends here within {} MiB, nor a quotation mark", MAX_LINE_BYTES >> 20),
-                "remove a quotation mark that is not closed; or copy or export the file again",
+                format!("neither line nor quotation ends here within {} MiB", MAX_LINE_BYTES >> 20),
+                "remove an open quotation mark, or copy or export the file again",
             ),
             csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
             // Only reading can fail: bytes are not decoded, and the number of fields is free.
@@ -297,7 +297,7 @@ impl CsvTable {
         if strange.is_empty() {
             return String::new();
         }
-        format!("; the header has names that the format does not have: {}", list(&strange))
+        format!("; the header has names that are not part of the format: {}", list(&strange))
     }
 
     fn check_header(&self) -> Result<()> {

@@ -48,8 +48,8 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
     let unfinished = crate::support::run_dir::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
-        let problem = "`lanesweep synth` ended here before all of its recordings had their names: it is no data set";
-        let help = "give that command again, which completes the folder, or remove the folder";
+        let problem = "`lanesweep synth` did not finish here, so recordings are missing";
+        let help = "repeat that command, which completes the folder, or remove the folder";
         return Err(Error::input(Place::file(dir), problem, help));
     }
     let mut inventory = Inventory { recordings: Vec::new(), problems: Vec::new() };

@@ -84,7 +84,7 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     if table.next_row()? {
         return Err(Error::input(
             table.place(),
-            "a second line; expected only one, for this recording",
+            "a second line; expected one line for this recording",
             "keep the line of this recording and remove the others",
         ));
     }
@@ -118,7 +118,7 @@ fn frames_per_second(table: &CsvTable, column: CsvColumn) -> Result<f64> {
     let (least, most) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
     Err(table.bad(
         column,
-        format!("{} is no frame rate; expected between {least} and {most} frames per second", table.shown(column)),
+        format!("{} is not a frame rate; expected between {least} and {most} frames per second", table.shown(column)),
         "give the number of frames per second (highD: 25)",
     ))
 }
@@ -190,7 +190,7 @@ pub(super) fn read_tracks_meta(
         return Err(Error::input(
             place.clone().column("id").of(format!("vehicle {}", vehicle.id)),
             "an earlier line has the same id; expected one line per vehicle",
-            "remove the surplus line, or give the vehicle an id of its own in both files",
+            "remove the surplus line, or give the vehicle its own id in both files",
         ));
     }
     Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()))
@@ -223,13 +223,13 @@ impl MetaColumns {
     fn vehicle(&self, table: &CsvTable, recording: &RecordingMeta) -> Result<VehicleMeta> {
         let id = table.integer(self.id)?;
         let id = u32::try_from(id).map_err(|_| {
-            table.bad(self.id, format!("{id} is no vehicle id; expected 0 to {}", u32::MAX), "correct the id")
+            table.bad(self.id, format!("{id} is not a vehicle id; expected 0 to {}", u32::MAX), "correct the id")
         })?;
         let direction = Direction::from_number(table.integer(self.direction)?).ok_or_else(|| {
             let found = table.shown(self.direction);
             table.bad(
                 self.direction,
-                format!("{found} is no driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
+                format!("{found} is not a driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
                 "correct the value",
             )
         })?;
@@ -276,7 +276,7 @@ fn class(table: &CsvTable, column: CsvColumn) -> Result<VehicleClass> {
         "truck" | "bus" | "trailer" => Ok(VehicleClass::Truck),
         _ => Err(table.bad(
             column,
-            format!("{} is no known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
+            format!("{} is not a known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
             "write `Car` or `Truck`",
         )),
     }

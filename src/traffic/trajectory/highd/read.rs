@@ -203,7 +203,7 @@ fn add_sample(
         return Err(table.bad(
             columns.velocity_x,
             format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", vehicle.id),
-            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s is taken as 0)",
+            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s counts as 0)",
         ));
     }
     let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
@@ -306,8 +306,8 @@ fn out_of_step(table: &CsvTable, track: &Track, frame: i64) -> Error {
     let (first, last) = (track.first_frame, track.last_frame());
     let (problem, help) = if (first..=last).contains(&frame) {
         (
-            format!("frame {frame} of this vehicle is there twice"),
-            "remove one of the two lines, or give the second vehicle an id of its own",
+            format!("frame {frame} of this vehicle occurs twice"),
+            "remove one of the two lines, or give the second vehicle its own id",
         )
     } else if frame < first {
         (
@@ -317,7 +317,7 @@ fn out_of_step(table: &CsvTable, track: &Track, frame: i64) -> Error {
     } else {
         (
             format!("a gap, or the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
-            "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
+            "sort the lines by id and frame; if a track has a gap, give each part its own id",
         )
     };
     Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
@@ -332,7 +332,7 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
     let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
     let (found, more) = (track.len() as u64, mismatches.count());
     let expected = match vehicle.samples {
-        Some(samples) => format!("the tracksMeta file announces {samples}"),
+        Some(samples) => format!("the tracksMeta file claims {samples}"),
         None => "it is in the tracksMeta file".to_owned(),
     };
     let more = if more == 0 { String::new() } else { format!(" ({more} more vehicles do not fit either)") };
@@ -351,7 +351,7 @@ fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track]) -> 
         notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
     }
     if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
-        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file would not be noticed".to_owned());
+        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file cannot be detected".to_owned());
     }
     let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
         let mut affected = tracks.iter().filter(|track| applies(track));

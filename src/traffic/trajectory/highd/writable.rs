@@ -76,7 +76,7 @@ impl ImageLayout {
         for carriageway in &recording.carriageways {
             let bad = |problem: &str, help: &str| {
                 let item = format!("recording {}, carriageway `{}`", recording.id, carriageway.name);
-                Error::input(Place::item(item), format!("{problem}; highD files cannot hold it"), help)
+                Error::input(Place::item(item), format!("{problem}; highD files cannot represent it"), help)
             };
             let direction = Direction::BOTH
                 .into_iter()
@@ -146,7 +146,7 @@ fn check_frame(recording: &Recording) -> Result<()> {
         return bad("the frame rate is out of range", "use a rate between 0.01 and 10000 frames per second");
     }
     if recording.carriageways.is_empty() || recording.tracks.is_empty() {
-        return bad("no carriageway or no vehicle; highD files cannot hold it", "add at least one of each");
+        return bad("no carriageway or no vehicle; highD files cannot represent it", "add at least one of each");
     }
     if recording.tracks.array_windows().any(|[a, b]| a.id >= b.id) {
         return bad("the vehicles are not sorted by id, or two have the same", "sort them, each with its own id");
@@ -158,7 +158,11 @@ fn check_tracks(recording: &Recording, precision: Precision) -> Result<()> {
     for track in &recording.tracks {
         if let Some(problem) = track_problem(track, recording, precision) {
             let place = Place::item(format!("recording {}, vehicle {}", recording.id, track.id));
-            return Err(Error::input(place, format!("{problem}; highD files cannot hold it"), "correct the recording"));
+            return Err(Error::input(
+                place,
+                format!("{problem}; highD files cannot represent it"),
+                "correct the recording",
+            ));
         }
     }
     Ok(())
@@ -168,7 +172,7 @@ fn track_problem(track: &Track, recording: &Recording, precision: Precision) -> 
     let series = [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2];
     let size_is_good = |size: f64| in_range(size) && precision.rounded(size) > 0.0;
     if track.carriageway >= recording.carriageways.len() {
-        Some("it drives on a carriageway that is not there")
+        Some("it drives on a carriageway that does not exist")
     } else if !size_is_good(track.length_m) || !size_is_good(track.width_m) {
         Some("its size is not above zero")
     } else if track.is_empty() || track.lane.len() != track.len() || series.iter().any(|s| s.len() != track.len()) {
