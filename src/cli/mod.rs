@@ -194,7 +194,7 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MAX_THREADS).contains(threads)) {
         let problem = format!("{threads} threads are out of range");
-        let help = format!("use 1 to {MAX_THREADS}; more threads than cores bring no gain");
+        let help = format!("use at least 1 and at most {MAX_THREADS}; more threads than cores bring no gain");
         return Err(Error::usage(Place::item("--threads"), problem, help));
     }
     start_threads(cli.common.threads)?;
