@@ -303,7 +303,7 @@ mod tests {
     fn an_environment_that_is_not_understood_still_shows_the_devices() {
         let error = || Err(Error::usage(Place::item("CUDA_VISIBLE_DEVICES"), "there is no GPU 9", "unset it"));
         let text = text(&node(), error());
-        assert!(text.contains(A) && text.contains("--backend auto takes nothing"), "{text}");
+        assert!(text.contains(A) && text.contains("--backend auto selects no device"), "{text}");
         let nodes = node();
         let json = Seen::new(&nodes, error()).json(&|_| "-".to_owned()).unwrap();
         let seen: serde_json::Value = serde_json::from_str(&json).unwrap();

@@ -231,7 +231,7 @@ mod tests {
             assert_eq!(auto(cards, Some(&ids(&[A]))), None);
             let error = choose(cards, BackendChoice::Gpu, None, None).unwrap_err();
             assert!(matches!(error, Error::Device { .. }), "{error}");
-            assert!(says(error).contains("this machine has no GPU"));
+            assert!(says(error).contains("this machine show no GPU"));
         }
         let software = software_only();
         for device in ["0", "llvmpipe", "LLVMPIPE (llvm"] {
