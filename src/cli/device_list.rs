@@ -273,13 +273,16 @@ mod tests {
         let text = text(&node(), Ok(None));
         assert!(text.contains(A) && text.contains(B), "{text}");
         assert!(text.contains("binding 2 GiB") && text.contains("buffer 16 EiB"), "{text}");
-        assert!(text.contains("--backend auto takes 0: NVIDIA H200 NVL"), "{text}");
+        assert!(text.contains("--backend auto selects 0: NVIDIA H200 NVL"), "{text}");
     }
 
     #[test]
     fn what_the_environment_hides_is_said() {
         let one = text(&node(), allowed(&[B]));
-        assert!(one.contains("auto takes 1: NVIDIA H200 (discrete, Vulkan, pci:0000:65:00.0): the only GPU"), "{one}");
+        assert!(
+            one.contains("auto selects 1: NVIDIA H200 (discrete, Vulkan, pci:0000:65:00.0): the only GPU"),
+            "{one}"
+        );
         assert!(one.contains("allows pci:0000:65:00.0; hidden: 1 of 2 GPUs"), "{one}");
         assert_eq!(one.matches("hidden ").count(), 1, "one row is marked: {one}");
         let none = text(&node(), allowed(&[]));
