@@ -4,10 +4,10 @@
 //! The first variable that is set decides:
 //!
 //! 1. `CUDA_VISIBLE_DEVICES`: entries have CUDA's numbering. Inside a device cgroup Slurm renumbers them from 0; CUDA
-//! numbers only the GPUs that it can open, and so does this. It has priority over Slurm's variables, because task
-//! binding and users narrow it. 2. `SLURM_STEP_GPUS`, then `SLURM_JOB_GPUS`: numbers of the node, never renumbered.
-//! They are the numbers of the device files (`/dev/nvidia3` is 3, `Device Minor`), which may differ from the order on
-//! the bus.
+//!    numbers only the GPUs that it can open, and so does this. It has priority over Slurm's variables, because task
+//!    binding and users narrow it.
+//! 2. `SLURM_STEP_GPUS`, then `SLURM_JOB_GPUS`: numbers of the node, never renumbered. They are the numbers of the
+//!    device files (`/dev/nvidia3` is 3, `Device Minor`), which may differ from the order on the bus.
 //!
 //! CUDA's indices follow the PCI bus here, as those of nvidia-smi and Slurm do. CUDA itself does so with
 //! `CUDA_DEVICE_ORDER=PCI_BUS_ID`; by default (`FASTEST_FIRST`) the fastest model is first, which other programs
