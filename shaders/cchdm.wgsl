@@ -18,8 +18,8 @@ fn initial() -> DriverState {
     return DriverState(driver_coasting, driver_delay_steps);
 }
 
-// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver goes on braking below the other's speed
-// until the opening gap exceeds 2 s of |dv|.
+// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver continues braking below the other's speed until
+// the opening gap exceeds 2 s of |dv|.
 fn check(view: View) -> Hazard {
     let dv = closing(view);
     let near = view.lateral_gap <= driver_lateral_gate;

@@ -71,8 +71,8 @@ fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> f32 {
     return value;
 }
 
-// Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or while it
-// needs longer to come in than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
+// Lateral gate, only for h > 0: closed while the other vehicle moves away, is faster, or needs more time to enter
+// than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
 fn gate_is_open(view: View) -> bool {
     let dv = closing(view);
     let w = view.lateral_towards;
@@ -96,7 +96,7 @@ fn check(view: View) -> Hazard {
     return Hazard(!is_behind(view) & surrogate & gate_is_open(view), demand);
 }
 
-// Hold the speed for τ, then the demand: reached with 12.65 m/s³ upwards, at once downwards.
+// Keep the speed for τ, then apply the demand: increases are limited to 12.65 m/s³, decreases act at once.
 fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
     let ramp = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
     return latched_braking(state, 0.0, smaller(ramp, hazard.demand), v_ego);

@@ -1,5 +1,5 @@
-// The entry of the generator: one invocation makes the case of one sample, with its series, for all lanes of the
-// sample that run afterwards.
+// Entry point of the generator: one invocation makes the case of one sample, with its series, for all later lanes of
+// that sample.
 
 struct Generation {
     // First sample index of this dispatch.
@@ -16,7 +16,7 @@ struct Generation {
     components: u32,
     // 1 where components have weights.
     weighted: u32,
-    // Places in `numbers`: the basis of a reduction begins at 0.
+    // Offsets in `numbers`; the basis of a reduction begins at 0.
     first_mean: u32,
     first_factor: u32,
     first_factor_of: u32,

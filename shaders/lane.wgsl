@@ -1,4 +1,4 @@
-// The entry: bindings and the way from an invocation to its lane. Everything else is a pure function.
+// Entry point: bindings, and the lane of an invocation. All other functions are pure.
 //
 // Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion.
 
@@ -19,14 +19,14 @@ fn lanes(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) inside: u32,
 ) {
-    // Two dimensions, because one ends at 65,535 workgroups.
+    // Two dimensions, because one dimension is limited to 65,535 workgroups.
     let lane = (group.y * groups.x + group.x) * WORKGROUP + inside;
     if lane >= launch.lanes {
         return;
     }
     let at = lane / launch.headways;
     let record = run_lane(cases[launch.first_case + at], starts[lane - at * launch.headways]);
-    // Tells the host that this device computed every lane, to its end.
+    // The host checks this counter: the device must compute every lane to its end.
     if (record.word >> 8u) != END_NOT_YET {
         atomicAdd(&counts[launch.done_word], 1u);
     }

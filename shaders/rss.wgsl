@@ -51,7 +51,7 @@ fn check(view: View) -> Hazard {
     return Hazard(!is_behind(view) & close & beside, driver_max_deceleration);
 }
 
-// Hold the speed for ρ, then ramp from 0 at 12.65 m/s³ up to 0.774 g.
+// Keep the speed for ρ, then ramp from 0 at 12.65 m/s³ up to 0.774 g.
 fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
     let braking = smaller(state.deceleration + driver_jerk_per_step, hazard.demand);
     return latched_braking(state, 0.0, braking, v_ego);

@@ -1,4 +1,4 @@
-// When a driver may react to a vehicle, as far as that depends on the vehicle's own motion: twin of
+// First step at which a driver may react, from the other vehicle's motion alone: twin of
 // src/model/driver/attention.rs.
 
 const NEVER: u32 = 0xffffffffu;
@@ -8,10 +8,10 @@ const ATTENTION_VISIBLE_MOVEMENT: u32 = 1u;
 const ATTENTION_WANDERING: u32 = 2u;
 const ATTENTION_DECELERATION: u32 = 3u;
 
-// Lateral movement per step from which on a vehicle moves, m.
+// A vehicle moves laterally above this change per step, m.
 const MOVEMENT: f32 = 1e-9f;
 
-// What has to be seen of the principal vehicle before a driver may react.
+// Condition on the principal vehicle's motion before a driver may react.
 struct AttentionRule {
     kind: u32,
     delay_steps: u32,
@@ -48,7 +48,7 @@ fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion
             happens = abs(position - start) > rule.threshold;
         }
         if happens && event == NEVER {
-            // Movement is seen at the step that it begins from.
+            // Movement counts from the step before its first change.
             let begins_before = (rule.kind == ATTENTION_VISIBLE_MOVEMENT) & (step > 0u);
             event = select(step, step - 1u, begins_before) + rule.delay_steps;
         }

@@ -1,5 +1,5 @@
-// Brake Threat Number: required over largest available deceleration. Twin of src/model/criterion/btn.rs, which
-// has the formulas. The quotient itself is worked out on the host.
+// Brake Threat Number: required over maximum available deceleration. Twin of src/model/criterion/btn.rs, which has
+// the formulas. The host computes the quotient.
 
 const BTN_EQUIVALENT_DELAY: u32 = 0u;
 const BTN_EXACT: u32 = 1u;
@@ -26,20 +26,20 @@ override btn_short_ramp: f32;
 // 2j
 override btn_two_jerk: f32;
 
-// Largest number so far: a quotient (closed forms; of squares for the distance ratio) or a deceleration
-// (exact form), so that a step never divides.
+// Maximum so far. A step never divides: closed forms keep a quotient (the distance ratio one of squares), the exact
+// form a deceleration.
 struct BrakeThreatMaximum {
     numerator: f32,
     denominator: f32,
     failed: bool,
 }
 
-// Nothing seen yet: 0.
+// Initial value: 0.
 fn btn_nothing() -> BrakeThreatMaximum {
     return BrakeThreatMaximum(0.0, 1.0, false);
 }
 
-// A collision that counts: infinite.
+// Value of a collision that counts: infinite.
 fn btn_fail() -> BrakeThreatMaximum {
     return BrakeThreatMaximum(1.0, 0.0, true);
 }
@@ -83,7 +83,7 @@ fn btn_update(maximum: BrakeThreatMaximum, seen: bool, gap: f32, closing: f32) -
         let fails = touches | (squared > limit * limit);
         raised = btn_raise(maximum, counts, select(squared, 1.0, touches), select(gap * gap, 0.0, touches), fails);
     } else {
-        // What the largest deceleration so far still avoids needs no new solution.
+        // If the maximum so far avoids this collision too, no new solution is needed.
         let known = (maximum.denominator == 0.0) | !btn_needs_more(maximum.numerator, gap, closing);
         let fails = touches | btn_needs_more(btn_a_limit, gap, closing);
         let hopeless = touches | (gap * gap < btn_short_ramp * closing * closing * closing);
@@ -115,7 +115,7 @@ fn btn_needs_more(a: f32, gap: f32, v: f32) -> bool {
     return select(short, long, btn_ramp_ends(a, v));
 }
 
-// An interval that holds the deceleration in question.
+// An interval that contains the required deceleration.
 struct Bracket {
     low: f32,
     high: f32,
@@ -127,8 +127,8 @@ fn btn_halve(bracket: Bracket, gap: f32, v: f32) -> Bracket {
     return Bracket(select(bracket.low, middle, more), select(middle, bracket.high, more));
 }
 
-// Bisection on (0, 1 + 2jv], which holds (0, sqrt(2jv)]; D falls with a there, so it always converges. Eighty
-// halvings, eight per turn: llvmpipe gives all loops of an invocation together 65,535 turns.
+// Bisection on (0, 1 + 2jv], which holds (0, sqrt(2jv)]; D decreases with a there, so it always converges. Eighty
+// halvings, eight per iteration, because llvmpipe limits all loops of an invocation together to 65,535 iterations.
 fn btn_solve(gap: f32, v: f32) -> f32 {
     var bracket = Bracket(0.0, 1.0 + btn_two_jerk * v);
     for (var k = 0u; k < 10u; k++) {

@@ -6,8 +6,8 @@ const CONTACT_BY_SIDE: u32 = 1u;
 // The ego's front hits the other vehicle.
 const CONTACT_FRONTAL: u32 = 2u;
 
-// The gap after a step between vehicles that overlap across the road at its end: held in the contact where the step
-// leads their centres past each other.
+// The gap after a step between vehicles that overlap across the road at its end. If their centres pass each other in
+// the step, the gap is held in contact.
 fn held_in_contact(before: f32, after: f32, half_lengths: f32) -> f32 {
     let was_behind = before + half_lengths + half_lengths <= 0.0;
     let passes = after + half_lengths >= 0.0;

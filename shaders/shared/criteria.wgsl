@@ -1,5 +1,5 @@
-// The criteria together: their gate and what they have gathered. Twin of src/model/criterion/mod.rs and of the
-// record in src/engine/lane_step.rs.
+// The gate and the record of all criteria. Twin of src/model/criterion/mod.rs and of the record in
+// src/engine/lane_step.rs.
 
 const GATE_EGO_WIDTH: u32 = 0u;
 const GATE_OVERLAP: u32 = 1u;
@@ -8,15 +8,15 @@ override criteria_gate: u32;
 // A side contact fails BTN too.
 override criteria_any_contact: bool;
 
-// What the steps of a lane have gathered so far.
+// Values of the criteria over the steps so far.
 struct Record {
     ttc: TtcMinimum,
     btn: BrakeThreatMaximum,
-    // UNBOUNDED where nothing was seen.
+    // UNBOUNDED if no vehicle was seen.
     min_gap: f32,
 }
 
-// Do TTC and BTN look at a vehicle here? In front by its centre, and near enough across the road.
+// Do TTC and BTN judge a vehicle here? Its centre must be in front, and it must be near enough across the road.
 fn criteria_sees(gap: f32, half_lengths: f32, lateral_gap: f32, lateral_position: f32, ego_width: f32) -> bool {
     let near = select(lateral_gap < 0.0, abs(lateral_position) <= ego_width, criteria_gate == GATE_EGO_WIDTH);
     return (gap + half_lengths >= 0.0) & near;

@@ -1,8 +1,9 @@
-// Point → validity and case: twin of src/engine/generated/decode.rs. Series go to this sample's own part of the tables.
+// Point → validity and case: twin of src/engine/generated/decode.rs. Each sample writes its series to its own part of
+// the tables.
 
-// An event this close behind a step, in steps, counts as at the step.
+// An event up to this many steps after a step counts as at that step.
 const STEP_TOLERANCE: f32 = 1e-4f;
-// No event is later, in steps.
+// Latest step of an event.
 const MAX_STEPS: f32 = 1e6f;
 
 // sin(πx/2) on [0, 1] as x·p(x²).
@@ -124,7 +125,7 @@ fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneO
     return other;
 }
 
-// The value of a quantity; 0 where no parameter gives it.
+// The value of a quantity; 0 if no parameter has it.
 fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
     var values = point;
     let slot = recipe.slots[which];
@@ -134,7 +135,7 @@ fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
     return values[slot];
 }
 
-// A column of the vector that belongs to coefficients.
+// A column of the vector that the coefficients of a point give.
 fn reduced_column(point: array<f32, MAX_PARAMETERS>, column: u32) -> f32 {
     var coefficients = point;
     var value = number(column);
@@ -144,7 +145,7 @@ fn reduced_column(point: array<f32, MAX_PARAMETERS>, column: u32) -> f32 {
     return value;
 }
 
-// Whole steps that cover a time, given in steps.
+// A time in steps, rounded up.
 fn steps_up(time: f32) -> u32 {
     let late = larger(smaller(time, MAX_STEPS) - STEP_TOLERANCE, 0.0);
     let below = u32(late);
@@ -155,7 +156,7 @@ fn less_one(steps: u32) -> u32 {
     return select(0u, steps - 1u, steps > 0u);
 }
 
-// Steps in which something happens, and a few more.
+// Number of steps that contain all events of a motion, and a few more.
 fn steps_seen(motion: Motion) -> u32 {
     var last = motion.speed_len;
     last = select(last, motion.lateral_len, motion.lateral_len > last);
@@ -164,7 +165,7 @@ fn steps_seen(motion: Motion) -> u32 {
     return select(recipe.step_cap, last + 2u, last + 2u < recipe.step_cap);
 }
 
-// Speed that changes by `acceleration` until `duration`, then holds.
+// Constant `acceleration` until `duration`, then constant speed.
 fn kinematic_speed(initial: f32, acceleration: f32, duration: f32, motion: ptr<function, Motion>) {
     let until_step = less_one(steps_up(duration * recipe.inverse_dt));
     (*motion).speed_initial = initial;
@@ -173,7 +174,7 @@ fn kinematic_speed(initial: f32, acceleration: f32, duration: f32, motion: ptr<f
     (*motion).speed_end = larger(initial + acceleration * duration, 0.0);
 }
 
-// Lateral motion at constant speed; gives the time of the lane change, s.
+// Lateral motion at constant speed; returns the time of the lane change, s.
 fn kinematic_lateral(lateral_speed: f32, motion: ptr<function, Motion>) -> f32 {
     let way = recipe.lane_change;
     if recipe.lateral == LATERAL_GONE {
@@ -227,7 +228,7 @@ fn quarter_sine(x: f32) -> f32 {
     return x * sum;
 }
 
-// Place of a step between the instants of a reduced series.
+// Position of a step between two instants of a reduced series.
 struct Between {
     below: u32,
     above: u32,

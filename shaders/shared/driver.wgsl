@@ -1,5 +1,5 @@
-// What a driver sees, decides and remembers: twin of src/model/driver/mod.rs. A model brings `initial`, `check`
-// and `react`, and its constants as `override driver_…`.
+// View, hazard and state of a driver: twin of src/model/driver/mod.rs. A model defines `initial`, `check` and
+// `react`, and its constants as `override driver_…`.
 
 struct View {
     v_ego: f32,
@@ -37,8 +37,8 @@ fn is_behind(view: View) -> bool {
     return view.gap + view.half_lengths < 0.0;
 }
 
-// One unsafe step of any model: the reaction time is paid once, coasting; then the deceleration follows
-// `braking`, and the speed stops at 0.
+// One unsafe step of any model. The ego coasts during the reaction time, which occurs once; then the deceleration is
+// `braking`. The speed stops at 0.
 fn latched_braking(state: DriverState, coasting: f32, braking: f32, v_ego: f32) -> Reaction {
     let is_delayed = state.delay_steps > 0u;
     let applied = select(braking, coasting, is_delayed);

@@ -1,28 +1,28 @@
 // Exact arithmetic, as src/model/scalar.rs: binary32, to nearest even, in the written order. No fma, no root, no
-// transcendental; `%`, min, max and clamp are left alone because devices differ on them.
+// transcendental function; `%`, min, max and clamp are not used, because devices differ on them.
 
 const INFINITY_BITS: u32 = 0x7f800000u;
-// Stands for +∞ until the end of a lane: larger than every number that a lane computes.
+// Represents +∞ until the end of a lane: larger than every number that a lane computes.
 const UNBOUNDED: f32 = 0x1.fffffep+127f;
 
-// The larger; the second where they are equal.
+// The larger of two; the second if they are equal.
 fn larger(a: f32, b: f32) -> f32 {
     return select(b, a, a > b);
 }
 
-// The smaller; the second where they are equal.
+// The smaller of two; the second if they are equal.
 fn smaller(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
-// The bits of a number that may stand for +∞.
+// The bits of a number that may represent +∞.
 fn bounded_bits(value: f32) -> u32 {
     return select(bitcast<u32>(value), INFINITY_BITS, value == UNBOUNDED);
 }
 
-// Correctly rounded a/b. A device's own quotient may be 2.5 units in the last place off (Vulkan), so it is
-// only the first guess: the remainder, exact in wrapping 32-bit integers, corrects it. Zero numerators and
-// normal operands; quotients below the normal range become 0, above it infinite; b = 0 is never asked.
+// Correctly rounded a/b. A device's quotient may have an error of 2.5 units in the last place (Vulkan); the
+// remainder, exact in wrapping 32-bit integers, corrects it. Operands are normal, or a is 0; b is never 0. A quotient
+// below the normal range becomes 0, above it infinite.
 fn exact_div(a: f32, b: f32) -> f32 {
     let a_bits = bitcast<u32>(a);
     let b_bits = bitcast<u32>(b);
@@ -40,7 +40,7 @@ fn exact_div_from(guess: f32, a_bits: u32, b_bits: u32) -> f32 {
     let below_one = a_mantissa < b_mantissa;
     let shift = select(23u, 24u, below_one);
     var quotient = u32(guess * select(8388608.0, 16777216.0, below_one));
-    // |remainder| stays below 2^28, so that its low 32 bits tell it; the dividend itself has 48.
+    // |remainder| is below 2^28, so its low 32 bits are sufficient; the dividend has 48.
     var remainder = bitcast<i32>((a_mantissa << shift) - quotient * b_mantissa);
     let divisor = bitcast<i32>(b_mantissa);
     for (var k = 0u; k < 4u; k++) {
@@ -52,7 +52,7 @@ fn exact_div_from(guess: f32, a_bits: u32, b_bits: u32) -> f32 {
     quotient = quotient + select(0u, 1u, remainder + remainder > divisor);
     let exponent = i32((a_bits >> 23u) & 0xffu) - i32((b_bits >> 23u) & 0xffu) + select(127, 126, below_one);
     let is_zero = ((a_bits & 0x7f800000u) == 0u) | (exponent <= 0);
-    // Adding the mantissa without its leading bit carries into the exponent where rounding overflows it.
+    // If rounding overflows the mantissa, the addition carries into the exponent.
     let magnitude = (bitcast<u32>(exponent) << 23u) + (quotient - 0x00800000u);
     let is_infinite = (exponent >= 255) | (magnitude >= INFINITY_BITS);
     let bits = select(select(magnitude, INFINITY_BITS, is_infinite), 0u, is_zero);

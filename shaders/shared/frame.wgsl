@@ -1,8 +1,8 @@
-// The frame: one lane from start to end, the latched step once for all models. Twin of src/engine/lane_step.rs and
+// The frame: one lane from start to end, with the latched step of all models. Twin of src/engine/lane_step.rs and
 // src/engine/lane.rs.
 //
-// Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the
-// contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter.
+// Order inside a step: the gap moves to i (a contact on the way holds it), the state at i gives the criteria and the
+// contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions.
 
 // s
 override frame_dt: f32;
@@ -12,11 +12,11 @@ override frame_inverse_dt: f32;
 override frame_step_cap: u32;
 override frame_start_shift: bool;
 override frame_end_when_settled: bool;
-// s; off where not positive
+// s; off unless positive
 override frame_abort_above_ttc: f32;
 // Position of the model in the registry.
 override frame_model: u32;
-// Some case has a second vehicle.
+// At least one case has a second vehicle.
 override frame_paired: bool;
 
 const NO_STEP: u32 = 0xffffffffu;
@@ -62,7 +62,7 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
     var v_before = v_ego;
     var reaction_step = NO_STEP;
     var record = Record(ttc_nothing(), btn_nothing(), UNBOUNDED);
-    // Stays so only where a device leaves the loop before its end.
+    // Remains only if a device leaves the loop early.
     var last = Last(END_NOT_YET, 0u, CONTACT_NONE, 0u, 0.0, 0.0);
     for (var index = 0u; index < frame_step_cap; index++) {
         let a_ego = (v_ego - v_before) * frame_inverse_dt;
@@ -82,7 +82,7 @@ fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
                 gap_1 = second.view.gap;
                 record = judge(record, second);
                 let other_hazard = attentive_check(second, lane.others[1], index);
-                // The nearest unsafe vehicle drives the reaction.
+                // The nearest unsafe vehicle determines the reaction.
                 let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | (gap_1 < gap_0));
                 hazard.is_unsafe = hazard.is_unsafe | nearer;
                 hazard.demand = select(hazard.demand, other_hazard.demand, nearer);
@@ -126,7 +126,7 @@ fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
     let present = (other.used != 0u) & (index >= other.present_from) & (index < other.present_until);
     let way = (v_other - ego.v) * frame_dt;
     var after = before + way;
-    // A shorter way leads no centre past another.
+    // With a smaller change, no centre passes another.
     if abs(way + way) > other.half_lengths {
         let stops = present & (other.judged != 0u) & (lateral_gap < 0.0);
         after = select(after, held_in_contact(before, after, other.half_lengths), stops);
@@ -159,7 +159,7 @@ fn touches(seen: Seen, other: LaneOther) -> u32 {
     return select(CONTACT_NONE, touch, seen.present & (other.judged != 0u));
 }
 
-// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
+// No further event is possible with this vehicle: it is behind, out of the lane, or not slower.
 fn is_settled(seen: Seen) -> bool {
     let in_lane = seen.judged | (seen.present & (seen.view.lateral_gap < 0.0));
     return is_behind(seen.view) | !in_lane | (closing(seen.view) <= 0.0);

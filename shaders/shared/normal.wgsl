@@ -1,5 +1,5 @@
-// Standard normal deviates, as src/stats/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which whoever includes
-// this declares and fills with `normal_table()`.
+// Standard normal deviates, as src/stats/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which the
+// including kernel declares and the host fills with `normal_table()`.
 
 const NORMAL_SEGMENT_BITS: u32 = 4u;
 

@@ -1,4 +1,5 @@
-// Philox4x32-10, as src/stats/random/philox.rs. Pairs of words for 64 bits: the low word first, but for products.
+// Philox4x32-10, as src/stats/random/philox.rs. Pairs of words hold 64 bits with the low word first, except for
+// products.
 
 const PHILOX_MULTIPLIER_0: u32 = 0xD2511F53u;
 const PHILOX_MULTIPLIER_1: u32 = 0xCD9E8D57u;

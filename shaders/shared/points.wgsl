@@ -1,4 +1,4 @@
-// Sample index → point: twin of src/engine/generated/points.rs. Means and factors stand in `numbers`, as bits.
+// Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means and factors as bits.
 
 const ATTEMPTS: u32 = 64u;
 // Blocks of four words per draw.
@@ -13,7 +13,7 @@ struct Drawn {
     tries: u32,
 }
 
-// The number at a place of the shared table.
+// The number at an index of the shared table.
 fn number(at: u32) -> f32 {
     return bitcast<f32>(numbers[at]);
 }
@@ -33,13 +33,13 @@ fn draw_point(index: vec2<u32>) -> Drawn {
     return drawn;
 }
 
-// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
+// Draw `attempt` of an index, valid or not. Words 0 and 1 select the component; the others give normal deviates.
 fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
     let d = recipe.dimensions;
     var words: array<u32, 16>;
     if generation.source == SOURCE_GIVEN {
         var given: array<f32, MAX_PARAMETERS>;
-        // A plan holds no index beyond the points.
+        // A plan has no index beyond the points.
         for (var j = 0u; j < d; j++) {
             given[j] = number(generation.first_mean + index.x * d + j);
         }

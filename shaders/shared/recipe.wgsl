@@ -1,4 +1,4 @@
-// What a point's numbers mean: twin of src/engine/generated/recipe.rs. A test compares sizes and offsets.
+// Meaning of a point's numbers: twin of src/engine/generated/recipe.rs. A test compares sizes and offsets.
 
 const MAX_PARAMETERS: u32 = 14u;
 const QUANTITIES: u32 = 11u;
@@ -72,7 +72,7 @@ struct Recipe {
     attention: array<AttentionRule, MODELS>,
 }
 
-// The case of a void sample: nobody is there, and the ego stands.
+// The case of a void sample: no vehicle is present, and the ego stands.
 fn void_case() -> LaneCase {
     var nobody: LaneOther;
     nobody.half_lengths = recipe.half_lengths[0];

@@ -62,7 +62,7 @@ struct Launch {
     first_outcome: u32,
     // First word of this dispatch's cells in the counts: one cell per variant.
     first_cell_word: u32,
-    // Word of the counts that counts the lanes of this dispatch, whatever is wanted.
+    // Word of the counts with the number of finished lanes of this dispatch.
     done_word: u32,
     // WANTED_…
     wanted: u32,
@@ -72,7 +72,7 @@ const WANTED_VERDICTS: u32 = 0u;
 const WANTED_OUTCOMES: u32 = 1u;
 const WANTED_COUNTS: u32 = 2u;
 
-// What a lane says when it is over. Infinite minima are given as bits: WGSL has no infinite literal.
+// Result of a finished lane. Infinite minima are bits, because WGSL has no infinite literal.
 struct OutcomeRecord {
     // Bits 0–3 verdicts (collision, TTC, BTN, capped), 4–5 contact, 6 vehicle of the contact, 8–10 end.
     word: u32,

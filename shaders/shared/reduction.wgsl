@@ -1,11 +1,11 @@
-// What comes back. Integer atomics only, so that the order of the lanes cannot matter.
+// Results of a dispatch. Only integer atomics, so that the order of the lanes has no effect.
 
 // Lanes per verdict word: four bits each.
 const LANES_PER_WORD: u32 = 8u;
 // Words per cell of the counts: lanes, collisions, TTC, BTN, capped, smallest TTC, smallest gap, unused.
 const CELL_WORDS: u32 = 8u;
 
-// Four verdict bits among those of the seven neighbours.
+// Writes a lane's four verdict bits into the word that it shares with seven neighbours.
 fn pack_verdicts(launch: Launch, lane: u32, word: u32) {
     let bits = (word & 0xfu) << ((lane % LANES_PER_WORD) * 4u);
     if bits != 0u {
@@ -26,7 +26,7 @@ fn count_lane(launch: Launch, variant: u32, record: OutcomeRecord) {
     atomicMin(&counts[cell + 6u], ordered(record.min_gap_bits));
 }
 
-// The bits of a number as an integer that is ordered as the number is.
+// An integer with the same order as the number that has these bits.
 fn ordered(bits: u32) -> u32 {
     return select(bits | 0x80000000u, ~bits, (bits & 0x80000000u) != 0u);
 }

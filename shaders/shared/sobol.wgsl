@@ -1,5 +1,5 @@
-// Sobol's sequence with nested uniform scrambling, as src/stats/random/sobol.rs. Reads `sobol_table: array<u32>`, which
-// whoever includes this declares and fills with `Sobol::table`.
+// Sobol's sequence with nested uniform scrambling, as src/stats/random/sobol.rs. Reads `sobol_table: array<u32>`,
+// which the including kernel declares and the host fills with `Sobol::table`.
 
 const SOBOL_DIGITS: u32 = 32u;
 const SOBOL_ROW: u32 = 34u;
@@ -26,7 +26,7 @@ fn sobol_point(dimension: u32, index: u32) -> u32 {
 fn owen_scramble(word: u32, seed: vec2<u32>) -> u32 {
     var scrambled = 0u;
     for (var chunk = 0u; chunk < SOBOL_CHUNKS; chunk++) {
-        // Two shifts: one by 32 is none.
+        // Two shifts, because a shift by 32 does nothing.
         let above = (word >> 1u) >> (31u - SOBOL_LEVELS * chunk);
         let coins = avalanche(avalanche(above + seed.x) ^ (seed.y + chunk * 0x9E3779B9u));
         var node = 1u;

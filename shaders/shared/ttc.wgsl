@@ -3,19 +3,19 @@
 // s
 override ttc_threshold_s: f32;
 
-// Smallest TTC so far, kept as a quotient so that a step never divides.
+// Minimum TTC so far, as a quotient, so that a step never divides.
 struct TtcMinimum {
     gap: f32,
     closing: f32,
     failed: bool,
 }
 
-// Nothing seen yet: infinite.
+// Initial value: infinite.
 fn ttc_nothing() -> TtcMinimum {
     return TtcMinimum(1.0, 0.0, false);
 }
 
-// The value's bits, s, ≥ 0; infinite where the ego never closed in.
+// The value's bits, s, ≥ 0; infinite if the ego never closed in.
 fn ttc_value_bits(minimum: TtcMinimum) -> u32 {
     var bits = INFINITY_BITS;
     if minimum.closing > 0.0 {

@@ -13,7 +13,7 @@ use crate::{Error, Place, Result};
 /// Flags of every verb that sweeps.
 #[derive(Debug, Clone, Args)]
 pub struct BackendFlags {
-    /// What computes; auto: a GPU where there is one
+    /// Backend; auto: a GPU if there is one
     #[arg(long, value_name = "auto|cpu|gpu")]
     backend: BackendChoice,
     /// Device, by a part of its name, its PCI bus id or its index
@@ -55,7 +55,7 @@ impl BackendFlags {
         }
         let backend = if self.backend == BackendChoice::Cpu { BackendChoice::Cpu } else { BackendChoice::Gpu };
         let device = open_device(backend, self.device.as_ref())?
-            .ok_or_else(|| Error::Internal("a device was asked for and none was chosen".to_owned()))?;
+            .ok_or_else(|| Error::Internal("a device was requested, but none was chosen".to_owned()))?;
         Ok(Opened { cpu, device: Some(device) })
     }
 
@@ -66,7 +66,7 @@ impl BackendFlags {
     pub fn none_but(&self, flag: &str) -> Result<Opened> {
         if self.backend == BackendChoice::Gpu || self.device.is_some() {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
-            return Err(Error::usage(Place::item(flag), problem, "leave --backend and --device out"));
+            return Err(Error::usage(Place::item(flag), problem, "leave out --backend and --device"));
         }
         Ok(Opened { cpu: CpuBackend::lane_arithmetic(), device: None })
     }

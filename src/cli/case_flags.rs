@@ -150,8 +150,9 @@ impl CaseFlags {
         }
         // An acceleration without an end leads far within the time cap.
         let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
-        let judged = doubts.judge(Quantity::Speed, last_mps, || "the speed that the acceleration leads to".to_owned());
-        judged.map_err(|text| wrong("acceleration", format!("it leads to a speed that no vehicle has: {text}")))?;
+        let judged =
+            doubts.judge(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
+        judged.map_err(|text| wrong("acceleration", format!("it results in a speed that no vehicle has: {text}")))?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         plain.case(frame.time_cap_s)
     }

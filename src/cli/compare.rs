@@ -33,9 +33,9 @@ const BYTES_OF_COUNTS: u64 = 8 << 20;
 /// Which parameterizations give the right risk, not only the right labels?
 ///
 /// Simulates the recorded scenarios (S) and their parameterized replays (S'), fits a density per parameterization on
-/// the same scenarios, draws --samples scenarios from each, and sets the rates of failure beside one another: per
-/// category, driver model and criterion, with the ratio to S and its interval. A ratio whose interval holds 1
-/// agrees. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
+/// the same scenarios, draws --samples scenarios from each, and compares the rates of failure per category, driver
+/// model and criterion, with the ratio to S and its interval. A ratio agrees if its interval lies within the margin.
+/// Without data it runs on generated recordings. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep compare\n  lanesweep compare recordings --categories cut-in --samples \
@@ -105,7 +105,9 @@ impl Compare {
         tracing::info!("{}", counts_text(&collection.scenarios));
         let facts = fit::facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
-            tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
+            tracing::warn!(
+                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
+            );
         }
 
         let options = CompareOptions {
@@ -232,8 +234,8 @@ impl Compare {
 
     fn check_samples(&self) -> Result<()> {
         let problem = match self.samples {
-            0 => "0 samples estimate nothing",
-            n if n >= 1 << 48 => "2^48 samples and more cannot be counted",
+            0 => "0 samples give no estimate",
+            n if n >= 1 << 48 => "the number of samples must be below 2^48",
             _ => return Ok(()),
         };
         Err(Error::usage(Place::item("--samples"), problem, "give 20000, for instance"))

@@ -50,7 +50,7 @@ struct Init {
     file: PathBuf,
 }
 
-/// Show every value that is in force, and where it comes from
+/// Show every effective value and its source
 ///
 /// After all layers: defaults, file, environment, flags. With --format toml it prints a file that sets the same, for
 /// another machine or an appendix.
@@ -60,7 +60,7 @@ struct Show {
     /// How to print
     #[arg(long, value_enum, default_value_t)]
     format: ShowFormat,
-    /// Only what is not the default's
+    /// Only values that differ from the default
     #[arg(long)]
     changed: bool,
     #[command(flatten)]
@@ -91,7 +91,7 @@ struct Check {
     file: PathBuf,
 }
 
-/// Print the JSON Schema of a configuration file, or of a profile: editors complete and check by it
+/// Print the JSON Schema of a configuration file or a profile, for editors
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
 struct Schema {
@@ -130,7 +130,7 @@ impl Init {
         }
         if self.file.exists() {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
-            return Err(Error::usage(Place::file(&self.file), "it is there already and is not overwritten", help));
+            return Err(Error::usage(Place::file(&self.file), "it exists already and is not overwritten", help));
         }
         if let Some(folder) = self.file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             make_folder(folder)?;

@@ -289,7 +289,7 @@ fn with_defaults(command: Command, path: &[&str], given: &[(&str, Setting)]) -> 
 }
 
 fn broken(error: clap::Error) -> Error {
-    Error::Internal(format!("the command line was read once and not twice: {error}"))
+    Error::Internal(format!("the second parsing of the command line failed: {error}"))
 }
 
 #[cfg(test)]

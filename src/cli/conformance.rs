@@ -28,7 +28,7 @@ pub struct Conformance {
     /// JRC case tables or function tables (CSV)
     #[arg(value_name = "FILE")]
     tables: Vec<PathBuf>,
-    /// Scenarios that the lanes were run on (JSON Lines)
+    /// Scenarios of the lanes (JSON Lines)
     #[arg(long, value_name = "FILE", requires = "golden_lanes")]
     scenarios: Option<PathBuf>,
     /// Golden lanes of the paper profile (CSV)

@@ -121,8 +121,7 @@ impl<'a> Seen<'a> {
         let visible = match &self.visible {
             Ok(visible) => visible.as_deref(),
             Err(_) => {
-                return "--backend auto takes nothing: the environment cannot be understood (see the error)."
-                    .to_owned();
+                return "--backend auto selects no device: the environment is invalid (see the error).".to_owned();
             }
         };
         let real = self.cards.iter().filter(|card| card.is_real()).count();
@@ -131,10 +130,10 @@ impl<'a> Seen<'a> {
             Some(card) => {
                 let why = match (visible, real - hidden) {
                     (_, 1) => "the only GPU",
-                    (Some(_), _) => "the first that the environment allows",
+                    (Some(_), _) => "the first one that the environment allows",
                     (None, _) => "the first GPU, discrete before virtual before integrated",
                 };
-                format!("--backend auto takes {}: {why}.", card.one_line())
+                format!("--backend auto selects {}: {why}.", card.one_line())
             }
             None => {
                 let why = match (real, hidden, self.cards.first()) {
@@ -142,7 +141,7 @@ impl<'a> Seen<'a> {
                     (0, _, Some(_)) => "no GPU; other devices are used only when --device names one",
                     _ => "the environment hides every GPU",
                 };
-                format!("--backend auto takes the processor: {why}.")
+                format!("--backend auto selects the CPU: {why}.")
             }
         };
         if let Some(visible) = visible {
@@ -157,7 +156,7 @@ impl<'a> Seen<'a> {
             );
             let shown = |bus: &String| self.cards.iter().any(|card| card.pci_bus_id.as_ref() == Some(bus));
             for bus in visible.iter().filter(|bus| !shown(bus)) {
-                let _ = write!(text, "\nNo driver shows pci:{bus} here: a driver for CUDA alone brings no Vulkan.");
+                let _ = write!(text, "\nNo driver shows pci:{bus} here: a CUDA driver alone does not include Vulkan.");
             }
         }
         text
@@ -182,9 +181,8 @@ impl<'a> Seen<'a> {
     }
 }
 
-const LEGEND: &str =
-    "limits: largest buffer; largest part of one that a shader sees; workgroups along an axis; lanes in a workgroup.
-exact: the shader reaches the driver with every rounding pinned, so results can equal the processor's bit for bit;
+const LEGEND: &str = "limits: maximum buffer; maximum buffer binding; workgroups along an axis; lanes in a workgroup.
+exact: no float operation may be contracted or reordered, so results equal the CPU's bit for bit;
 elsewhere the self-check decides. self-check: random lanes and lanes on thresholds, word for word.
 timing: the device can time its own work.
 ";
@@ -275,13 +273,16 @@ mod tests {
         let text = text(&node(), Ok(None));
         assert!(text.contains(A) && text.contains(B), "{text}");
         assert!(text.contains("binding 2 GiB") && text.contains("buffer 16 EiB"), "{text}");
-        assert!(text.contains("--backend auto takes 0: NVIDIA H200 NVL"), "{text}");
+        assert!(text.contains("--backend auto selects 0: NVIDIA H200 NVL"), "{text}");
     }
 
     #[test]
     fn what_the_environment_hides_is_said() {
         let one = text(&node(), allowed(&[B]));
-        assert!(one.contains("auto takes 1: NVIDIA H200 (discrete, Vulkan, pci:0000:65:00.0): the only GPU"), "{one}");
+        assert!(
+            one.contains("auto selects 1: NVIDIA H200 (discrete, Vulkan, pci:0000:65:00.0): the only GPU"),
+            "{one}"
+        );
         assert!(one.contains("allows pci:0000:65:00.0; hidden: 1 of 2 GPUs"), "{one}");
         assert_eq!(one.matches("hidden ").count(), 1, "one row is marked: {one}");
         let none = text(&node(), allowed(&[]));
@@ -305,7 +306,7 @@ mod tests {
     fn an_environment_that_is_not_understood_still_shows_the_devices() {
         let error = || Err(Error::usage(Place::item("CUDA_VISIBLE_DEVICES"), "there is no GPU 9", "unset it"));
         let text = text(&node(), error());
-        assert!(text.contains(A) && text.contains("--backend auto takes nothing"), "{text}");
+        assert!(text.contains(A) && text.contains("--backend auto selects no device"), "{text}");
         let nodes = node();
         let json = Seen::new(&nodes, error()).json(&|_| "-".to_owned()).unwrap();
         let seen: serde_json::Value = serde_json::from_str(&json).unwrap();

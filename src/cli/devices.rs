@@ -6,10 +6,10 @@ use super::Exit;
 use super::format::FormatFlag;
 use crate::Result;
 
-/// List the compute devices and tell which one is used
+/// List the compute devices and the one that is used
 ///
-/// Every device of every driver, with its limits, and the one that `--backend auto` takes. CUDA_VISIBLE_DEVICES
-/// and Slurm's GPU list are honoured.
+/// Every device of every driver, with its limits, and the one that `--backend auto` selects. CUDA_VISIBLE_DEVICES and
+/// Slurm's GPU list are respected.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep verify devices --format json")]
 pub struct Devices {

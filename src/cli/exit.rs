@@ -51,20 +51,20 @@ impl Exit {
     pub fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => "done",
-            Exit::Usage => "a flag, key or profile cannot be used; nothing was done",
-            Exit::BadInput => "the data cannot be used; nothing was written",
+            Exit::Usage => "invalid flag, key or profile; nothing was done",
+            Exit::BadInput => "invalid data; nothing was written",
             Exit::Incomplete => "a result was written, but parts of the input were left out",
-            Exit::VerificationFailed => "a check did not pass",
+            Exit::VerificationFailed => "a check failed",
             Exit::Io => "the system refused to read, to write or to start a thread",
             Exit::NoDevice => "no usable device, or the device failed",
-            Exit::Internal => "a defect of the program",
-            Exit::Interrupted => "interrupted, or busy elsewhere; what is done is kept, and the same command continues",
+            Exit::Internal => "a program error",
+            Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",
         }
     }
 
     /// Statuses of a process that a signal ended, 128 + the signal's number, with what they mean.
     pub const BY_SIGNAL: [(u8, &str); 3] = [
-        (129, "ended at once by SIGHUP; a run that keeps a journal ends with 75 instead, and continues"),
+        (129, "ended at once by SIGHUP; a run with a journal ends with 75 instead, and can resume"),
         (130, "the same by SIGINT (Ctrl-C)"),
         (143, "the same by SIGTERM"),
     ];

@@ -140,8 +140,8 @@ impl Xosc {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
         if is_lane && self.case.says_a_case() {
-            let help = "leave the case's flags out, or --from and --scenarios";
-            return wrong("--lane", "a lane is a whole case: the other flags would not be heeded", help);
+            let help = "leave out the case's flags, or --from and --scenarios";
+            return wrong("--lane", "a lane is a complete case: the other flags would be ignored", help);
         }
         let models = self.case.named_models()?;
         let source = Source { keys: &self.lane, models };
@@ -160,7 +160,7 @@ impl Xosc {
             (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &source, extras),
             (None, None) if !self.lane.is_empty() => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                wrong("--lane", "a key alone does not say what it is of", help)
+                wrong("--lane", "a key alone does not identify a lane", help)
             }
             (None, None) => {
                 let file = self.case_file.as_deref().map(from_toml).transpose()?.unwrap_or_default();
@@ -175,19 +175,23 @@ impl Xosc {
             EgoFlag::External => EgoMotion::External,
         };
         if self.duration.is_some() && ego == EgoMotion::Model {
-            let problem = "the ego follows the driver model, whose path ends with the lane";
-            return Err(Error::usage(Place::item("--duration"), problem, "add --ego external, or leave it out"));
+            let problem = "the ego follows the driver model, and its path ends with the lane";
+            return Err(Error::usage(
+                Place::item("--duration"),
+                problem,
+                "add --ego external, or leave out --duration",
+            ));
         }
         if let Some(duration) = self.duration.filter(|d| !(*d > 0.0 && *d <= 3600.0)) {
-            let problem = format!("{duration} s cannot be played");
+            let problem = format!("{duration} s is out of range");
             return Err(Error::usage(Place::item("--duration"), problem, "give seconds above 0 and at most 3600"));
         }
         if let Some(width) = self.lane_width.filter(|w| !(1.0..=20.0).contains(w)) {
-            let problem = format!("{width} m is no width of a lane");
+            let problem = format!("{width} m is not a lane width");
             return Err(Error::usage(Place::item("--lane-width"), problem, "give 1 to 20 m, such as 3.5"));
         }
         if self.worst == Some(0) {
-            return Err(Error::usage(Place::item("--worst"), "0 lanes are none", "give 1 or more"));
+            return Err(Error::usage(Place::item("--worst"), "0 is out of range", "give 1 or more"));
         }
         let side = self.side.map(|side| match side {
             SideFlag::Left => Side::Left,

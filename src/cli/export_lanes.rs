@@ -289,8 +289,8 @@ fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Ext
         };
         scenarios.push(concrete(&runner.trace(key), (&case, &tables), &wide, &known, extras)?);
     }
-    let note = "a study's plan knows the sums of two lengths only: the ego has the profile's length, the others what is \
-                left; gaps and contacts stay (--scenarios FILE tells the lengths)";
+    let note = "a study's plan has only the sum of two lengths: the ego gets the profile's \
+                length, the others the remainder; gaps and contacts do not change (--scenarios FILE has the lengths)";
     let notes = if are_lengths_told { Vec::new() } else { vec![note.to_owned()] };
     Ok(Exported { scenarios, notes, incomplete: about.incomplete })
 }
@@ -327,8 +327,8 @@ fn concrete<R: Real>(
     let from = case.others[0].present_from;
     let is_exposed = trace.category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed;
     if is_exposed && from != NEVER {
-        let problem = "the cutting-out vehicle hits the one ahead, and the lane has its place only after that";
-        let help = "use a profile that heeds every vehicle of a cut-out, such as paper";
+        let problem = "the cutting-out vehicle hits the one ahead, whose position the lane has only after that";
+        let help = "use a profile that judges every vehicle of a cut-out, such as paper";
         return Err(Error::input(Place::item(format!("lane {}", known.key)), problem, help));
     }
     let sizes = sizes_of_case(known.key, wide, known.sizes.as_ref(), profile.frame.default_length_m)?;

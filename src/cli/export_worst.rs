@@ -123,7 +123,7 @@ pub(super) fn worst_of_sample(
     }
     let short = models.iter().map(|model| per_model[*model].len()).min().unwrap_or(0);
     if short < count {
-        tracing::warn!("the run lists {short} worst lanes of a model, not {count}: `sample --worst` says how many");
+        tracing::warn!("the run lists {short} worst lanes of a model, not {count}: `sample --worst` sets the number");
     }
     Ok(models.iter().flat_map(|model| per_model[*model].clone()).collect())
 }
@@ -135,7 +135,7 @@ fn wanted_models(plan: &LanePlan, models: Option<&[ModelId]>, count: usize) -> R
     };
     if all.len().saturating_mul(count) > MAX_LANES {
         let problem = format!("{count} lanes of {} models are too many files", all.len());
-        return Err(Error::usage(Place::item("--worst"), problem, format!("write {MAX_LANES} at most at once")));
+        return Err(Error::usage(Place::item("--worst"), problem, format!("write at most {MAX_LANES} at once")));
     }
     Ok(all)
 }

@@ -30,10 +30,10 @@ const MAX_VALID_DRAWS: u64 = 1_000_000_000;
 
 /// How are the parameters of scenarios distributed?
 ///
-/// Fits a kernel density to the kept scenarios of each category under each parameterization, counts which share
-/// of it is physically possible, tells how often such scenarios occur and how well drawn ones stand for unseen
-/// real ones. One density file per parameterization is written. Without data it runs on synthetic recordings of
-/// its own. Tables go to stdout, files to --out.
+/// Fits a kernel density to the kept scenarios of each category under each parameterization, computes which fraction
+/// of it is physically possible, how often such scenarios occur, and how well drawn scenarios represent unseen real
+/// ones. One density file per parameterization is written. Without data it runs on generated recordings. Tables go to
+/// stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
@@ -53,7 +53,7 @@ pub struct Fit {
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     parameterizations: lists::ParameterizationsFlag,
-    /// Make the observed time headway one more parameter (thw_s)
+    /// Add the observed time headway as a parameter (thw_s)
     #[arg(long)]
     with_thw: bool,
     #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true)]
@@ -109,7 +109,9 @@ impl Fit {
         tracing::info!("{}", counts_text(&collection.scenarios));
         let facts = facts(&source, &collection, typed)?;
         if facts.driven.is_none() {
-            tracing::warn!("exposure is unknown: the scenarios do not say what was driven; give --hours and --km");
+            tracing::warn!(
+                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
+            );
         }
 
         // One file needs no folder of its own.

@@ -18,9 +18,9 @@ pub(super) enum Format {
 /// The flag of every verb that prints tables.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct FormatFlag {
-    /// What goes to stdout
+    /// Output on stdout
     ///
-    /// text: tables for people; json: one document with the same numbers.
+    /// text: tables; json: one document with the same numbers.
     #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text)]
     pub format: Format,
 }

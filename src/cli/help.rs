@@ -153,16 +153,16 @@ pub(super) fn laid_out(command: Command) -> Command {
             text += &format!("  {verb:<12} {}\n", about.map_or(String::new(), ToString::to_string));
         }
     }
-    command.help_template(format!("{text}\nOf every verb:\n{flags}{{after-help}}"))
+    command.help_template(format!("{text}\nFlags of every verb:\n{flags}{{after-help}}"))
 }
 
 /// The flags that every verb has, in a line each.
 fn root_flags() -> String {
     [
-        ("-h, --help", "Print help; VERB -h has the flags of a verb, VERB --help all of them"),
+        ("-h, --help", "Print help; VERB -h lists the flags of a verb, VERB --help all of them"),
         ("-V, --version", "Print version"),
         ("-q, --quiet", "Errors only"),
-        ("-v, --verbose", "Say more"),
+        ("-v, --verbose", "More messages"),
         ("    --threads <N>", "Threads; results do not depend on it [default: all cores]"),
         ("    --config <FILE|KEY=VALUE>", "Configuration file, or one key of it; repeatable"),
     ]
@@ -176,7 +176,7 @@ fn with_groups(mut command: Command, verb: &str) -> Command {
     for name in names {
         command = command.mut_subcommand(&name, |inner| with_groups(inner, &name));
     }
-    let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help("Print help; --help tells more");
+    let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help("Print help; --help has more");
     command = command.disable_help_flag(true).arg(help);
     let ids = |of: &[(&str, &'static [&'static str])]| of.iter().find(|of| of.0 == verb).map_or(&[][..], |of| of.1);
     let (often, seldom_here) = (ids(&OFTEN), ids(&SELDOM));

@@ -35,7 +35,7 @@ impl CategoriesFlag {
 pub struct ParameterizationsFlag {
     /// Parameterizations: 1…7, a…g, i…v [default: all]
     ///
-    /// 1…7 are of cut-ins, a…g of cut-outs, i…v of leader decelerations.
+    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
     #[arg(long, alias = "parameterization", value_name = "LIST", value_delimiter = ',')]
     parameterizations: Vec<String>,
 }
@@ -85,7 +85,7 @@ pub fn models_help() -> String {
 pub struct CriterionFlag {
     /// Criterion to map, rank or estimate
     ///
-    /// Of worst lanes, failure maps, shares and stop rules, and of the adaptive estimators.
+    /// For worst lanes, failure maps, fractions, stop rules and the adaptive estimators.
     #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
     criterion: String,
 }
@@ -106,10 +106,10 @@ impl CriterionFlag {
 /// `--hours` and `--km`.
 #[derive(Debug, Clone, Args)]
 pub struct ExposureFlags {
-    /// Time driven, of all egos together [default: from the recordings]
+    /// Driven time of all egos [default: from the recordings]
     #[arg(long, value_name = "h")]
     hours: Option<f64>,
-    /// Distance driven, of all egos together [default: from the recordings]
+    /// Driven distance of all egos [default: from the recordings]
     #[arg(long, value_name = "km")]
     km: Option<f64>,
 }
@@ -155,7 +155,7 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let parse = |text: &str| {
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         value.map(Headway::ThwS).ok_or_else(|| {
-            let problem = format!("`{text}` is no time headway");
+            let problem = format!("`{text}` is not a time headway");
             let help = format!("give seconds above 0, separated by commas, or {words}");
             Error::usage(Place::item("--thw"), problem, help)
         })

@@ -44,26 +44,27 @@ pub struct Map {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(value_name = "CATEGORY")]
     category: String,
-    /// Grids with models of their own: jrc
+    /// Predefined grids with their models: jrc
     #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
     preset: Option<String>,
     /// OpenSCENARIO file with deterministic distributions
     ///
-    /// The first two parameters with several values are the axes, unless --x and --y name others; the rest part the panels.
+    /// The first two parameters with several values are the axes, unless --x and --y name others; the others define
+    /// the panels.
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
     distribution: Option<PathBuf>,
-    /// With --distribution: parameter of the file that is one of ours, times a factor; repeatable
+    /// With --distribution: parameter of the file = our parameter, times a factor; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     rename: Vec<Rename>,
-    /// Parameter across: NAME=FROM..TO/STEP or NAME=A,B,C
+    /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
     ///
-    /// With --distribution also a NAME of the file's.
+    /// With --distribution also a NAME of the file.
     #[arg(long, value_name = "NAME=RANGE")]
     x: Option<String>,
-    /// Parameter upwards
+    /// Parameter of the y axis
     #[arg(long, value_name = "NAME=RANGE")]
     y: Option<String>,
-    /// Parameter that parts the panels; repeatable
+    /// Parameter of the panels; repeatable
     ///
     /// Several make a panel of every combination.
     #[arg(long, value_name = "NAME=RANGE")]
@@ -266,7 +267,7 @@ impl Map {
                     let parameter = Parameter::find(category, key, name)?;
                     let at = left.iter().position(|axis| axis.parameter == parameter);
                     named(&mut left, at).ok_or_else(|| {
-                        let problem = format!("the file has no distribution of `{key}` alone");
+                        let problem = format!("the file has no separate distribution of `{key}`");
                         Error::usage(Place::item(name), problem, format!("give its values: {name} {key}=FROM..TO/STEP"))
                     })
                 }
@@ -274,7 +275,7 @@ impl Map {
                     let several = left.iter().position(|axis| axis.len() > 1);
                     let at = several.or(if left.is_empty() { None } else { Some(0) });
                     named(&mut left, at).ok_or_else(|| {
-                        let problem = "the file has no two parameters with distributions of their own";
+                        let problem = "the file has fewer than two parameters with separate distributions";
                         let help = format!("a map has two axes: give one by {name} NAME=FROM..TO/STEP");
                         Error::usage(Place::item(name), problem, help)
                     })
@@ -298,7 +299,7 @@ impl Map {
         let mut rows = found.set_rows;
         for axis in &left {
             if rows.len().saturating_mul(axis.len()) > MAX_PANELS {
-                let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
+                let help = format!("give fewer values: a sheet has at most {MAX_PANELS} panels");
                 return Err(Error::usage(Place::item("--distribution"), "too many panels", help));
             }
             let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();

@@ -17,7 +17,7 @@ use crate::support::files::check_folder;
 use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// Make the result of a run that was computed in parts
+/// Merge the parts of a run into its result
 ///
 /// Checks that the parts in DIR (left there by `--shard`) belong to the plan beside them, cover every lane exactly
 /// once and are whole; names what is missing, doubled, foreign or damaged, with the command that makes it. The result
@@ -41,14 +41,11 @@ impl Merge {
         let (problem, help) = if !self.dir.is_dir() {
             ("there is no such folder", "check the path for typing errors")
         } else if has("run.json") || has("estimate.json") {
-            ("there is nothing to merge: this is the result of a run in one piece", "give the folder of a run in parts")
+            ("there is nothing to merge: this is the result of an unsplit run", "give the folder of a run in parts")
         } else if names().any(|name| name.to_string_lossy().ends_with(".journal")) {
-            (
-                "there is nothing to merge: a run in one piece was interrupted here",
-                "run its command again: it continues",
-            )
+            ("there is nothing to merge: an unsplit run was interrupted here", "run its command again: it continues")
         } else {
-            ("there is nothing to merge: plan.json is missing", "give the folder that the parts were written to")
+            ("there is nothing to merge: plan.json is missing", "give the folder of the parts")
         };
         Error::input(Place::file(&self.dir), problem, help)
     }

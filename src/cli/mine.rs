@@ -19,9 +19,9 @@ use crate::traffic::mining::counts_text;
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
-/// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with
-/// its series, or one row where FILE ends in .parquet; `study --scenarios FILE` reads it. How long and how far the recordings' vehicles drove is written
-/// beside it (FILE with the ending .exposure.json), so that `fit --scenarios FILE` can tell events per hour.
+/// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with its
+/// series, or one row if FILE ends in .parquet; `study --scenarios FILE` reads it. The driven time and distance go to
+/// FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
 pub struct Mine {

@@ -60,9 +60,9 @@ use crate::{Error, Place, Result};
 #[command(
     name = "lanesweep",
     version,
-    about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios",
-    long_about = "Sweeps UN R157 driver models over recorded and parameterized traffic scenarios and tells how \
-                  far the parameterized ones agree with the recorded ones.\n\nStart with: lanesweep study",
+    about = "Runs UN R157 driver models in recorded and parameterized traffic scenarios",
+    long_about = "Runs UN R157 driver models in recorded and parameterized traffic scenarios, and measures how far both \
+                  agree.\n\nStart with: lanesweep study",
     after_long_help = Exit::table(),
     arg_required_else_help = true
 )]
@@ -79,7 +79,7 @@ struct Common {
     /// Errors only
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say more
+    /// More messages
     #[arg(short, long, global = true)]
     verbose: bool,
     /// Threads; results do not depend on it [default: all cores]
@@ -182,8 +182,8 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
         Ok(Ok(exit)) => return exit,
         Ok(Err(error)) => error,
         Err(_) => Error::Internal(
-            "the program panicked; see the message above. Files that are there are whole; a run that \
-             keeps a journal goes on from it by the same command"
+            "the program panicked; see the message above. Existing files are complete; \
+                         the same command resumes a run from its journal"
                 .to_owned(),
         ),
     };
@@ -193,8 +193,8 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
 
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MAX_THREADS).contains(threads)) {
-        let problem = format!("{threads} threads cannot work");
-        let help = format!("use at least 1 and at most {MAX_THREADS}; more than there are cores serve nothing");
+        let problem = format!("{threads} threads are out of range");
+        let help = format!("use at least 1 and at most {MAX_THREADS}; more threads than cores bring no gain");
         return Err(Error::usage(Place::item("--threads"), problem, help));
     }
     start_threads(cli.common.threads)?;

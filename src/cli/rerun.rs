@@ -50,7 +50,7 @@ pub(super) fn same_engine(recorded: Option<u64>) -> std::result::Result<(), Stri
         Some(engine) => {
             Err(format!("it is of engine {engine}, this program has engine {ENGINE_VERSION}: its lanes differ"))
         }
-        None => Err("it does not tell its engine: an earlier version of lanesweep made it".to_owned()),
+        None => Err("it has no engine number: an earlier version of lanesweep made it".to_owned()),
     }
 }
 
@@ -62,7 +62,8 @@ pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
         Error::input(Place::file(&path), problem, help)
     };
     let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
-    let run: Recorded = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no run: {e}")))?;
+    let run: Recorded =
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
     if run.lanesweep_estimate != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
     }
@@ -108,6 +109,6 @@ pub(super) fn run_of(dir: &Path) -> Result<(RunFacts, LanePlan, DensityModel)> {
     let plan = plan_samples(&density, &mixture_of(&density, &facts.given)?, &facts.profile, &options)?;
     match plan_sha256 {
         Some(hash) if hash == plan.hash() => Ok((facts, plan, density)),
-        _ => Err(wrong("its plan is not the one that the density and the profile beside it make".to_owned())),
+        _ => Err(wrong("its plan does not match the density and the profile beside it".to_owned())),
     }
 }

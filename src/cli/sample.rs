@@ -27,7 +27,7 @@ use crate::stats::density::DensityModel;
 ///
 /// Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates
 /// the probability of failure with its interval: by crude Monte Carlo, importance sampling, cross-entropy or subset
-/// simulation. Each estimate says when it should not be trusted. A table goes to stdout, files to --out.
+/// simulation. Each estimate has a verdict on whether to trust it. A table goes to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
@@ -56,7 +56,7 @@ pub struct Sample {
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", requires = "distribution")]
     pub(super) category: Option<String>,
-    /// With --distribution: parameter of the file that is one of ours, times a factor; repeatable
+    /// With --distribution: parameter of the file = our parameter, times a factor; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: value that is the same in every sample; repeatable
@@ -87,12 +87,12 @@ pub struct Sample {
     pub(super) interval: IntervalFlag,
     #[arg(long, value_name = "FRACTION")]
     pub(super) level: f64,
-    /// End once half-width over estimate is at most this
+    /// Stop when half-width over estimate is at most this
     ///
-    /// The interval is looked at after 4096·2^k samples.
+    /// The interval is checked after 4096·2^k samples.
     #[arg(long, alias = "until", value_name = "FRACTION")]
     pub(super) half_width: Option<f64>,
-    /// End at the first look after this time: not reproducible
+    /// Stop at the first check after this time: not reproducible
     #[arg(long, value_name = "s")]
     pub(super) time_limit: Option<f64>,
     #[arg(long, value_name = "N")]
@@ -207,6 +207,6 @@ impl Sample {
 /// `NAME=VALUE`.
 fn given(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, such as v_ego_mps=30")?;
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is no number"))?;
+    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
     if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value is not finite".to_owned()) }
 }

@@ -27,7 +27,7 @@ impl Sample {
                 return Ok(());
             }
             let range = if from_zero { "from 0 to below 1" } else { "between 0 and 1" };
-            Err(Error::usage(Place::item(name), format!("{value} is no fraction"), format!("give a number {range}")))
+            Err(Error::usage(Place::item(name), format!("{value} is out of range"), format!("give a number {range}")))
         };
         share("--level", self.level, false)?;
         share("--elite-fraction", self.elite_fraction, false)?;
@@ -45,10 +45,10 @@ impl Sample {
         }
         if self.samples == Some(0) {
             let help = "give 1000000, for instance";
-            return Err(Error::usage(Place::item("--samples"), "0 samples estimate nothing", help));
+            return Err(Error::usage(Place::item("--samples"), "0 samples give no estimate", help));
         }
         if self.samples.is_some_and(|n| n >= 1 << 63) {
-            let problem = "2^63 samples and more cannot be counted";
+            let problem = "the number of samples must be below 2^63";
             return Err(Error::usage(Place::item("--samples"), problem, "give fewer"));
         }
         let is_crude = self.is_crude();
@@ -67,7 +67,7 @@ impl Sample {
                 return Ok(());
             }
             let help = format!("give at least {least} and at most {most}");
-            Err(Error::usage(Place::item(flag), format!("{value} does not do"), help))
+            Err(Error::usage(Place::item(flag), format!("{value} is out of range"), help))
         };
         match self.estimator {
             EstimatorFlag::Is if self.is_weighted() => {
@@ -86,22 +86,22 @@ impl Sample {
             least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
             if !self.given.is_empty() {
                 let problem = "replicates are those of the whole density";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --given out"));
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave out --bootstrap or --given"));
             }
             if self.shards.is_part() || self.shards.plan_only {
-                let problem = "a part of a run has no replicates of its own";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave --bootstrap or --shard out"));
+                let problem = "a part of a run has no replicates";
+                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave out --bootstrap or --shard"));
             }
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && !is_crude && !self.is_weighted() {
-            let problem = "the adaptive estimators are sequential: they make no shards";
+            let problem = "the adaptive estimators are sequential and cannot be split";
             let help = "use --estimator mc, or --estimator is with one given --proposal";
             return Err(Error::usage(Place::item("--shard"), problem, help));
         }
         if is_split && (self.half_width.is_some() || self.time_limit.is_some()) {
-            let problem = "a part of a run cannot tell when the whole is good enough";
-            return Err(Error::usage(Place::item("--shard"), problem, "leave the stop rules out, or --shard"));
+            let problem = "a part of a run cannot evaluate a stop rule of the whole run";
+            return Err(Error::usage(Place::item("--shard"), problem, "leave out the stop rules, or --shard"));
         }
         if !self.proposal.is_empty() && self.estimator != EstimatorFlag::Is {
             return Err(Error::usage(

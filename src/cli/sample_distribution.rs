@@ -68,8 +68,12 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         return Err(only_crude("--distribution"));
     }
     if flags.points == PointsFlag::Sobol {
-        let help = "leave --points out: draws of a distribution file are independent";
-        return Err(Error::usage(Place::item("--points"), "there are no Sobol points of a distribution file", help));
+        let help = "leave out --points: draws of a distribution file are independent";
+        return Err(Error::usage(
+            Place::item("--points"),
+            "Sobol points are not available for a distribution file",
+            help,
+        ));
     }
     let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
     let name = flags.category.as_deref().unwrap_or_default();
@@ -89,7 +93,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     judge(&samples, Doubts::new(flags.plausibility.policy()))?;
     for p in samples.parameters.iter().filter(|p| p.kept_share < 1.0) {
         tracing::warn!(
-            "{:.3} % of the distribution of {} lie outside {} … {} {} and are not drawn",
+            "{:.3} % of the distribution of {} are outside {} … {} {} and are not drawn",
             100.0 * (1.0 - p.kept_share),
             p.parameter.key,
             readable::value(p.parameter.least),
@@ -100,7 +104,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let listed = flags.listed_headways()?;
     if listed.is_some() && samples.has_distance() {
         let problem = "the initial distance is a parameter already";
-        return Err(Error::usage(Place::item("--thw"), problem, "leave --thw out"));
+        return Err(Error::usage(Place::item("--thw"), problem, "leave out --thw"));
     }
     let headways = listed.unwrap_or_else(Headway::paper);
     let (profile, models, criterion) = (flags.load_profile()?, flags.models()?, flags.criterion()?);
@@ -246,7 +250,8 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
         Error::input(Place::file(&path), problem, help)
     };
     let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
-    let kept: Kept = serde_json::from_slice(&text).map_err(|e| wrong(format!("it tells no distribution: {e}")))?;
+    let kept: Kept =
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a distribution: {e}")))?;
     if kept.lanesweep_distribution != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", kept.lanesweep_distribution)));
     }
@@ -256,7 +261,7 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
     let samples = kept.samples()?;
     let (plan, _) = samples.plan((facts.samples, facts.seed), profile, &facts.models, &facts.headways)?;
     if plan_sha256.as_deref() != Some(plan.hash()) {
-        return Err(wrong("its plan is not the one that the distributions and the profile beside it make".to_owned()));
+        return Err(wrong("its plan does not match the distributions and the profile beside it".to_owned()));
     }
     let file = Path::new(&kept.file).file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok((plan, format!("distributions of {file}")))

@@ -91,7 +91,7 @@ impl Sample {
             None => MapAxes::of(density, &parameters[0].name, &parameters[1].name).map(Some),
             Some(text) => {
                 let (x, y) = text.split_once(',').ok_or_else(|| {
-                    let problem = format!("`{text}` names no two parameters");
+                    let problem = format!("`{text}` does not name two parameters");
                     Error::usage(Place::item("--map"), problem, "give two, separated by a comma, or `none`")
                 })?;
                 MapAxes::of(density, x.trim(), y.trim()).map(Some)

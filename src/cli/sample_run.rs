@@ -117,7 +117,7 @@ impl Sample {
         }
         // Rows are written on the way: a run that writes them begins anew.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
-            tracing::info!("this part is there already, and whole");
+            tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok);
         };
         let missing = run.missing()?;
@@ -168,14 +168,14 @@ impl Sample {
 /// What limits the estimates of crude Monte Carlo.
 fn warn(planned: &CrudePlan) -> Result<()> {
     if planned.facts.sobol {
-        tracing::warn!("Sobol points: the intervals are those of independent draws, and wider than need be");
+        tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
     }
     if !planned.facts.given.is_empty() {
         let left = conditional(&planned.density, &planned.facts.given)?.effective_scenarios;
         let of = planned.density.kde.points().len();
         if left < FEW_SCENARIOS {
             tracing::warn!(
-                "only {left:.1} of {of} scenarios are near the given values: what follows is the kernels', not data"
+                "only {left:.1} of {of} scenarios are near the given values: results depend on the kernels, not on data"
             );
         } else {
             tracing::info!("{left:.1} of {of} scenarios are near the given values");

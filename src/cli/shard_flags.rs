@@ -13,16 +13,16 @@ use crate::{Error, Place, Result};
 pub struct ShardFlags {
     /// Compute shard I of N (from 0); `cluster merge` joins them
     ///
-    /// The part is left in --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
+    /// The part is written to --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Run a plan that --plan-only wrote, instead of making one
     #[arg(long, value_name = "FILE", conflicts_with = "plan_only")]
     pub plan: Option<PathBuf>,
-    /// Write the plan, plan.json in --out, and end
+    /// Write the plan, plan.json in --out, and stop
     #[arg(long, conflicts_with = "shard")]
     pub plan_only: bool,
-    /// End after the chunk in progress at that time, as Ctrl-C does; the same command resumes
+    /// Stop after the chunk in progress at that time, as Ctrl-C does; the same command resumes
     #[arg(long, value_name = "s")]
     pub stop_after: Option<f64>,
 }
@@ -35,7 +35,7 @@ impl ShardFlags {
     pub fn start(&self) -> Result<()> {
         let Some(seconds) = self.stop_after else { return Ok(()) };
         if !(seconds > 0.0 && seconds < 1e9) {
-            let problem = format!("{seconds} s is no time");
+            let problem = format!("{seconds} s is out of range");
             return Err(Error::usage(Place::item("--stop-after"), problem, "give seconds above 0"));
         }
         interrupt::stop_after(seconds);

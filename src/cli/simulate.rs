@@ -23,10 +23,10 @@ use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///
-/// The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as
-/// keys or columns; flags win), or from a finished run or a scenario file with a lane key. The series goes to
-/// stdout as CSV, the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or
-/// variants (--compare) stand below one another in the CSV and together on the figure.
+/// The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as keys or columns;
+/// flags win), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV, the
+/// outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
+/// another in the CSV and share the figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw \
@@ -50,13 +50,13 @@ pub struct Simulate {
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
-    /// Runs that lane again with the run's profile and options, bit for bit, and says whether f64 ends otherwise.
+    /// Repeats that lane with the run's profile and options, bit for bit, and says whether f64 gives another outcome.
     #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"])]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model
     #[arg(long, value_name = "KEY")]
     lane: Option<String>,
-    /// Beside the lane, other variants of its scenario
+    /// Also other variants of the lane's scenario
     ///
     /// S (recorded; also without a value), keys of parameterizations, or all.
     #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S")]
@@ -66,7 +66,7 @@ pub struct Simulate {
     /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Where the figure's time ends [default: 2 s after the last change]
+    /// End of the figure's time axis [default: 2 s after the last change]
     #[arg(long, alias = "until", value_name = "s", requires = "plot")]
     plot_end: Option<f64>,
     #[command(flatten)]
@@ -101,8 +101,8 @@ impl Simulate {
         if self.case.says_a_case() {
             return Err(Error::usage(
                 Place::item("--lane"),
-                "the lane is a whole case: the other flags would not be heeded",
-                "leave the case's flags out, or --lane with its --scenarios or --from",
+                "the lane is a complete case: the other flags would be ignored",
+                "leave out the case's flags, or --lane with its --scenarios or --from",
             ));
         }
         let asked = Asked { key, models: self.case.named_models()?, compare: &self.compare };
@@ -111,7 +111,7 @@ impl Simulate {
             (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &asked, self.plausibility.policy()),
             (None, None) => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                Err(Error::usage(Place::item("--lane"), "a key alone does not say what it is of", help))
+                Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help))
             }
         }
     }
@@ -149,11 +149,11 @@ impl Simulate {
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
         if let Some(until) = self.plot_end.filter(|until| !(*until > 0.0 && *until < 1e9)) {
-            let problem = format!("{until} s is no end of a time axis");
+            let problem = format!("{until} s is out of range for a time axis");
             return Err(Error::usage(Place::item("--plot-end"), problem, "give seconds above 0 and below 10^9"));
         }
         if plot.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("svg")) {
-            let problem = format!("{} is no name of an SVG file", plot.display());
+            let problem = format!("{} is not the name of an SVG file", plot.display());
             let help = "give a name that ends in .svg; `rsvg-convert` makes PNG and PDF of it";
             return Err(Error::usage(Place::item("--plot"), problem, help));
         }
@@ -253,8 +253,8 @@ fn end(outcome: &Outcome<f64>) -> String {
             value(outcome.impact_closing_speed),
             value(outcome.impact_speed)
         ),
-        EndReason::Settled => "nothing can happen any more".to_owned(),
-        EndReason::Standstill => "the ego stands".to_owned(),
+        EndReason::Settled => "no further event is possible".to_owned(),
+        EndReason::Standstill => "the ego is stationary".to_owned(),
         EndReason::Cap => "time cap".to_owned(),
         EndReason::Aborted => "aborted at a large TTC (jrc-2021)".to_owned(),
     }

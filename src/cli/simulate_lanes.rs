@@ -148,13 +148,13 @@ fn study_of(dir: &Path, run: &Path) -> Result<Study> {
         Error::input(
             Place::file(run),
             problem,
-            "make the plan again with the study's own command and `--plan-only`, into this folder; a study leaves it \
-             there by itself up to 256 MiB, and with `--keep-plan always`",
+            "make the plan again with the study's own command and `--plan-only`, into this \
+                 folder; a study keeps it up to 256 MiB, and always with `--keep-plan always`",
         )
     };
     let text = input_file::read(run, input_file::MAX_TABLE_BYTES)?;
     let recorded: Recorded =
-        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is no record of a study: {e}")))?;
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a study: {e}")))?;
     super::rerun::same_engine(recorded.engine).map_err(wrong)?;
     let plans: Vec<PathBuf> =
         [RUN_PLAN_FILE, PLAN_FILE].iter().map(|name| dir.join(name)).filter(|path| path.exists()).collect();
@@ -176,7 +176,7 @@ fn study_of(dir: &Path, run: &Path) -> Result<Study> {
 /// A void sample has no case.
 pub(super) fn refuse_void(plan: &LanePlan, key: &LaneKey) -> Result<()> {
     if plan.generator().is_some_and(|generator| generator.draw(key.unit).is_void()) {
-        let help = "no draw of it was valid: take another";
+        let help = "none of its draws was valid: use another sample";
         return Err(Error::usage(Place::item("--lane"), "this sample is void", help));
     }
     Ok(())
@@ -247,7 +247,7 @@ fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<us
     variants.dedup();
     variants.retain(|variant| *variant != key.variant);
     if variants.is_empty() && !compare.is_empty() {
-        let problem = "this is the lane itself: there is nothing to compare it with";
+        let problem = "this is the lane itself, so there is nothing to compare";
         let others = names.iter().enumerate().filter(|(at, _)| *at != key.variant).map(|(_, name)| name.as_str());
         let help = format!("name other variants: {}", others.collect::<Vec<_>>().join(", "));
         return Err(Error::usage(Place::item("--compare"), problem, help));

@@ -14,8 +14,8 @@ use crate::{Error, Place, Result};
 /// Split a run over a Slurm job array
 ///
 /// Writes three scripts: array.sbatch (one task per shard), merge.sbatch (the result of the whole run) and submit.sh,
-/// which makes the plan and submits both. Tasks that reach their time limit, crash or lose their node go back to the
-/// queue and continue. All nodes must share --out.
+/// which makes the plan and submits both. Tasks that reach their time limit, crash or lose their node are queued
+/// again and resume. All nodes must share --out.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  lanesweep cluster slurm study.toml --array 20 --out result\n  lanesweep cluster slurm --array 20 \
@@ -37,7 +37,7 @@ pub struct Slurm {
     /// Time limit of a task, as Slurm writes it
     #[arg(long, value_name = "TIME", default_value = "02:00:00")]
     time: String,
-    /// GPUs per task: 1, or none to compute on the processors
+    /// GPUs per task: 1, or none to compute on the CPU
     #[arg(long, value_name = "1|none", default_value = "none", value_parser = ["1", "none"])]
     gpus: String,
     /// Processors per task
@@ -55,10 +55,10 @@ pub struct Slurm {
     /// Quality of service [default: the account's]
     #[arg(long, value_name = "NAME")]
     qos: Option<String>,
-    /// How long before the time limit a task is told to stop
+    /// Time before the limit at which a task gets the stop signal
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]
     signal_before: u32,
-    /// The program as the nodes find it
+    /// Path of the program on the nodes
     #[arg(long, value_name = "PATH", default_value = "lanesweep")]
     program: String,
     /// Folder for scripts and logs [default: slurm in --out]

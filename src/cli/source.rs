@@ -75,7 +75,7 @@ const TOLD: usize = 20;
 pub fn complain_of(problems: &[Error], notes: &[String]) {
     problems.iter().take(TOLD).for_each(console::complain);
     if problems.len() > TOLD {
-        tracing::error!("{} more were left out", problems.len() - TOLD);
+        tracing::error!("{} more are left out", problems.len() - TOLD);
     }
     notes.iter().for_each(|note| tracing::warn!("{note}"));
 }
@@ -83,7 +83,7 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
 /// What is done about input that no road has.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PlausibilityFlag {
-    /// Use values beyond what is physical (a speed of 108 m/s), and name them
+    /// Use physically impossible values (a speed of 108 m/s) with a warning
     #[arg(long)]
     accept_implausible: bool,
 }

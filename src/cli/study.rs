@@ -30,9 +30,9 @@ use crate::traffic::mining::counts_text;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
-/// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S')
-/// from ten time headways against every driver model, judges collision, TTC and BTN, and scores S' against
-/// S. Without data it runs on synthetic recordings of its own. Tables go to stdout, files to --out.
+/// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S') from ten
+/// time headways against every driver model, judges collision, TTC and BTN, and scores S' against S. Without data it
+/// runs on generated recordings. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
@@ -56,7 +56,7 @@ pub struct Study {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, alias = "lanes", value_name = "FILE")]
     rows: Option<PathBuf>,
-    /// Show the paper's published numbers beside (they are highD's)
+    /// Also show the paper's published numbers (of highD)
     #[arg(long)]
     published: bool,
     /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
@@ -70,7 +70,8 @@ pub struct Study {
     seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
     ///
-    /// The plan is run-plan.json; with it, each lane can run again. auto keeps it up to 256 MiB, some 150,000 scenarios.
+    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 150,000
+    /// scenarios.
     #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,
     #[command(flatten)]
@@ -243,7 +244,7 @@ impl Study {
         }
         // Before the work, so that a folder that cannot be written to is known at once.
         let Some(mut run) = study.open(&self.out, self.shards.shard)? else {
-            tracing::info!("this part is there already, and whole");
+            tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok);
         };
         let units = run.units();
@@ -267,7 +268,7 @@ impl Study {
         let comparison = self.compare_reference.then(|| compare_reference(study.cases())).transpose()?;
         let host = Host {
             backend: match (executor.fallback, swept.redone_lanes) {
-                (Some(stand_in), 1..) => format!("{}; where it failed {}", backend.describe(), stand_in.describe()),
+                (Some(stand_in), 1..) => format!("{}; after its failure {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },
             device: opened.device(),
@@ -286,7 +287,8 @@ impl Study {
         let Some(max_bytes) = self.keep_plan.max_bytes() else { return Ok(()) };
         if !study.keep(results, RUN_PLAN_FILE, max_bytes)? {
             tracing::info!(
-                "the plan is not left in {}: it has more than {} MiB; --keep-plan always leaves it, for `simulate --from`",
+                "the plan is not kept in {}: it has more than {} MiB; \
+                 `--keep-plan always` keeps it for `simulate --from`",
                 self.out.display(),
                 max_bytes >> 20
             );

@@ -48,7 +48,7 @@ impl GeneratorFlags {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep synth recordings")]
 pub struct Synth {
-    /// Folder to write to; made where it does not exist
+    /// Folder for the recordings; created if it does not exist
     #[arg(value_name = "DIR")]
     dir: PathBuf,
     #[command(flatten)]

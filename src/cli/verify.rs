@@ -25,9 +25,9 @@ use crate::{Error, Place, Result};
 
 /// Check that a device computes every lane as the CPU does
 ///
-/// Runs the same lanes on the f64 reference, the CPU and the device: random ones, ones on the thresholds of
-/// every rule, and a study. Every output word of the device must equal the CPU's; the exit code tells.
-/// Without a GPU name a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
+/// Runs the same lanes on the f64 reference, the CPU and the device: random ones, ones on the thresholds of every
+/// rule, and a study. Every output word of the device must equal the CPU's; otherwise the exit code is 5. Without a
+/// GPU, use a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -123,7 +123,7 @@ impl Verify {
         } else {
             format!("{} DIFFER from the CPU's", count(differing))
         };
-        let text = || format!("\n{} lanes, all computed by what is under test itself: {found}.\n", count(lanes));
+        let text = || format!("\n{} lanes, all computed by the backend under test: {found}.\n", count(lanes));
         self.format.print(text, || {
             records::document(&serde_json::json!({
                 "under_test": tested.describe(),
@@ -138,7 +138,7 @@ impl Verify {
         if equal {
             Ok(Exit::Ok)
         } else {
-            Err(Error::Verification(format!("{} does not compute what the CPU computes", tested.describe())))
+            Err(Error::Verification(format!("results of {} differ from the CPU's", tested.describe())))
         }
     }
 

@@ -35,7 +35,7 @@ pub fn comparison(comparison: &Comparison) -> String {
     if comparison.modes_differing > 0 {
         let _ = writeln!(
             text,
-            "{} values differ where verdicts or counts alone are asked for",
+            "{} values differ if only verdicts or counts are requested",
             count(comparison.modes_differing)
         );
     }

@@ -9,7 +9,7 @@ use crate::support::plausibility::{Doubts, HELP, Quantity};
 pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
     check(scenario).map_err(|p| {
         let place = Place::item(name(&scenario.id)).column(p.field);
-        let problem = format!("{}: it cannot be written", p.problem);
+        let problem = format!("{} cannot be written", p.problem);
         Error::input(place, problem, "correct the data that it was made of, or leave them out")
     })
 }
@@ -43,7 +43,7 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     if samples < 2 {
         return Err(Problem {
             field: "target.v".into(),
-            problem: format!("{samples} samples, but a scenario has a duration: expected at least 2"),
+            problem: format!("{samples} samples, but a scenario needs at least 2"),
             help: "remove the scenario or export its whole series",
         });
     }
@@ -57,7 +57,7 @@ pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     if s.category == Category::CutOut && s.kept && (s.lead.is_none() || s.lead_gap.is_none()) {
         return Err(Problem {
             field: if s.lead.is_none() { "lead" } else { "D" }.into(),
-            problem: "absent, but a kept cut-out uncovers a vehicle ahead".into(),
+            problem: "absent, but a kept cut-out needs a vehicle ahead".into(),
             help: "give the vehicle ahead (`lead`) and the gap to it (`D`), or set `kept` to false",
         });
     }
@@ -160,7 +160,7 @@ pub(super) fn admit(
             };
         worst(Quantity::Speed, "v", &mut other.v.iter().copied(), &is)?;
         worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), &is)?;
-        let jump = |text: String| format!("a jump to the side: {text}");
+        let jump = |text: String| format!("lateral jump: {text}");
         worst(Quantity::LateralSpeed, "y", &mut rates(&other.y, 1, s.fps), &jump)?;
         // Over a second: single samples of recorded speeds are noisy.
         let second = (s.fps.round() as usize).max(1);

@@ -194,7 +194,7 @@ fn yes_or_no(value: Value) -> Value {
 }
 
 /// Where users read about the columns.
-pub(super) const HELP: &str = "the columns are told in the chapter on tables (docs/src/tables.md)";
+pub(super) const HELP: &str = "the chapter on tables lists the columns (docs/src/tables.md)";
 
 /// Says which fields the columns of a table are, and takes only those.
 ///
@@ -234,7 +234,7 @@ pub(super) fn choose(
             None if others_are_let_be => continue,
             None => format!("remove it; {HELP}"),
         };
-        return Err(Error::input(table.header().column(column), "no such column is known", help));
+        return Err(Error::input(table.header().column(column), "there is no such column", help));
     }
     let at: Vec<usize> = chosen.iter().map(|column| column.at).collect();
     table.want(&at)?;

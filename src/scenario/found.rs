@@ -78,7 +78,7 @@ impl ScenariosRead {
             return self.refuse(Error::input(place(&field), problem, help));
         }
         if let Some(first) = self.rows.get(&scenario.id) {
-            let problem = format!("this id is that of {word} {first} too, but every scenario needs its own");
+            let problem = format!("this id belongs to {word} {first} too, but every scenario needs its own id");
             // Nobody knows which of the two is meant, or the one is a piece of the other: neither is used.
             self.more += u64::from(self.doubled.insert(scenario.id.clone()));
             return self.refuse(Error::input(place("id"), problem, self.help));

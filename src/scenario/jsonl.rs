@@ -22,7 +22,7 @@ use crate::support::plausibility::Implausible;
 pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
     let file = input_file::open(path)?;
     let mut reader = BufReader::with_capacity(1 << 16, file);
-    let mut found = ScenariosRead::new(implausible, "remove one of the two lines or rename one scenario");
+    let mut found = ScenariosRead::new(implausible, "remove one of the two lines, or rename one scenario");
     let mut line = Vec::new();
     for row in 1.. {
         line.clear();
@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile
             0 => break,
             MAX_LINE_BYTES => {
                 let problem = format!("the line is longer than {} MiB", MAX_LINE_BYTES >> 20);
-                return Err(Error::input(place, problem, "expected one scenario a line"));
+                return Err(Error::input(place, problem, "expected one scenario per line"));
             }
             _ => (),
         }
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path, implausible: Implausible) -> Result<ScenarioFile
             Err(error) => found.refuse(explain(&place, text, &error)),
         }
     }
-    found.finish(Place::file(path), "expected one JSON object a line, as `lanesweep mine` writes them")
+    found.finish(Place::file(path), "expected one JSON object per line, as `lanesweep mine` writes them")
 }
 
 /// Writes a scenario file: whole or not at all.
@@ -96,7 +96,7 @@ fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
         return Error::input(
             place.clone(),
             format!("not JSON: {} at character {}", reason(error), error.column()),
-            "every line holds one whole scenario; NaN and Infinity are not JSON: remove such scenarios",
+            "every line holds one complete scenario; NaN and Infinity are not JSON: remove such scenarios",
         );
     };
     let id = value.get("id").and_then(Value::as_str);

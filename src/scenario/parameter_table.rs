@@ -113,15 +113,15 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
     let header = table.header();
     let mut rows = ParameterRows::new(table)?;
     if rows.chosen.iter().all(|column| COLUMNS[column.field].0 != "category") {
-        return Err(Error::input(header, "no column `category`: this is no table of scenarios", HELP));
+        return Err(Error::input(header, "no column `category`: this is not a table of scenarios", HELP));
     }
-    let mut found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario stand together");
+    let mut found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario must be adjacent");
     let mut samples = 0.0;
     while let Some((row, map)) = rows.next_row()? {
         let count = found.count();
         if samples > MAX_SAMPLES + MAX_SAMPLES_PER_ROW * count as f64 {
-            let problem = format!("the scenarios above have {samples} samples, too many for so few rows");
-            let help = "give shorter ones (`duration_s`) or a lower `rate_hz`, or make several tables";
+            let problem = format!("the scenarios above have {samples} samples, too many for this number of rows");
+            let help = "give shorter scenarios (`duration_s`) or a lower `rate_hz`, or make several tables";
             return Err(Error::input(rows.table.place(row, None).column("duration_s"), problem, help));
         }
         let mut doubts = found.doubts();
@@ -198,7 +198,7 @@ fn of_row(
         (Some(_), Some(_)) => {
             return Err(Error::usage(
                 Place::item("thw"),
-                "gap and time headway are both given",
+                "both gap and time headway are given",
                 "leave one of the two empty",
             ));
         }

@@ -96,7 +96,7 @@ impl Reader {
             return Err(Error::input(table.header(), problem, HELP));
         }
         let may_change = chosen.iter().map(|column| names.get(column.known).is_none_or(|name| name.2)).collect();
-        let found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario stand together");
+        let found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario must be adjacent");
         Ok(Reader { table, leaves, chosen, may_change, found, open: None, refused: None })
     }
 
@@ -160,7 +160,7 @@ impl Reader {
                     return Err(Error::input(
                         self.table.place(row, item).column(&column.column),
                         problem,
-                        "what is of a whole scenario is the same in all its rows, or stands in the first only",
+                        "a value of a whole scenario must be equal in all its rows, or given in the first row only",
                     ));
                 }
                 _ => {}
@@ -191,7 +191,7 @@ impl Reader {
         let place = |at: usize| self.table.place(open.rows[at], open.id.as_str().map(name)).column("time_s");
         match rate_hz(&open.times_s) {
             Err((at, problem)) => {
-                let help = "give every scenario rows at equal distances in time, in order";
+                let help = "give every scenario rows in order with equal time steps";
                 return self.found.refuse(Error::input(place(at), problem, help));
             }
             Ok(rate_hz) if !has_rate => drop(scenario.insert("fps".to_owned(), Value::from(rate_hz))),
@@ -232,7 +232,7 @@ fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
     let end = times_s.len() - 1;
     let (first, last) = (times_s[0], times_s[end]);
     if end == 0 {
-        return Err((0, "one instant, but a scenario has a duration".to_owned()));
+        return Err((0, "one instant, but a scenario needs a duration".to_owned()));
     }
     let step_s = (last - first) / end as f64;
     if step_s.is_nan() || step_s <= 0.0 {
@@ -245,7 +245,7 @@ fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
         let (before, time_s) = (times_s[at - 1], times_s[at]);
         return Err((
             at,
-            format!("{time_s} s after {before} s; most instants are {usual_s:.4} s apart: they are not equally spaced"),
+            format!("{time_s} s after {before} s; most time steps are {usual_s:.4} s: they must be equal"),
         ));
     }
     // 25 Hz from times with rounding errors is 25 Hz.

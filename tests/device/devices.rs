@@ -36,7 +36,7 @@ fn stdout(mut command: Command) -> String {
 fn a_machine_without_any_driver_is_told_what_to_install() {
     let home = tempfile::tempdir().unwrap();
     let text = stdout(without_drivers(&home));
-    for part in ["No compute device", "libvulkan1 mesa-vulkan-drivers", "--backend auto takes the processor"] {
+    for part in ["No compute device", "libvulkan1 mesa-vulkan-drivers", "--backend auto selects the CPU"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let mut json = without_drivers(&home);
@@ -84,7 +84,7 @@ fn a_variable_of_nvidia_is_judged_only_where_its_driver_is() {
     let text = String::from_utf8(output.stdout).unwrap();
     let nvidia = std::fs::read_dir("/proc/driver/nvidia/gpus").is_ok_and(|gpus| gpus.count() > 0);
     assert_eq!(output.status.code(), Some(if nvidia { 2 } else { 0 }), "{text}");
-    assert!(text.contains("--backend auto takes"), "the devices are listed either way: {text}");
+    assert!(text.contains("--backend auto selects"), "the devices are listed either way: {text}");
     if !nvidia {
         assert_eq!(visible_here().unwrap(), None);
     }

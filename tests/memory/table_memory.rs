@@ -144,7 +144,10 @@ fn no_small_file_of_scenarios_takes_more_than_200_mb() {
     }
     for name in ["fine.csv", "long.csv"] {
         let error = said(name).expect(name);
-        assert!(error.contains("too many for so few rows") && error.contains("column `duration_s`"), "{name}: {error}");
+        assert!(
+            error.contains("too many for this number of rows") && error.contains("column `duration_s`"),
+            "{name}: {error}"
+        );
     }
     assert!(said("million.parquet").unwrap().contains("far more than a file of its size"));
     assert!(said("texts.parquet").unwrap().contains("a text has 102400 bytes"));

@@ -156,7 +156,7 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
             "line 2, `mining.cut_out.require_slower_lead`",
             "true or false",
         ),
-        ("mining = 3\n", "line 1, `mining`: this is a table, no key", "write [mining]"),
+        ("mining = 3\n", "line 1, `mining`: this is a table, not a key", "write [mining]"),
         ("[score]\nseed = 1\nseed = 2\n", "a.toml, line 3", "duplicate key"),
         ("[score\n", "a.toml, line 1", "lanesweep config init -"),
     ];

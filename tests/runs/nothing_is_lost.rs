@@ -168,7 +168,7 @@ fn values_that_no_lane_can_hold_are_refused_with_their_line() {
 fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let lane = "01_cut_in_81_74_836/S/1.2s/RSS";
-    refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would not be heeded");
+    refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would be ignored");
     refused(&["study", "--threads", "100000000"], "at most 4096");
 }
 

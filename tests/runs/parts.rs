@@ -141,7 +141,7 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     refused(&["merge", "empty"], 3, &["plan.json is missing"]);
     refused(&["merge", "nowhere"], 3, &["no such folder"]);
     std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
-    refused(&["merge", "empty"], 3, &["a run in one piece"]);
+    refused(&["merge", "empty"], 3, &["an unsplit run"]);
     let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
     shard("0/3", "p");
     shard("2/3", "p");

@@ -193,7 +193,7 @@ fn a_deterministic_file_becomes_the_map_of_the_same_flags() {
     let x = ["--x", "lateral_speed_mps", "--y", "gap_m", "--models", "RSS"];
     good(root, &[&by_file[..], &RENAME, &x].concat());
     let says = said(root, &[&by_file[..], &RENAME, &["--x", "thw_s"]].concat());
-    assert!(says.contains("the file has no distribution of `thw_s` alone"), "{says}");
+    assert!(says.contains("the file has no separate distribution of `thw_s`"), "{says}");
 }
 
 #[test]

@@ -47,7 +47,7 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
 #[test]
 fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() {
     let cases = [
-        ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "not equally spaced"),
+        ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "they must be equal"),
         (
             "a,cut-in,10.04,107,4.5",
             "a,cut-in,10.04,107,4.6",
@@ -132,7 +132,13 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         ("lateral_speed", "lateral_speed_ms", "column `lateral_speed_ms`", "milliseconds", "`lateral_speed_mps`"),
         ("cut-in,FSM", "cutin,FSM", "line 2, column `category`", "no category `cutin`", "use cut-in, cut-out or lvd"),
         ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "a speed in m/s"),
-        ("1.2,,1.0,,,,", "1.2,8,1.0,,,,", "line 2, column `thw`", "both given", "leave one of the two empty"),
+        (
+            "1.2,,1.0,,,,",
+            "1.2,8,1.0,,,,",
+            "line 2, column `thw`",
+            "both gap and time headway are given",
+            "leave one of the two empty",
+        ),
         ("-6,0", "-6,40", "line 3, column `end_speed`", "cannot be reached", "sign"),
         ("36,4,", "36,2000,", "line 4, column `duration_s`", "2000 cannot be used", "at most 120"),
         ("108,20,", "108,fast,", "line 2, column `speed`", "expected a number", "tables"),
@@ -152,7 +158,7 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
     }
     let rows: String = (0..6000).map(|_| "lvd,20,120,1000\n").collect();
     let error = of("p.csv", &format!("category,ego_speed,duration_s,rate_hz\n{rows}")).unwrap_err();
-    assert!(error.to_string().contains("too many for so few rows"), "{error}");
+    assert!(error.to_string().contains("too many for this number of rows"), "{error}");
 }
 
 fn texts(values: &[&str]) -> ArrayRef {
@@ -327,7 +333,7 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     let jump = |id, k| if (id, k) == (7, 10) { row(7, 10, 20.0, 0.0) } else { None };
     let (code, text) = study(&cut_ins(30, jump), &[]);
     assert_eq!(code, 4, "{text}");
-    assert!(text.contains("column `target_lateral_m[9]`, scenario s7: a jump to the side: -26 m/s"), "{text}");
+    assert!(text.contains("column `target_lateral_m[9]`, scenario s7: lateral jump: -26 m/s"), "{text}");
     let run: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
     assert_eq!(run["categories"][0]["kept"].as_u64(), Some(29));
@@ -361,7 +367,7 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     };
     let (code, text) = study(&cut_ins(30, spoilt), &[]);
     assert_eq!(code, 3, "{text}");
-    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "is \"left\", but \"up\"", "not equally spaced"] {
+    for part in ["4 of 30", "is \"soon\"", "is -7; expected", "is \"left\", but \"up\"", "they must be equal"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert_eq!(study(&cut_ins(50, spoilt), &[]).0, 4);
@@ -433,7 +439,7 @@ fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let (code, text) = simulate("90");
     assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
     let (code, text) = simulate("30 --acceleration 6");
-    assert!(code == 2 && text.contains("acceleration: it leads to a speed that no vehicle has: 740 m/s"), "{text}");
+    assert!(code == 2 && text.contains("acceleration: it results in a speed that no vehicle has: 740 m/s"), "{text}");
     assert_eq!(simulate("30 --acceleration 6 --end-speed 40").0, 0);
     let (code, text) = simulate("30 --length 430");
     assert!(code == 2 && text.contains("430 looks like cm: 4.3 m"), "{text}");

@@ -298,7 +298,7 @@ fn duplicates_disorder_and_gaps_in_a_vehicles_frames_are_told_apart() {
     let with = |more: [&'static str; 2]| [place.as_slice(), more.as_slice()].concat();
     refused(
         |t| t.tracks = with_field(&t.tracks, 5, "frame", "3"),
-        &with(["line 5", "frame 3 of this vehicle is there twice"]),
+        &with(["line 5", "frame 3 of this vehicle occurs twice"]),
     );
     refused(|t| t.tracks = with_field(&t.tracks, 5, "frame", "0"), &with(["line 5", "out of order"]));
     refused(|t| t.tracks = without_line(&t.tracks, 5), &with(["line 5", "gap"]));
@@ -321,7 +321,7 @@ fn the_vehicles_of_the_two_files_must_be_the_same() {
     );
     refused(
         |t| t.tracks_meta += "9,4.00,1.80,1,12,12,Car,2,0.00,0.00,0.00,0.00,-1.00,-1.00,-1.00,0\n",
-        &["01_tracks.csv", "vehicle 9", "has 0 frames", "announces 12", "truncated?"],
+        &["01_tracks.csv", "vehicle 9", "has 0 frames", "claims 12", "truncated?"],
     );
     refused(
         |t| t.tracks_meta = with_repeated_line(&t.tracks_meta, 2),
@@ -332,7 +332,7 @@ fn the_vehicles_of_the_two_files_must_be_the_same() {
     let last_line_lost = |t: &Texts| without_line(&t.tracks, 27);
     refused(
         |t| (t.tracks_meta, t.tracks) = (uncounted(t), last_line_lost(t)),
-        &["vehicle 7", "has 4 frames", "announces 5"],
+        &["vehicle 7", "has 4 frames", "claims 5"],
     );
     let bare = |t: &Texts| without_column(&uncounted(t), "finalFrame") + "9,4,1.8,1,Car,2,0,0,0,0,-1,-1,-1,0\n";
     refused(|t| t.tracks_meta = bare(t), &["vehicle 9", "has 0 frames", "in the tracksMeta file"]);
@@ -348,7 +348,7 @@ fn the_vehicles_of_the_two_files_must_be_the_same() {
     );
     refused(
         |t| t.tracks_meta = with_field(&t.tracks_meta, 2, "numFrames", "6"),
-        &["vehicle 1", "has 8 frames", "announces 6"],
+        &["vehicle 1", "has 8 frames", "claims 6"],
     );
 }
 
@@ -506,7 +506,7 @@ fn bytes_that_are_no_utf_8_are_refused_where_they_matter() {
 fn a_huge_announced_number_of_frames_takes_no_memory() {
     refused(
         |t| t.tracks_meta = with_field(&t.tracks_meta, 2, "numFrames", "999999999999999999"),
-        &["vehicle 1", "announces 999999999999999999"],
+        &["vehicle 1", "claims 999999999999999999"],
     );
 }
 

@@ -47,10 +47,10 @@ pub(super) fn read<'k>(variables: &[(OsString, OsString)], keys: &'k [Key]) -> R
             let names = known.iter().map(|(variable, _)| variable.as_str()).chain([FILE_VARIABLE]);
             let help = nearest(name, names).map_or(String::new(), |near| format!("did you mean {near}? "));
             let help = format!("{help}Variables are LANESWEEP_ and a key of `lanesweep config show` in capitals");
-            return Err(Error::usage(place(), "lanesweep knows no such variable", help));
+            return Err(Error::usage(place(), "there is no such variable", help));
         };
         let Some(word) = word.to_str() else {
-            return Err(Error::usage(place(), "it is no UTF-8 text", format!("expected {}", key.expected())));
+            return Err(Error::usage(place(), "it is not UTF-8 text", format!("expected {}", key.expected())));
         };
         found.push((key, name.to_owned(), word.to_owned()));
     }

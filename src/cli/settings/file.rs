@@ -72,7 +72,7 @@ impl Reader<'_> {
             let DeValue::Table(inner) = value.get_ref() else {
                 return Err(Error::usage(
                     place(),
-                    "this is a table, no key",
+                    "this is a table, not a key",
                     format!("write [{name}], and its keys below"),
                 ));
             };

@@ -85,11 +85,11 @@ impl Default for RunSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FitSettings {
-    /// Interval that the bandwidth is searched in.
+    /// Search interval of the bandwidth.
     pub bandwidth_rule: BandwidthInterval,
     /// Seed of P_valid and of the splits for M.
     pub seed: u64,
-    /// Draws that P_valid is counted on; 10^9 tell it to 0.01 % where it is 0.1.
+    /// Number of draws for P_valid; 10^9 tell it to 0.01 % where it is 0.1.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub valid_draws: u64,
 }

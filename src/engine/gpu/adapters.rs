@@ -1,4 +1,4 @@
-//! Which compute devices this machine has, and what each can do.
+//! The compute devices of this machine and their properties.
 
 use std::fmt;
 
@@ -7,19 +7,19 @@ use serde::Serialize;
 use crate::engine::device_choice::pci_bus_id;
 use crate::{Error, Result};
 
-/// What kind of processor stands behind an adapter, as its driver says.
+/// Kind of device, as its driver reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DeviceKind {
     /// A GPU with memory of its own.
     Discrete,
-    /// A GPU that shares the processor's memory.
+    /// A GPU that shares the CPU's memory.
     Integrated,
-    /// A GPU that a hypervisor passes on, whole or in part.
+    /// A GPU behind a hypervisor, whole or in part.
     Virtual,
-    /// A rasterizer that runs on the processor: llvmpipe, WARP.
+    /// A rasterizer that runs on the CPU: llvmpipe, WARP.
     Software,
-    /// The driver does not say; OpenGL never does for a discrete GPU.
+    /// The driver does not report it; OpenGL never does for a discrete GPU.
     Other,
 }
 
@@ -48,8 +48,8 @@ impl From<wgpu::DeviceType> for DeviceKind {
     }
 }
 
-/// Interface to a device, in order of preference: Vulkan first, because only there the shader reaches the
-/// driver with every rounding pinned.
+/// Interface to a device, in order of preference: Vulkan first, because only there equality with the CPU is
+/// guaranteed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Api {
     /// Vulkan.
@@ -95,44 +95,43 @@ impl fmt::Display for Api {
 /// The limits that bound a chunk of lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct AdapterLimits {
-    /// Largest buffer, bytes.
+    /// Maximum size of a buffer, bytes.
     pub max_buffer_size: u64,
-    /// Largest part of a buffer that a shader can see at once, bytes.
+    /// Maximum size of a buffer binding, bytes.
     pub max_storage_buffer_binding_size: u64,
-    /// Most workgroups along one axis of a dispatch.
+    /// Maximum number of workgroups along one axis of a dispatch.
     pub max_compute_workgroups_per_dimension: u32,
-    /// Most lanes in a workgroup.
+    /// Maximum number of lanes in a workgroup.
     pub max_compute_invocations_per_workgroup: u32,
 }
 
 /// One device under one interface, described without the interface's types.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AdapterCard {
-    /// Position in [`Adapters::cards`]; what `--device INDEX` counts.
+    /// Position in [`Adapters::cards`]; the index of `--device INDEX`.
     pub index: usize,
-    /// The device's name, as its driver says.
+    /// The device's name from its driver.
     pub name: String,
-    /// Kind of processor.
+    /// Kind of device.
     pub kind: DeviceKind,
-    /// Interface it is reached through.
+    /// Interface to the device.
     pub api: Api,
-    /// Driver; empty where the interface does not tell.
+    /// Driver; empty if unknown.
     pub driver: String,
-    /// Version of the driver, in its own words; may be empty.
+    /// Version text of the driver; may be empty.
     pub driver_info: String,
-    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case (`pci_bus_id`); `None` where the interface does
-    /// not tell and for what is on no bus.
+    /// Place on the PCI bus as `dddd:bb:dd.f`, lower case (`pci_bus_id`); `None` if unknown or not on a bus.
     pub pci_bus_id: Option<String>,
     /// Vendor, as a PCI id where the vendor has one.
     pub vendor: u32,
-    /// Model, by the vendor's numbering; 0 where the interface does not tell.
+    /// Model number of the vendor; 0 if unknown.
     pub device: u32,
     /// Limits of a dispatch.
     pub limits: AdapterLimits,
-    /// The device can time its own work.
+    /// The device supports timestamps.
     pub timestamps: bool,
-    /// The shader can be handed over as SPIR-V with every float operation kept as written, so that results
-    /// equal the processor's: Vulkan with shader passthrough. Elsewhere equality is not promised.
+    /// The device accepts SPIR-V with `NoContraction`, so that results equal the CPU's (Vulkan with shader
+    /// passthrough). Elsewhere equality is not guaranteed.
     pub exact_path: bool,
 }
 
@@ -163,26 +162,26 @@ impl AdapterCard {
         })
     }
 
-    /// A GPU, as far as its driver says so; `Other` could be anything and counts as none.
+    /// Does the driver report a GPU? `Other` counts as none.
     pub fn is_real(&self) -> bool {
         matches!(self.kind, DeviceKind::Discrete | DeviceKind::Virtual | DeviceKind::Integrated)
     }
 
-    /// Whether the environment hides it ([`super::visible()`]): a GPU that is not in the list of allowed PCI bus
-    /// ids, also one without an id. A software rasterizer never: the environment speaks of GPUs.
+    /// Does the environment hide it ([`super::visible()`])? It hides GPUs outside the list of allowed PCI bus ids,
+    /// and those without an id, but never software rasterizers.
     pub fn is_hidden_by(&self, visible: Option<&[String]>) -> bool {
         let Some(visible) = visible else { return false };
         self.kind != DeviceKind::Software && !self.pci_bus_id.as_ref().is_some_and(|bus| visible.contains(bus))
     }
 
-    /// Index, name, interface and PCI bus id, to tell devices apart in a message.
+    /// Index, name, interface and PCI bus id, for messages.
     pub fn one_line(&self) -> String {
         let bus = self.pci_bus_id.as_ref().map(|bus| format!(", pci:{bus}")).unwrap_or_default();
         format!("{}: {} ({}, {}{bus})", self.index, self.name, self.kind.label(), self.api)
     }
 }
 
-/// The devices of this machine, in an order that does not change from run to run.
+/// The devices of this machine, in a reproducible order.
 #[derive(Debug, Clone)]
 pub struct Adapters {
     cards: Vec<AdapterCard>,
@@ -190,13 +189,12 @@ pub struct Adapters {
 }
 
 impl Adapters {
-    /// Asks every driver for its devices. A machine without any gives an empty list, never an error.
+    /// Lists the devices of all drivers. A machine without devices gives an empty list, never an error.
     ///
-    /// OpenGL is asked only where no other interface answers: it shows the same devices again, without bus ids.
+    /// OpenGL is used only if no other interface has a device, because it lists the same devices without bus ids.
     ///
-    /// Nothing is written to stdout. On stderr Mesa's device-select layer of Vulkan says twice that
-    /// `XDG_RUNTIME_DIR` is not set, where it is not and there is no display; `NODEVICE_SELECT=1`, which the program
-    /// sets for itself, silences it.
+    /// Nothing is written to stdout. Without `XDG_RUNTIME_DIR` and display, Mesa's device-select layer warns twice on
+    /// stderr; the program sets `NODEVICE_SELECT=1` to silence it.
     pub fn enumerate() -> Adapters {
         let mut found = ask(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
         if found.is_empty() {
@@ -210,32 +208,32 @@ impl Adapters {
         Adapters { cards, adapters }
     }
 
-    /// What is known of each: by interface, real before software, by PCI bus id, by name.
+    /// All devices: by interface, real before software, by PCI bus id, by name.
     pub fn cards(&self) -> &[AdapterCard] {
         &self.cards
     }
 
-    /// The adapter of a card, to open the device with; the list keeps its own.
+    /// The adapter of a card, with which the device is opened.
     ///
     /// # Errors
     /// [`Error::Internal`] if there is no card with this index.
     pub fn take(&self, index: usize) -> Result<wgpu::Adapter> {
         let adapter = self.adapters.get(index).cloned();
-        adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was asked for", self.adapters.len())))
+        adapter.ok_or_else(|| Error::Internal(format!("device {index} of {} was requested", self.adapters.len())))
     }
 }
 
 fn ask(backends: wgpu::Backends) -> Vec<(AdapterCard, wgpu::Adapter)> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
-    // The same in every build: validation layers are slow and talk.
+    // The same in every build: validation layers are slow and write messages.
     descriptor.flags = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
     let instance = wgpu::Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(backends));
     adapters.into_iter().filter_map(|adapter| Some((AdapterCard::of(&adapter)?, adapter))).collect()
 }
 
-/// What the list is ordered by. Model numbers last, for twins without a bus id.
+/// Sort key of the list. Model numbers last, for equal devices without a bus id.
 fn order(card: &AdapterCard) -> impl Ord {
     let software = card.kind == DeviceKind::Software;
     let bus = card.pci_bus_id.clone();

@@ -1,21 +1,20 @@
-//! Which device a user means: `--backend auto|cpu|gpu` and `--device INDEX|pci:BUS|NAME`.
+//! Selects the device of `--backend auto|cpu|gpu` and `--device INDEX|pci:BUS|NAME`.
 //!
-//! A software rasterizer runs on the same cores as the CPU backend, only slower; it is taken only when it is named.
+//! A software rasterizer runs on the same cores as the CPU backend, but slower, so it must be named.
 
 use super::adapters::{AdapterCard, DeviceKind};
 use crate::engine::device_choice::{BackendChoice, DeviceName};
 use crate::{Error, Place, Result};
 
-/// The index of the device to use, or `None` for the processor.
+/// The index of the device to use, or `None` for the CPU.
 ///
-/// `cards` in the order of [`super::Adapters`]. `visible` holds the PCI bus ids that the environment allows
-/// ([`super::visible()`]): where it is given, it hides every other GPU, also one without a bus id, and its order is
-/// the order of preference. Without it, discrete GPUs come before virtual ones before integrated ones. Software
-/// rasterizers and devices of unknown kind are taken only when named.
+/// `cards` have the order of [`super::Adapters`]. `visible` has the PCI bus ids that the environment allows
+/// ([`super::visible()`]), in order of preference; it hides every other GPU. Without it the order is discrete,
+/// virtual, integrated. Software rasterizers and devices of unknown kind must be named.
 ///
 /// # Errors
-/// [`Error::Usage`]: a device together with `Cpu`; a name that means no device or several. [`Error::Device`]:
-/// `Gpu` without a usable GPU; a named device that the environment hides.
+/// [`Error::Usage`]: a device together with `Cpu`; a name of no device or of several. [`Error::Device`]: `Gpu`
+/// without a usable GPU; a named device that the environment hides.
 pub fn choose(
     cards: &[AdapterCard],
     backend: BackendChoice,
@@ -49,7 +48,7 @@ fn first_real<'a>(cards: &'a [AdapterCard], visible: Option<&[String]>) -> Optio
 fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[String]>) -> Result<&'a AdapterCard> {
     let all = matching(cards, device);
     let Some(&any) = all.first() else {
-        let problem = format!("no device of this machine is meant by `{device}`");
+        let problem = format!("no device of this machine matches `{device}`");
         return Err(Error::usage(Place::option("device"), problem, list(cards.iter())));
     };
     let usable: Vec<&AdapterCard> = all.iter().copied().filter(|card| !card.is_hidden_by(visible)).collect();
@@ -65,14 +64,14 @@ fn named<'a>(cards: &'a [AdapterCard], device: &DeviceName, visible: Option<&[St
         ));
     };
     if usable.iter().any(|card| !same_device(first, card)) {
-        let problem = format!("`{device}` means more than one device");
+        let problem = format!("`{device}` matches more than one device");
         return Err(Error::usage(Place::option("device"), problem, list(usable.into_iter())));
     }
     Ok(first)
 }
 
-/// All cards that are meant, the preferred interface first. A name that is complete means no longer one: `NVIDIA L4`
-/// is not `NVIDIA L40`.
+/// All matching cards, the preferred interface first. A complete name has priority: `NVIDIA L4` does not match
+/// `NVIDIA L40`.
 fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a AdapterCard> {
     match device {
         DeviceName::Index(index) => cards.iter().filter(|card| card.index == *index).collect(),
@@ -88,8 +87,8 @@ fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a Adapte
     }
 }
 
-/// Whether two cards are one physical device: the bus id decides; where one has none, the same name under another
-/// interface (OpenGL appends to it: `NVIDIA L4/PCIe/SSE2`).
+/// Are two cards one physical device? The bus id decides, or the same name under another interface (OpenGL appends to
+/// it: `NVIDIA L4/PCIe/SSE2`).
 fn same_device(a: &AdapterCard, b: &AdapterCard) -> bool {
     match (&a.pci_bus_id, &b.pci_bus_id) {
         _ if a.index == b.index => true,
@@ -115,8 +114,8 @@ fn no_gpu(cards: &[AdapterCard], visible: Option<&[String]>) -> Error {
         };
         return Error::device(
             "option `backend = gpu`",
-            "this machine has no GPU that its drivers show",
-            format!("`lanesweep verify devices` shows what there is; use option `backend = cpu`{named}"),
+            "the drivers of this machine show no GPU",
+            format!("`lanesweep verify devices` lists all devices; use option `backend = cpu`{named}"),
         );
     }
     Error::device(
@@ -232,7 +231,7 @@ mod tests {
             assert_eq!(auto(cards, Some(&ids(&[A]))), None);
             let error = choose(cards, BackendChoice::Gpu, None, None).unwrap_err();
             assert!(matches!(error, Error::Device { .. }), "{error}");
-            assert!(says(error).contains("this machine has no GPU"));
+            assert!(says(error).contains("this machine show no GPU"));
         }
         let software = software_only();
         for device in ["0", "llvmpipe", "LLVMPIPE (llvm"] {

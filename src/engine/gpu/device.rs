@@ -1,7 +1,7 @@
-//! The open device: its pipelines, its shared tables and its troubles. Only its owner's thread uses it.
+//! The open device: pipelines, shared tables and errors. Only its owner's thread uses it.
 
-// `create_shader_module_passthrough` hands SPIR-V to the driver unseen; it is naga's own output, from shaders
-// that are part of this crate, with decorations added. `create_shader_module_trusted` leaves out run-time checks.
+// `create_shader_module_passthrough` passes SPIR-V to the driver unchecked; it is naga's output for shaders of this
+// crate, with decorations added. `create_shader_module_trusted` leaves out run-time checks.
 #![allow(unsafe_code)]
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,20 +13,20 @@ use super::spirv::{Checks, exact_spirv};
 use crate::model::driver::ModelId;
 use crate::{Error, Result};
 
-/// How a device is used.
+/// Options of a device.
 #[derive(Debug, Clone)]
 pub struct GpuOptions {
     /// Run-time checks of the shaders.
     pub checks: Checks,
-    /// A dispatch that takes longer than this is given up, and the device with it.
+    /// Time-out of a dispatch; after it the device counts as lost.
     pub timeout: Duration,
     /// Lanes per model of the first job; later ones follow the device's speed.
     pub first_lanes: u64,
-    /// Takes the plain path where the exact one exists, as on other interfaces: for tests.
+    /// Uses the plain path instead of the exact one, for tests.
     pub plain: bool,
-    /// Replaces text of the shaders before they are compiled, to see that verification finds it: for tests.
+    /// Replaces text of the shaders before compilation, so that tests can check that verification detects errors.
     pub shader_patch: Option<(String, String)>,
-    /// Makes one job fail: for tests.
+    /// Makes one job fail, for tests.
     pub fault: Option<Fault>,
 }
 
@@ -46,22 +46,22 @@ impl Default for GpuOptions {
 /// A job that fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// Which job, counted from 0 over the device's life.
+    /// Index of the job since the device was opened.
     pub at_job: u64,
-    /// How.
+    /// Kind of failure.
     pub kind: FaultKind,
 }
 
-/// How a job fails.
+/// Kind of an injected failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The device is lost for good.
+    /// The device is lost permanently.
     Lost,
-    /// The device has no memory left for this job.
+    /// The device has no memory for this job.
     OutOfMemory,
 }
 
-/// One model's pipeline, as it is asked for.
+/// Key of a model's pipeline.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PipelineSpec {
     pub model: ModelId,
@@ -73,7 +73,7 @@ pub(super) struct Device {
     pub name: String,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
-    /// Float operations reach the driver as written.
+    /// Float operations reach the driver unchanged.
     pub exact: bool,
     pub timestamps: bool,
     pub layout: wgpu::BindGroupLayout,
@@ -87,7 +87,7 @@ pub(super) struct Device {
 }
 
 impl Device {
-    /// Opens a device with everything it can.
+    /// Opens a device with all its features and limits.
     ///
     /// # Errors
     /// [`Error::Device`] where the driver refuses.
@@ -99,7 +99,7 @@ impl Device {
         let asked = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("lanesweep"),
             required_features: features,
-            // Not the 128 MiB of every browser: what this device can.
+            // The device's own limits, not the portable 128 MiB.
             required_limits: adapter.limits(),
             experimental_features: wgpu::ExperimentalFeatures::disabled(),
             memory_hints: wgpu::MemoryHints::Performance,
@@ -112,7 +112,7 @@ impl Device {
                 "choose another device, or option `backend = cpu`",
             )
         })?;
-        // Without these handlers an error of the device would be a panic.
+        // Without these handlers a device error would panic.
         let trouble = Arc::new(Mutex::new(None));
         let note = |trouble: &Arc<Mutex<Option<String>>>| {
             let trouble = Arc::clone(trouble);
@@ -230,7 +230,7 @@ impl Device {
                 },
             }
         };
-        // A passed-through module takes no constants: they are resolved in it.
+        // A passed-through module takes no constants; they are already resolved.
         let constants: &[(&str, f64)] = if self.exact { &[] } else { values };
         let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
@@ -255,13 +255,13 @@ impl Device {
         })
     }
 
-    /// A storage buffer with this content.
+    /// A storage buffer with the given content.
     pub fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
         let limits = self.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes.len() as u64 > most {
-            let problem = format!("the {label} take {} bytes, and it can hold {most} at once", bytes.len());
+            let problem = format!("the {label} take {} bytes, but the device holds at most {most}", bytes.len());
             return Err(Error::device(&self.name, problem, "use option `backend = cpu`, or split the data"));
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
@@ -271,7 +271,7 @@ impl Device {
         Ok(buffer)
     }
 
-    /// Lanes per model that a job may hold at most: what fits into the buffers of results.
+    /// Maximum number of lanes per model of a job, limited by the result buffers.
     pub fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
         // The read-back buffer holds the counts and times as well.
@@ -280,7 +280,7 @@ impl Device {
         ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
     }
 
-    /// Workgroups of a dispatch in two dimensions, because one ends at 65,535.
+    /// Workgroups of a dispatch in two dimensions, because one dimension is limited to 65,535.
     pub fn workgroups(&self, lanes: u32) -> (u32, u32) {
         let groups = lanes.div_ceil(WORKGROUP).max(1);
         let most = self.device.limits().max_compute_workgroups_per_dimension.max(1);
@@ -289,7 +289,7 @@ impl Device {
     }
 
     /// # Errors
-    /// [`Error::Device`] if something went wrong since the last time.
+    /// [`Error::Device`] if an error occurred since the last call.
     pub fn untroubled(&self) -> Result<()> {
         let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone();
         match trouble {
@@ -304,11 +304,11 @@ impl Device {
     }
 }
 
-/// Results of one job at most, bytes.
+/// Maximum size of the results of one job, bytes.
 const MAX_RESULT_BYTES: u64 = 256 << 20;
-/// Left for counts, times and rounding beside them.
+/// Reserve for counts, times and rounding, bytes.
 const SMALL_RESULT_BYTES: u64 = 4 << 20;
-/// Lanes per model of one job at most: their number and every index into their results stay far below 2³².
+/// Maximum number of lanes per model of one job, so that every index into their results stays far below 2³².
 const MAX_LANES: u64 = 1 << 27;
 
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.

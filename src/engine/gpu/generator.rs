@@ -1,14 +1,34 @@
-//! The generator on the device: what it reads, and the dispatch that fills a session's cases and tables.
+//! The generator on the device: its inputs, and the dispatch that fills a session's cases and tables.
 
 use super::device::Device;
-use super::inputs::{GeneratorInputs, Inputs};
 use super::records::Generation;
 use crate::Result;
 use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
 use crate::stats::random::normal_table;
 
-/// What a device needs to make cases.
+/// The tables of a session.
+pub(super) struct Inputs {
+    pub starts: wgpu::Buffer,
+    pub speed: wgpu::Buffer,
+    pub lateral: wgpu::Buffer,
+    pub cases: wgpu::Buffer,
+    /// Makes cases and tables, if the host does not.
+    pub generator: Option<GeneratorInputs>,
+}
+
+/// The generator's buffers of one session.
+pub(super) struct GeneratorInputs {
+    pub template: Generation,
+    pub generation: wgpu::Buffer,
+    pub recipe: wgpu::Buffer,
+    pub numbers: wgpu::Buffer,
+    pub aliases: wgpu::Buffer,
+    pub sobol: wgpu::Buffer,
+    pub normal: wgpu::Buffer,
+}
+
+/// Inputs of the generator on a device.
 pub(super) struct GeneratorSetup {
     generation: Generation,
     recipe: Recipe,
@@ -56,13 +76,13 @@ impl GeneratorSetup {
         GeneratorSetup { generation, recipe: generator.recipe, numbers, aliases, sobol: sobol_words }
     }
 
-    /// Bytes that one sample takes in cases and tables.
+    /// Bytes of one sample in cases and tables.
     pub fn sample_bytes(&self) -> u64 {
         let tables = 4 * u64::from(self.generation.speed_stride) + 8 * u64::from(self.generation.lateral_stride);
         size_of::<LaneCase<f32>>() as u64 + tables
     }
 
-    /// Brings everything to the device.
+    /// Copies all inputs to the device.
     pub fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
         device.generator()?;
         use wgpu::BufferUsages as Use;
@@ -78,8 +98,8 @@ impl GeneratorSetup {
     }
 }
 
-/// Fills cases and tables with the samples from `first` on. Jobs that were submitted before still read the old ones:
-/// a queue keeps its order.
+/// Fills cases and tables with the samples from `first` on. Jobs submitted before still read the old ones, because a
+/// queue keeps its order.
 pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, count: u32) -> Result<()> {
     let Some(made) = &inputs.generator else { return Err(device.failed("the session makes no cases")) };
     let template = made.template;

@@ -1,4 +1,4 @@
-//! One thread owns the device. It submits jobs as long as the ring has room, and waits for the oldest.
+//! One thread owns the device. It submits jobs while the ring has space, and waits for the oldest.
 
 use std::collections::{HashMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,23 +8,23 @@ use std::time::Instant;
 
 use super::adapters::AdapterCard;
 use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
+use super::generator::Inputs;
 use super::generator::{GeneratorSetup, generate};
-use super::inputs::Inputs;
 use super::records::StartRecord;
 use super::ring::{Answer, Flight, Job, RING, Slot};
 use crate::engine::LaneCase;
 use crate::{Error, Result};
 
-/// What a session needs on the device.
+/// Requirements of a session on the device.
 pub(super) struct Setup {
     pub starts: Vec<StartRecord>,
     pub speed: Vec<f32>,
     pub lateral: Vec<[f32; 2]>,
-    /// What makes the cases on the device, where the host does not.
+    /// Makes the cases on the device, if the host does not.
     pub generator: Option<GeneratorSetup>,
     /// Models of a job.
     pub models: u64,
-    /// Compiled before the first job, so that a refusal is known at once.
+    /// Compiled before the first job, so that errors appear at once.
     pub pipelines: Vec<PipelineSpec>,
 }
 
@@ -36,7 +36,7 @@ pub(super) enum Cases {
     Made(u64, u32),
 }
 
-/// A job and the cases it needs, where they are not there yet.
+/// A job and its cases, unless the device already has them.
 pub(super) struct Request {
     pub session: u64,
     pub cases: Option<Cases>,
@@ -53,7 +53,7 @@ pub(super) enum Command {
     Close {
         session: u64,
     },
-    /// The backend goes; sessions that it leaves behind hear that the device is gone.
+    /// The backend ends; remaining sessions get an error.
     End,
 }
 
@@ -61,15 +61,15 @@ pub(super) enum Command {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prepared {
     pub session: u64,
-    /// Lanes per model of a job at most: verdicts, outcomes, counts.
+    /// Maximum number of lanes per model of a job: verdicts, outcomes, counts.
     pub max_lanes: [u64; 3],
-    /// Cases that the device holds at most at once.
+    /// Maximum number of cases on the device.
     pub max_cases: u64,
 }
 
-/// What is known of the device once it is open.
+/// Description of the open device.
 #[derive(Debug, Clone)]
-pub(super) struct Opened {
+pub(super) struct OpenedDevice {
     pub exact: bool,
 }
 
@@ -78,14 +78,14 @@ pub(super) fn start(
     adapter: wgpu::Adapter,
     card: AdapterCard,
     options: GpuOptions,
-) -> Result<(Sender<Command>, Opened, JoinHandle<()>)> {
+) -> Result<(Sender<Command>, OpenedDevice, JoinHandle<()>)> {
     let (sender, commands) = mpsc::channel();
     let (opened_sender, opened) = mpsc::channel();
     let name = card.name.clone();
     let work = move || match Device::open(&adapter, &card, options) {
         Ok(device) => {
-            let _ = opened_sender.send(Ok(Opened { exact: device.exact }));
-            Owner::new(device).serve(&commands);
+            let _ = opened_sender.send(Ok(OpenedDevice { exact: device.exact }));
+            DeviceOwner::new(device).serve(&commands);
         }
         Err(error) => {
             let _ = opened_sender.send(Err(error));
@@ -103,27 +103,27 @@ pub(super) fn start(
 
 /// The error of a thread that ended.
 pub(super) fn gone(device: &str) -> Error {
-    Error::device(device, "it is closed, or its driver failed and took its thread along", "use option `backend = cpu`")
+    Error::device(device, "it is closed, or its driver failed and ended its thread", "use option `backend = cpu`")
 }
 
-struct Owner {
+struct DeviceOwner {
     device: Device,
     sessions: HashMap<u64, Inputs>,
     next_session: u64,
     jobs: u64,
     free: Vec<Slot>,
     flying: VecDeque<(Slot, Flight, Sender<Result<Answer>>)>,
-    /// When the last job was done.
+    /// End of the last job.
     last_done: Option<Instant>,
-    /// Why no further job is tried.
+    /// The error after which no further job is submitted.
     dead: Option<String>,
 }
 
-impl Owner {
-    fn new(device: Device) -> Owner {
+impl DeviceOwner {
+    fn new(device: Device) -> DeviceOwner {
         let free = (0..RING).map(|_| Slot::default()).collect();
         let (sessions, flying) = (HashMap::new(), VecDeque::new());
-        Owner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
+        DeviceOwner { device, sessions, next_session: 0, jobs: 0, free, flying, last_done: None, dead: None }
     }
 
     fn serve(&mut self, commands: &Receiver<Command>) {
@@ -207,7 +207,7 @@ impl Owner {
             Some(Cases::Given(cases)) => {
                 let bytes: &[u8] = bytemuck::cast_slice(&cases);
                 if inputs.cases.size() >= bytes.len() as u64 {
-                    // Ordered after the jobs under way, which still read the old ones.
+                    // Ordered after the jobs in flight, which still read the old ones.
                     device.queue.write_buffer(&inputs.cases, 0, bytes);
                 } else {
                     inputs.cases = device.upload("cases", &cases)?;
@@ -218,7 +218,7 @@ impl Owner {
         match slot.submit(device, inputs, job) {
             Ok(flight) => Ok((slot, flight)),
             Err(error) => {
-                // Its buffers may be half made.
+                // Its buffers may be incomplete.
                 self.free.push(Slot::default());
                 self.dead = Some(error.to_string());
                 Err(error)
@@ -248,7 +248,7 @@ impl Owner {
     fn alive(&self) -> Result<()> {
         match &self.dead {
             None => Ok(()),
-            Some(why) => Err(self.device.failed(format!("it failed before ({why})"))),
+            Some(why) => Err(self.device.failed(format!("it failed earlier ({why})"))),
         }
     }
 
@@ -262,14 +262,14 @@ impl Owner {
                     self.device.device.destroy();
                     Ok(())
                 }
-                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory left for this job")),
+                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory for this job")),
             },
             _ => Ok(()),
         }
     }
 }
 
-/// Cases on the device at once, bytes.
+/// Maximum size of the cases on the device, bytes.
 const MAX_CASE_BYTES: u64 = 64 << 20;
-/// The same where the device makes them, with their tables.
+/// Maximum size of the cases and tables that the device makes, bytes.
 const MAX_MADE_BYTES: u64 = 512 << 20;

@@ -1,8 +1,8 @@
-//! The records that cross to the device and back, and their casts to bytes. `tests/device/shaders.rs`
-//! compares each with its WGSL twin, size and offsets, through naga.
+//! The records that host and device exchange, and their casts to bytes. `tests/device/shaders.rs` compares each with
+//! its WGSL twin, size and offsets, through naga.
 
-// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the
-// sizes below are checked when this is compiled. bytemuck's derive cannot do that for generic types.
+// These records may be cast to bytes, because they are `repr(C)` with 32-bit fields only and no padding (checked
+// below at compile time). bytemuck's derive does not support generic types.
 #![allow(unsafe_code)]
 
 use bytemuck::{Pod, Zeroable};
@@ -98,7 +98,7 @@ pub struct OutcomeRecord {
 }
 
 impl OutcomeRecord {
-    /// The outcome, in the lane's own numbers; `None` where the word is none that a lane writes.
+    /// The outcome in lane arithmetic; `None` if no lane writes such a word.
     pub fn outcome(&self, criteria: &Criteria<f32>) -> Option<Outcome<f32>> {
         let verdicts = Verdicts((self.word & 0xf) as u8);
         let contact = match (self.word >> 4) & 3 {
@@ -108,7 +108,7 @@ impl OutcomeRecord {
             _ => return None,
         };
         let end = match self.word >> 8 {
-            // A record that no lane wrote reads as 0.
+            // A record that no lane wrote is 0.
             0 if contact != Contact::None => EndReason::Contact,
             1 => EndReason::Settled,
             2 => EndReason::Standstill,
@@ -141,10 +141,10 @@ impl OutcomeRecord {
 /// Words per cell of the counts.
 pub const CELL_WORDS: usize = 8;
 
-/// An empty cell: nothing counted, no smallest value yet.
+/// An empty cell: zero counts, no minimum.
 pub const EMPTY_CELL: [u32; CELL_WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0];
 
-/// The number behind an integer that is ordered as the number is.
+/// The number of an order-preserving integer.
 pub fn from_ordered(key: u32) -> f32 {
     f32::from_bits(if key & 0x8000_0000 != 0 { key & 0x7fff_ffff } else { !key })
 }
@@ -171,11 +171,11 @@ pub struct Generation {
     pub components: u32,
     /// 1 where components have weights.
     pub weighted: u32,
-    /// Place of the first mean among the numbers.
+    /// Offset of the first mean in the numbers.
     pub first_mean: u32,
-    /// Place of the first factor.
+    /// Offset of the first factor.
     pub first_factor: u32,
-    /// Place of the components' indices of factors.
+    /// Offset of the components' factor indices.
     pub first_factor_of: u32,
     /// Entries of each sample in the table of speeds.
     pub speed_stride: u32,

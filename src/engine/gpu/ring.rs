@@ -6,7 +6,7 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
-use super::inputs::Inputs;
+use super::generator::Inputs;
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
 use crate::engine::Wanted;
 use crate::{Error, Result};
@@ -51,9 +51,9 @@ impl Job {
 pub(super) struct Answer {
     /// Verdict words of each model.
     pub words: Vec<Vec<u32>>,
-    /// Outcomes of each model, where wanted.
+    /// Outcomes of each model, if requested.
     pub outcomes: Vec<Vec<OutcomeRecord>>,
-    /// Cells of each model, one per variant, where wanted.
+    /// Cells of each model, one per variant, if requested.
     pub cells: Vec<Vec<[u32; CELL_WORDS]>>,
     /// Time of the slowest dispatch, s.
     pub slowest_s: f64,
@@ -61,7 +61,7 @@ pub(super) struct Answer {
     pub device_s: f64,
 }
 
-/// The buffers of one job; they grow and stay.
+/// The buffers of one job; they are reused and only grow.
 #[derive(Default)]
 pub(super) struct Slot {
     buffers: Option<Buffers>,
@@ -77,18 +77,18 @@ struct Buffers {
     models: usize,
 }
 
-/// Where each part of the results lies in the read-back buffer, bytes.
+/// Offset of each part of the results in the read-back buffer, bytes.
 #[derive(Clone, Copy)]
-struct Parts {
+struct ResultOffsets {
     verdicts: u64,
     outcomes: u64,
     counts: u64,
     times: u64,
 }
 
-impl Parts {
-    fn of(job: &Job, models: usize) -> Parts {
-        Parts {
+impl ResultOffsets {
+    fn of(job: &Job, models: usize) -> ResultOffsets {
+        ResultOffsets {
             verdicts: (models * job.words() * 4) as u64,
             outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
             counts: ((models + models * job.cells() * CELL_WORDS) * 4) as u64,
@@ -105,17 +105,17 @@ impl Parts {
 /// A job in flight.
 pub(super) struct Flight {
     job: Job,
-    parts: Parts,
+    parts: ResultOffsets,
     submission: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
     since: Instant,
 }
 
 impl Slot {
-    /// Gives a job to the device.
+    /// Submits a job to the device.
     pub fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
         let models = job.pipelines.len();
-        let parts = Parts::of(&job, models);
+        let parts = ResultOffsets::of(&job, models);
         self.grow(device, &parts, models);
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
@@ -162,7 +162,7 @@ impl Slot {
         let (x, y) = device.workgroups(job.lanes());
         let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
-        // Words that no lane writes must read as zero.
+        // Words that no lane writes must be zero.
         if parts.verdicts > 0 {
             encoder.clear_buffer(&buffers.verdicts, 0, Some(parts.verdicts));
         }
@@ -196,7 +196,7 @@ impl Slot {
         }
         let (sender, mapped) = mpsc::channel();
         encoder.map_buffer_on_submit(&buffers.readback, wgpu::MapMode::Read, 0..parts.total(), move |result| {
-            // Nobody listens if the job was abandoned.
+            // The receiver is gone if the job was abandoned.
             let _ = sender.send(result);
         });
         let since = Instant::now();
@@ -205,25 +205,27 @@ impl Slot {
         Ok(Flight { job, parts, submission, mapped, since })
     }
 
-    /// Waits for a job and reads its results. `previous` is when the job before it was done.
+    /// Waits for a job and reads its results. `previous` is the end of the previous job.
     ///
-    /// The outer error says that the device's state is unknown; the inner one that it did its job badly.
+    /// The outer error means that the device's state is unknown; the inner one that this job failed.
     pub fn finish(&mut self, device: &Device, flight: Flight, previous: Option<Instant>) -> Result<Result<Answer>> {
         let wait = wgpu::PollType::Wait {
             submission_index: Some(flight.submission.clone()),
             timeout: Some(device.options.timeout),
         };
         device.device.poll(wait).map_err(|error| match error {
-            wgpu::PollError::Timeout => device.failed(format!("it gave no answer for {:?}", device.options.timeout)),
+            wgpu::PollError::Timeout => {
+                device.failed(format!("it did not respond within {:?}", device.options.timeout))
+            }
             error => device.failed(error.to_string()),
         })?;
         device.untroubled()?;
-        // Not the time it waited behind the job before it.
+        // Excludes the time in the queue behind the previous job.
         let began = previous.map_or(flight.since, |done| done.max(flight.since));
         let wall_s = began.elapsed().as_secs_f64();
         let mapped = flight.mapped.recv_timeout(device.options.timeout);
         mapped
-            .map_err(|_| device.failed("its results did not come back"))?
+            .map_err(|_| device.failed("its results were not returned"))?
             .map_err(|e| device.failed(e.to_string()))?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let answer = {
@@ -235,7 +237,7 @@ impl Slot {
         Ok(answer)
     }
 
-    fn grow(&mut self, device: &Device, parts: &Parts, models: usize) {
+    fn grow(&mut self, device: &Device, parts: &ResultOffsets, models: usize) {
         use wgpu::BufferUsages as Use;
         let enough = self.buffers.as_ref().is_some_and(|b| {
             b.models == models
@@ -249,7 +251,7 @@ impl Slot {
         }
         let limits = device.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        // Doubling makes growth rare, but never beyond what the device takes.
+        // Doubling makes growth rare; the device's maximum is the limit.
         let room = |bytes: u64, most: u64| bytes.next_power_of_two().min(most).max(bytes);
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));
@@ -281,7 +283,7 @@ fn launch_stride(device: &Device) -> u32 {
     (size_of::<Launch>() as u32).next_multiple_of(device.device.limits().min_uniform_buffer_offset_alignment)
 }
 
-/// Bytes into results; every lane must have been computed.
+/// Converts bytes to results; every lane must have been computed.
 fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<Answer> {
     let Flight { job, parts, .. } = flight;
     let models = job.pipelines.len();
@@ -293,8 +295,9 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let (done, cells) = counts.split_at(models);
     if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
         let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
-        let problem = format!("it computed {} of {lanes} lanes of {name} to their end", done[model]);
-        let help = "use option `backend = cpu`; where lanes have very many steps, a larger time step (option `dt`) may do as well";
+        let problem = format!("it completed {} of {lanes} lanes of {name}", done[model]);
+        let help =
+            "use option `backend = cpu`; if lanes have very many steps, a larger time step (option `dt`) may help";
         return Err(Error::device(&device.name, problem, help));
     }
     let per_model = |part: &[u8], model: usize| {
@@ -307,7 +310,7 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let measured: Vec<f64> = if device.timestamps { dispatches.collect() } else { Vec::new() };
     let device_s: f64 = measured.iter().sum();
     let slowest_s = measured.iter().fold(0.0, |a: f64, b| a.max(*b));
-    // Without timestamps, or where they stand still, the wall clock bounds it.
+    // Without working timestamps, the wall clock bounds it.
     let timed = slowest_s > 0.0;
     Ok(Answer {
         words: (0..models).map(|m| bytemuck::pod_collect_to_vec(&per_model(verdicts, m))).collect(),

@@ -1,26 +1,29 @@
-//! A plan on the device: cuts units into jobs, keeps the ring filled, puts results back into the plan's order.
+//! The GPU as a backend, opened once and used by any number of sessions. A session is a plan on the device: it divides
+//! units into jobs, keeps the ring filled, and restores the plan's order in the results.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::JoinHandle;
 
 use rayon::prelude::*;
 
+use super::adapters::{AdapterCard, Adapters};
+use super::device::{GpuOptions, PipelineSpec};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
-use super::pacing::Pacer;
 use super::records::{CELL_WORDS, StartRecord, from_ordered};
 use super::ring::{Answer, Job, RING};
-use super::{device::PipelineSpec, shader};
-use crate::engine::{CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use super::shader;
+use crate::engine::{Backend, CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
-/// A chunk is several jobs long, so that the ring stays full: about three seconds with four models. Until a job has been
-/// timed it is one job.
+/// Jobs per chunk, so that the ring stays full: about three seconds with four models. Before the first measurement a
+/// chunk is one job.
 const JOBS_PER_CHUNK: u64 = 8;
 
-/// Steps per model of the first job, should each lane make every step.
+/// Steps per model of the first job, if each lane makes every step.
 const FIRST_STEPS: u64 = 1 << 26;
 
 pub(super) struct GpuSession<'p> {
@@ -31,13 +34,13 @@ pub(super) struct GpuSession<'p> {
     /// One per block.
     constants: Vec<Constants<f32>>,
     pacer: Pacer,
-    /// The cases that the device holds: block, units of it, some of them with a second vehicle.
+    /// The cases on the device: block, its units, and whether one of them has a second vehicle.
     window: Option<(usize, Range<u64>, bool)>,
     /// Time of all dispatches so far, s.
     device_s: f64,
 }
 
-/// Part of a run that is under way.
+/// Part of a run in flight.
 struct Piece {
     block: usize,
     /// Units within the block.
@@ -55,7 +58,7 @@ impl<'p> GpuSession<'p> {
             pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));
         }
         if pipelines.is_empty() {
-            return Err(Error::Internal("a plan without lanes has nothing to do on a device".to_owned()));
+            return Err(Error::Internal("a plan without lanes cannot run on a device".to_owned()));
         }
         let setup = Box::new(Setup {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
@@ -76,14 +79,14 @@ impl<'p> GpuSession<'p> {
         self.prepared.max_lanes[wanted as usize]
     }
 
-    /// Sends one job of units from `units` on; says how far it reaches.
+    /// Sends one job of units from the start of `units`; returns its end.
     fn send(&mut self, block: usize, units: Range<u64>, wanted: Wanted) -> Result<Piece> {
         let plan = self.plan;
         let variants = plan.blocks[block].variants.len() as u64;
         let per_unit = variants * plan.headways.len() as u64;
         let most = self.max_lanes(wanted);
         if per_unit > most || variants > self.prepared.max_cases {
-            let problem = format!("one scenario has {per_unit} lanes per model, and it can hold {most} at once");
+            let problem = format!("one scenario has {per_unit} lanes per model, but the device holds at most {most}");
             return Err(Error::device(&self.device, problem, "use option `backend = cpu`, or fewer headways"));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
@@ -91,7 +94,7 @@ impl<'p> GpuSession<'p> {
         if !inside {
             let room = self.prepared.max_cases / variants;
             let end = (units.start + room).min(plan.blocks[block].units.held().end);
-            // Not beyond what is asked for: a generator's samples have no natural end.
+            // Within the requested units, because a generator's samples have no end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };
             let is_cut_out = plan.blocks[block].category == Category::CutOut;
             let paired = if plan.generator().is_some() {
@@ -124,7 +127,7 @@ impl<'p> GpuSession<'p> {
         Ok(Piece { block, units: units.start..end, answer })
     }
 
-    /// Waits for a piece and puts it where it belongs.
+    /// Waits for a piece and stores its results.
     fn collect(&mut self, piece: Piece, chunk: &mut Chunk, wanted: Wanted) -> Result<()> {
         let answer = piece.answer.recv().map_err(|_| owner::gone(&self.device))??;
         let plan = self.plan;
@@ -153,7 +156,7 @@ impl<'p> GpuSession<'p> {
                     .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
                     .collect();
                 let outcomes = outcomes.ok_or_else(|| {
-                    Error::device(&self.device, "it left a lane unwritten", "use option `backend = cpu`")
+                    Error::device(&self.device, "it did not write a lane", "use option `backend = cpu`")
                 })?;
                 // Pieces come in the plan's order.
                 chunk.outcomes.extend(outcomes);
@@ -162,7 +165,7 @@ impl<'p> GpuSession<'p> {
         Ok(())
     }
 
-    /// Sends the jobs of an interval of units and collects what they give.
+    /// Sends the jobs of an interval of units and collects their results.
     fn run_jobs(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
@@ -198,7 +201,7 @@ impl Session for GpuSession<'_> {
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let chunk = self.run_jobs(units, wanted);
         if chunk.is_err() {
-            // Whether the job that failed has brought its cases to the device is not known.
+            // It is unknown whether the failed job copied its cases to the device.
             self.window = None;
         }
         chunk
@@ -217,7 +220,7 @@ impl Session for GpuSession<'_> {
 
 impl Drop for GpuSession<'_> {
     fn drop(&mut self) {
-        // Where the thread has ended, so has its session.
+        // If the thread has ended, its session has ended too.
         let _ = self.commands.send(Command::Close { session: self.prepared.session });
     }
 }
@@ -256,5 +259,144 @@ fn counts(cell: &[u32; CELL_WORDS]) -> CellCounts {
         capped: cell[4].into(),
         min_ttc_s: smallest(cell[5]),
         min_gap_m: smallest(cell[6]),
+    }
+}
+
+/// Lanes as invocations of a WGSL kernel on one device.
+#[derive(Debug)]
+pub struct GpuBackend {
+    card: AdapterCard,
+    exact: bool,
+    options: GpuOptions,
+    commands: Sender<Command>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl std::fmt::Debug for Command {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Command")
+    }
+}
+
+impl GpuBackend {
+    /// Opens the device with this index.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if its driver refuses.
+    pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
+        let adapter = adapters.take(index)?;
+        let card = adapters.cards()[index].clone();
+        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
+        Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
+    }
+
+    /// Description of the device.
+    pub fn card(&self) -> &AdapterCard {
+        &self.card
+    }
+
+    /// Float operations reach the driver unchanged, so that equality is guaranteed and not only checked.
+    pub fn is_exact(&self) -> bool {
+        self.exact
+    }
+}
+
+impl Drop for GpuBackend {
+    fn drop(&mut self) {
+        // A session may outlive the backend and holds a sender, so a join before the last sender is dropped would
+        // never return.
+        let _ = self.commands.send(Command::End);
+        if let Some(thread) = self.thread.take() {
+            // Callers have already received the panic of that thread.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Backend for GpuBackend {
+    fn describe(&self) -> String {
+        let path = if self.exact { "exact" } else { "plain" };
+        let driver = [&self.card.driver[..], &self.card.driver_info].join(" ").trim().to_owned();
+        format!("GPU {} ({}, {driver}), binary32, {path} path", self.card.name, self.card.api)
+    }
+
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        let commands = self.commands.clone();
+        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, self.options.first_lanes)?))
+    }
+}
+
+/// Target time of the longest dispatch of a job, s.
+const TARGET_S: f64 = 0.1;
+/// Maximum factor of one change, so that one outlier has little effect.
+const MAX_CHANGE: f64 = 4.0;
+
+/// The size of the next job, from the time of the last: a dispatch of about a tenth of a second. Longer ones can exceed
+/// the time-outs of desktop drivers; shorter ones wait for the host. Results do not depend on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pacer {
+    lanes: u64,
+}
+
+impl Pacer {
+    /// Starts with `lanes` per model.
+    pub fn new(lanes: u64) -> Pacer {
+        Pacer { lanes: lanes.max(1) }
+    }
+
+    /// Takes a job into account: lanes per model and the time of its slowest dispatch, s.
+    pub fn observe(&mut self, lanes: u64, slowest_s: f64) {
+        if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
+            return;
+        }
+        // A small last piece is not representative, because its start takes as long.
+        let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
+        let wanted = lanes as f64 * change;
+        if change < 1.0 || wanted > self.lanes as f64 {
+            self.lanes = (wanted as u64).max(1);
+        }
+    }
+
+    /// Units of a job with `lanes_per_unit` lanes per model each: at least one, within `max_lanes`.
+    pub fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
+        (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
+    }
+
+    /// Lanes per model of the next job.
+    pub fn lanes(&self) -> u64 {
+        self.lanes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jobs_grow_to_the_target_and_no_further() {
+        let mut pacer = Pacer::new(1 << 14);
+        for _ in 0..20 {
+            let lanes = pacer.lanes();
+            // A device of a hundred million lanes per second.
+            pacer.observe(lanes, lanes as f64 / 1e8);
+        }
+        assert!((pacer.lanes() as f64 / 1e8 - TARGET_S).abs() < 0.01 * TARGET_S, "{}", pacer.lanes());
+    }
+
+    #[test]
+    fn a_slow_job_makes_the_next_one_smaller_and_a_small_last_piece_does_not() {
+        let mut pacer = Pacer::new(1 << 20);
+        pacer.observe(1 << 20, 10.0);
+        assert_eq!(pacer.lanes(), 1 << 18);
+        pacer.observe(100, 0.05);
+        assert_eq!(pacer.lanes(), 1 << 18);
+    }
+
+    #[test]
+    fn a_job_holds_at_least_one_unit_and_never_more_than_the_device_can() {
+        let pacer = Pacer::new(1000);
+        assert_eq!(pacer.units(5000, u64::MAX), 1);
+        assert_eq!(pacer.units(10, u64::MAX), 100);
+        assert_eq!(pacer.units(10, 50), 5);
     }
 }

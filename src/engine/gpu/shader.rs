@@ -1,4 +1,4 @@
-//! From the files in `shaders/` to the source of one model's pipeline, and its constants from the profile.
+//! Joins the files in `shaders/` to the source of one model's pipeline, with constants from the profile.
 
 use crate::engine::Constants;
 use crate::model::driver::{MODELS, ModelId};
@@ -23,10 +23,10 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/reduction.wgsl", include_str!("../../../shaders/shared/reduction.wgsl")),
 ];
 
-/// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares what they read:
-/// `normal_table: array<vec4<f32>>` ([`normal_table`](crate::stats::random::normal_table)),
-/// `sobol_table: array<u32>` ([`Sobol::table`](crate::stats::random::Sobol::table)) and
-/// `alias_table: array<vec2<u32>>` ([`AliasTable::table`](crate::stats::random::AliasTable::table)).
+/// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their tables: `normal_table:
+/// array<vec4<f32>>` ([`normal_table`](crate::stats::random::normal_table)), `sobol_table: array<u32>`
+/// ([`Sobol::table`](crate::stats::random::Sobol::table)) and `alias_table: array<vec2<u32>>`
+/// ([`AliasTable::table`](crate::stats::random::AliasTable::table)).
 pub const RANDOM: [(&str, &str); 4] = [
     ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
     ("shared/uniform.wgsl", include_str!("../../../shaders/shared/uniform.wgsl")),
@@ -65,7 +65,7 @@ macro_rules! declare_shaders {
 }
 for_every_driver_model!(declare_shaders);
 
-/// The source of a model's pipeline: what the registry says, the shared fragments, the model.
+/// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
 pub fn assemble(model: ModelId) -> String {
     let (_, driver) = driver_shader(model);
     let mut source = format!("const MODELS: u32 = {MODELS}u;\n");
@@ -86,8 +86,8 @@ pub fn assemble_generator() -> String {
     source
 }
 
-/// Values of the `override` constants of a model's pipeline, by name. `paired` says that some case has a
-/// second vehicle; without, the pipeline skips half of the work.
+/// Values of the `override` constants of a model's pipeline, by name. `paired`: at least one case has a second
+/// vehicle; without one the pipeline skips half of the work.
 pub fn constants(resolved: &Constants<f32>, model: ModelId, paired: bool) -> Vec<(&'static str, f64)> {
     let mut all = resolved.frames[model.index()].shader_constants();
     all.push(("frame_model", model.index() as f64));

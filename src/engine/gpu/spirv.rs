@@ -1,5 +1,5 @@
-//! The exact path on Vulkan: WGSL with its constants resolved, as SPIR-V in which no float operation may be
-//! contracted or reassociated (`NoContraction`). Drivers see it as it is.
+//! The exact path on Vulkan: WGSL with resolved constants as SPIR-V, in which no float operation may be contracted or
+//! reassociated (`NoContraction`). Drivers receive it unchanged.
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
@@ -7,21 +7,21 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use crate::{Error, Result};
 
-/// What a shader does about an index beyond its buffer or a loop without end.
+/// Run-time checks of a shader against invalid indices and endless loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Checks {
-    /// Indices are clamped, loops counted, divisors tested: nothing undefined can happen.
+    /// Indices are clamped, loops counted, divisors tested, so that behaviour is always defined.
     Checked,
-    /// Only the shaders' own guards: every loop is bounded by the step cap or a constant, every index comes
-    /// from a record that the host made, every integer divisor is at least 1.
+    /// No added checks: every loop is bounded by the step cap or a constant, every index comes from a host record,
+    /// every integer divisor is at least 1.
     Unchecked,
 }
 
-/// SPIR-V opcodes that this file looks at.
+/// SPIR-V opcodes that this file uses.
 mod op {
     pub const DECORATE: u32 = 71;
     pub const MEMBER_DECORATE: u32 = 72;
-    /// Arithmetic that gives floats: FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod, VectorTimesScalar, Dot.
+    /// Arithmetic with float results: FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod, VectorTimesScalar, Dot.
     pub const FLOAT: [u32; 9] = [127, 129, 131, 133, 136, 140, 141, 142, 148];
     /// The decoration `NoContraction`.
     pub const NO_CONTRACTION: u32 = 42;
@@ -32,7 +32,7 @@ mod op {
 /// Compiles the entry point of a pipeline's source with its constants.
 ///
 /// # Errors
-/// [`Error::Internal`] where naga refuses the source: a defect of the shaders.
+/// [`Error::Internal`] if naga refuses the source, which is an error of the shaders.
 pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)], checks: Checks) -> Result<Vec<u32>> {
     let defect = |stage: &str, what: String| Error::Internal(format!("a shader does not {stage}: {what}"));
     let module = naga::front::wgsl::parse_str(source).map_err(|e| defect("parse", e.emit_to_string(source)))?;
@@ -124,7 +124,7 @@ mod tests {
                 let decorated = count(&words, |opcode, w| opcode == op::DECORATE && w[2] == op::NO_CONTRACTION);
                 assert!(floats > 40, "{name} {model:?}: only {floats} float operations");
                 assert_eq!(floats, decorated, "{name} {model:?}");
-                // GLSL.std.450 fma is extended instruction 50: nothing may ask for it.
+                // GLSL.std.450 fma is extended instruction 50 and must not occur.
                 assert_eq!(count(&words, |opcode, w| opcode == 12 && w[4] == 50), 0);
             }
         }

@@ -1,18 +1,18 @@
-//! What a cluster's environment lets a job use. Vulkan ignores `CUDA_VISIBLE_DEVICES`; a job that took a
-//! neighbour's GPU would slow both, so its entries are resolved to PCI bus ids here.
+//! The GPUs that a cluster's environment allows a job to use. Vulkan ignores `CUDA_VISIBLE_DEVICES`, so its entries
+//! are resolved to PCI bus ids here.
 //!
-//! Read in this order, the first that is set wins:
+//! The first variable that is set decides:
 //!
-//! 1. `CUDA_VISIBLE_DEVICES`: entries count as CUDA counts them. Inside a device cgroup Slurm renumbers them from
-//!    0; CUDA numbers only the GPUs that it can open, and so does this. It wins over Slurm's variables, because
-//!    task binding and users narrow it.
-//! 2. `SLURM_STEP_GPUS`, then `SLURM_JOB_GPUS`: numbers of the node, never renumbered. They are the numbers of
-//!    the device files (`/dev/nvidia3` is 3), which need not follow the bus (`Device Minor` tells).
+//! 1. `CUDA_VISIBLE_DEVICES`: entries have CUDA's numbering. Inside a device cgroup Slurm renumbers them from 0; CUDA
+//!    numbers only the GPUs that it can open, and so does this. It has priority over Slurm's variables, because task
+//!    binding and users narrow it.
+//! 2. `SLURM_STEP_GPUS`, then `SLURM_JOB_GPUS`: numbers of the node, never renumbered. They are the numbers of the
+//!    device files (`/dev/nvidia3` is 3, `Device Minor`), which may differ from the order on the bus.
 //!
 //! CUDA's indices follow the PCI bus here, as those of nvidia-smi and Slurm do. CUDA itself does so with
-//! `CUDA_DEVICE_ORDER=PCI_BUS_ID`; by default (`FASTEST_FIRST`) it puts the fastest model first, which cannot be
-//! worked out from outside. So where the GPUs differ in model and the order is not fixed, a warning says which way
-//! was taken; UUIDs are never ambiguous.
+//! `CUDA_DEVICE_ORDER=PCI_BUS_ID`; by default (`FASTEST_FIRST`) the fastest model is first, which other programs
+//! cannot determine. If the GPUs differ in model and the order is not fixed, a warning names the chosen order; UUIDs
+//! are never ambiguous.
 
 use std::path::Path;
 
@@ -33,8 +33,7 @@ struct NvidiaGpu {
 
 /// [`visible()`] of this process and this machine.
 ///
-/// Call it after the devices were listed: it may open the driver's device files, which is slow only while nobody
-/// else holds them open.
+/// Call it after listing the devices: opening the driver's device files is fast only while they are already open.
 ///
 /// # Errors
 /// As [`visible()`].
@@ -43,16 +42,15 @@ pub fn visible_here() -> Result<Option<Vec<String>>> {
     visible(&env, Path::new("/"))
 }
 
-/// PCI bus ids (`pci_bus_id`) of the devices that the environment allows, in its order; `None` where it says
-/// nothing. `env` reads a variable, `root` is the folder above `proc` and `dev`.
+/// PCI bus ids (`pci_bus_id`) of the devices that the environment allows, in its order; `None` without restriction.
+/// `env` reads a variable, `root` is the folder above `proc` and `dev`.
 ///
-/// `None` too where the driver lists no NVIDIA GPU: the variables speak of NVIDIA's devices only, and a variable
-/// left over on another vendor's machine must not take its GPU away. An empty value, `-1` and Slurm's `NoDevFiles`
-/// hide every GPU, or all after them in a list, as in CUDA.
+/// Also `None` if the driver lists no NVIDIA GPU, because the variables refer to NVIDIA devices only. An empty value,
+/// `-1` and Slurm's `NoDevFiles` hide every GPU, or all after them in a list, as in CUDA.
 ///
 /// # Errors
-/// [`Error::Usage`] for an entry that is unknown, ambiguous, named twice or a MIG instance. CUDA would hide that
-/// entry and all after it without a word; a job that runs on the wrong device or none must say so.
+/// [`Error::Usage`] for an entry that is unknown, ambiguous, named twice or a MIG instance. CUDA hides that entry and
+/// all after it silently; this returns an error.
 pub fn visible(env: &dyn Fn(&str) -> Option<String>, root: &Path) -> Result<Option<Vec<String>>> {
     let Some((variable, value)) = VARIABLES.iter().find_map(|&v| Some((v, env(v)?))) else { return Ok(None) };
     let mut gpus = nvidia_gpus(root);
@@ -113,8 +111,8 @@ fn resolve<'a>(variable: &str, entry: &str, gpus: &'a [NvidiaGpu]) -> Result<&'a
     }
 }
 
-/// The number of the GPU at this place of the bus in the variable's count. Slurm's numbers are device files; an old
-/// driver that does not tell those is taken to number along the bus.
+/// The variable's number for the GPU at this position on the bus. Slurm's numbers are device files; without them the
+/// order on the bus is assumed.
 fn number_of(variable: &str, at: usize, gpu: &NvidiaGpu, gpus: &[NvidiaGpu]) -> usize {
     match gpu.minor {
         Some(minor) if variable != CUDA && gpus.iter().all(|gpu| gpu.minor.is_some()) => minor as usize,
@@ -135,7 +133,7 @@ fn unusable(variable: &str, problem: String, gpus: &[NvidiaGpu]) -> Error {
     )
 }
 
-/// The driver's GPUs along the PCI bus; none where there is no such driver or it cannot be read.
+/// The driver's GPUs in the order of the PCI bus; none if there is no such driver or it cannot be read.
 fn nvidia_gpus(root: &Path) -> Vec<NvidiaGpu> {
     let Ok(folders) = std::fs::read_dir(root.join("proc/driver/nvidia/gpus")) else { return Vec::new() };
     let mut gpus: Vec<NvidiaGpu> = folders
@@ -158,8 +156,8 @@ fn nvidia_gpus(root: &Path) -> Vec<NvidiaGpu> {
     gpus
 }
 
-/// Leaves out the GPUs whose device file a cgroup or a container keeps from this process; `/proc` lists them all
-/// the same. If no file opens at all, the files tell nothing (they may be made on first use) and all stay.
+/// Removes the GPUs whose device file a cgroup or container denies; `/proc` still lists them. If no file opens, the
+/// files may be created on first use, and all GPUs stay.
 fn keep_those_that_open(gpus: &mut Vec<NvidiaGpu>, root: &Path) {
     let opens = |gpu: &NvidiaGpu| {
         let Some(minor) = gpu.minor else { return true };

@@ -30,9 +30,9 @@ pub const WORDS: [&str; 12] = [
 /// Differing lanes that a comparison keeps.
 const KEPT: usize = 10;
 
-/// What the lanes of one category and model showed.
+/// Results of the lanes of one category and model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tally {
+pub struct GroupComparison {
     /// Kind of scenario.
     pub category: Category,
     /// The ego's driver.
@@ -53,13 +53,13 @@ pub struct Tally {
     pub reference_differing: u64,
 }
 
-impl Tally {
-    /// Share of the lanes that fail a criterion.
+impl GroupComparison {
+    /// Fraction of the lanes that fail a criterion.
     pub fn share(&self, criterion: Criterion) -> f64 {
         self.failed[criterion.index()] as f64 / self.lanes.max(1) as f64
     }
 
-    /// A criterion that nearly always or nearly never fails is hardly tested.
+    /// Does a criterion fail nearly always or nearly never, so that the test is weak?
     pub fn tests(&self, criterion: Criterion) -> bool {
         (0.05..=0.95).contains(&self.share(criterion))
     }
@@ -68,7 +68,7 @@ impl Tally {
 /// A lane whose words differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DifferingLane {
-    /// Key: `lanesweep verify --lane KEY` runs it again.
+    /// Key, for `lanesweep verify --lane KEY`.
     pub key: String,
     /// On the backend under test.
     pub tested: Outcome<f64>,
@@ -90,7 +90,7 @@ impl DifferingLane {
     }
 }
 
-/// What a set of lanes showed.
+/// Results of a set of lanes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// Name of the set.
@@ -98,10 +98,10 @@ pub struct Comparison {
     /// Hash of its plan.
     pub plan_sha256: String,
     /// Per category and model.
-    pub tallies: Vec<Tally>,
+    pub tallies: Vec<GroupComparison>,
     /// The worst lanes that differ, worst first.
     pub worst: Vec<DifferingLane>,
-    /// Verdicts or counts that come out differently where nothing else is asked for.
+    /// Verdicts or counts that differ if only these are requested.
     pub modes_differing: u64,
 }
 
@@ -111,7 +111,7 @@ impl Comparison {
         self.modes_differing == 0 && self.lanes() > 0 && self.tallies.iter().all(|t| t.words_differing == 0)
     }
 
-    /// Lanes with a word that differs, and values that differ where less is asked for.
+    /// Lanes with a word that differs, and values that differ if only verdicts or counts are requested.
     pub fn differing(&self) -> u64 {
         self.modes_differing + self.tallies.iter().map(|t| t.lanes_differing).sum::<u64>()
     }
@@ -122,13 +122,13 @@ impl Comparison {
     }
 }
 
-/// Runs every lane of a plan on the three backends. `done` hears of the lanes of each part that is done.
+/// Runs every lane of a plan on the three backends. `done` gets the number of lanes of each finished part.
 ///
-/// The backend under test is asked three times: for outcomes, for verdicts alone, for counts alone; all must
-/// agree. It has no stand-in: what it cannot compute is an error.
+/// The backend under test runs three times: for outcomes, verdicts and counts; all must agree. It has no fallback: a
+/// lane that it cannot compute is an error.
 ///
 /// # Errors
-/// Of the backend under test.
+/// Those of the backend under test.
 pub fn compare(set: &str, plan: &LanePlan, tested: &dyn Backend, done: impl Fn(u64)) -> Result<Comparison> {
     let (cpu, reference) = (CpuBackend::scalar(), CpuBackend::reference());
     let mut sessions = [tested.prepare(plan)?, cpu.prepare(plan)?, reference.prepare(plan)?];
@@ -152,7 +152,7 @@ pub fn compare(set: &str, plan: &LanePlan, tested: &dyn Backend, done: impl Fn(u
     Ok(comparison)
 }
 
-/// What a small check of a device found.
+/// Result of the self-check of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SelfCheck {
     /// Lanes compared.
@@ -161,11 +161,10 @@ pub struct SelfCheck {
     pub differing: u64,
 }
 
-/// Some thousand random lanes and lanes on thresholds: the quick answer to whether a backend computes as the
-/// CPU does.
+/// The self-check: some thousand random lanes and lanes on thresholds, compared with the CPU.
 ///
 /// # Errors
-/// Of the backend.
+/// Those of the backend.
 pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
     let profile = crate::model::profile::Profile::load("paper")?;
     let random = super::RandomOptions { lanes_per_model_and_category: 400, ..Default::default() };
@@ -181,9 +180,9 @@ pub fn self_check(tested: &dyn Backend) -> Result<SelfCheck> {
 }
 
 /// One empty tally per category and model.
-fn tallies(plan: &LanePlan) -> Vec<Tally> {
+fn tallies(plan: &LanePlan) -> Vec<GroupComparison> {
     let models = |category| {
-        plan.models.iter().map(move |&model| Tally {
+        plan.models.iter().map(move |&model| GroupComparison {
             category,
             model,
             lanes: 0,
@@ -198,7 +197,7 @@ fn tallies(plan: &LanePlan) -> Vec<Tally> {
     plan.blocks.iter().flat_map(|block| models(block.category)).collect()
 }
 
-/// Values that differ where the backend gives verdicts alone, or counts alone, instead of outcomes.
+/// Values that differ if the backend returns only verdicts or only counts instead of outcomes.
 fn modes(plan: &LanePlan, tested: &mut dyn Session, units: Range<u64>, outcomes: &Chunk) -> Result<u64> {
     let verdicts = tested.run(units.clone(), Wanted::Verdicts)?;
     verdicts.check(plan)?;
@@ -216,7 +215,7 @@ fn modes(plan: &LanePlan, tested: &mut dyn Session, units: Range<u64>, outcomes:
     Ok((cells + lanes) as u64)
 }
 
-/// Takes a chunk of the three backends into account.
+/// Adds a chunk of the three backends.
 fn add(comparison: &mut Comparison, plan: &LanePlan, [tested, cpu, reference]: [&Chunk; 3]) {
     let models = plan.models.len();
     for (at, (a, b)) in tested.outcomes.iter().zip(&cpu.outcomes).enumerate() {

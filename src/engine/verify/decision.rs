@@ -1,8 +1,8 @@
-//! The decisions that the threshold set sits on, and the starts that its cases count on.
+//! The decisions of the threshold set, and the starts that its cases need.
 
 use crate::engine::Headway;
 
-/// The starts: a case puts the vehicle on its threshold for one of them, by `gap_offset`.
+/// The starts: for one of them, a case's `gap_offset` puts the vehicle on its threshold.
 pub(super) const HEADWAYS: [Headway; 4] =
     [Headway::GapM(0.0), Headway::ThwS(0.0), Headway::GapM(10.0), Headway::ThwS(1.0)];
 
@@ -13,7 +13,7 @@ pub enum Threshold {
     Ttc,
     /// BTN criterion at its threshold.
     Btn,
-    /// BTN: no room left after the ramp.
+    /// BTN: no distance left after the ramp.
     BtnRoom,
     /// Reg157: |g| = |dv|·(dv/(2·6) + c).
     Reg157Ttc,
@@ -39,7 +39,7 @@ pub enum Threshold {
     FsmGate,
     /// FSM: lateral speed 0 beside the ego.
     LateralSpeed,
-    /// Lateral gap 0: contact across the road, and every gate that says "overlap".
+    /// Lateral gap 0: contact across the road, and every gate `overlap`.
     LateralGap,
     /// |y| = width of the ego: gate of TTC and BTN.
     EgoWidth,
@@ -55,9 +55,9 @@ pub enum Threshold {
     StandingEgo,
     /// First step of a model's attention.
     Attention,
-    /// First step at which the vehicle is there.
+    /// First step at which the vehicle is present.
     Appearance,
-    /// First step at which it is gone: the step of the contact.
+    /// First step at which it is absent: the step of the contact.
     Disappearance,
     /// Speed change that ends on a step.
     SpeedEvent,

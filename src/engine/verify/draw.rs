@@ -1,12 +1,12 @@
-//! Random access to random numbers: one stream per (purpose, seed, category, unit, variant), so a case does
-//! not depend on how many others were asked for, nor on threads.
+//! Random numbers: one stream per (purpose, seed, category, unit, variant), so a case depends neither on other cases
+//! nor on threads.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
 use crate::scenario::Category;
 
-/// What a stream is for; streams of different purposes never share a number.
+/// Purpose of a stream; streams of different purposes never share a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// The series that the cases share.
@@ -22,18 +22,18 @@ pub(super) enum Purpose {
 }
 
 /// A stream of random numbers.
-pub(super) struct Draw(ChaCha8Rng);
+pub(super) struct CaseRandom(ChaCha8Rng);
 
-impl Draw {
+impl CaseRandom {
     /// The stream of one thing.
-    pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> Draw {
+    pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> CaseRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&unit.to_le_bytes());
         key[16..20].copy_from_slice(&(variant as u32).to_le_bytes());
         key[20] = category as u8;
         key[21] = purpose as u8;
-        Draw(ChaCha8Rng::from_seed(key))
+        CaseRandom(ChaCha8Rng::from_seed(key))
     }
 
     /// Uniform in [0, 1), 53 bits.
@@ -52,7 +52,7 @@ impl Draw {
         self.uniform() < probability
     }
 
-    /// An index below `count`; 0 where there is nothing to choose from.
+    /// An index below `count`; 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }

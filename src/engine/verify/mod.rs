@@ -1,21 +1,21 @@
-//! Verification: lanes that a backend must compute word for word like the CPU, and the comparison.
+//! Verification: lanes for which a backend must give the same words as the CPU, and the comparison.
 //!
-//! Here live the comparison of a backend with the CPU and the f64 reference ([`compare`]), the random set ([`random_plan`]: everything that a lane can hold, in plausible numbers) and the
-//! set on the decision thresholds ([`threshold_plan`]: lanes where one unit in the last place decides). Here
-//! lives no physics. Cases are pure functions of (seed, category, unit,
-//! variant), so the key of a lane alone says how to make it again. Plans go to [`crate::engine`].
+//! This room has the comparison of a backend with the CPU and the f64 reference ([`compare`]), a random set of cases with
+//! plausible numbers ([`random_plan`]), and a set on the decision thresholds ([`threshold_plan`]), where one unit in the
+//! last place decides. Cases are pure functions of (seed, category, unit, variant), so the key of a lane is sufficient to
+//! repeat it. Plans go to [`crate::engine`].
 
 mod comparison;
 mod decision;
 mod draw;
+mod first_step;
 mod pool;
 mod random;
-mod scene;
 mod series;
 mod solve;
 mod thresholds;
 
-pub use comparison::{Comparison, DifferingLane, SelfCheck, Tally, WORDS, compare, self_check};
+pub use comparison::{Comparison, DifferingLane, GroupComparison, SelfCheck, WORDS, compare, self_check};
 pub use decision::Threshold;
 pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
 pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};

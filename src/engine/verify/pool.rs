@@ -1,7 +1,7 @@
-//! The series that all cases of a set share: some hundred random speeds and lateral motions of at most
-//! [`LONGEST`] steps. A case points into them, so a set of any size has the same tables.
+//! The series that all cases of a set share: some hundred random speeds and lateral motions of at most [`LONGEST`]
+//! steps. A case refers to them, so a set of any size has the same tables.
 
-use super::draw::{Draw, Purpose};
+use super::draw::{CaseRandom, Purpose};
 use crate::scenario::{Category, Lateral, Speed, Tables};
 
 /// Entries of the longest series.
@@ -18,9 +18,9 @@ pub(super) struct Slice {
     pub len: u32,
 }
 
-/// How a vehicle moves across the road, by its part in the scenario.
+/// Lateral motion of a vehicle by its role in the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Across {
+pub(super) enum LateralRole {
     /// From the next lane into the ego's.
     In,
     /// From the ego's lane into the next.
@@ -31,13 +31,13 @@ pub(super) enum Across {
 
 /// The shared series.
 pub(super) struct Pool {
-    /// All of them, one after the other.
+    /// All series in sequence.
     pub tables: Tables<f64>,
-    /// Speeds that change at will.
+    /// Random speeds.
     varied: Vec<Slice>,
-    /// Speeds that are held, then braked down.
+    /// Speeds that are constant, then decrease.
     braked: Vec<Slice>,
-    /// Lateral motions, in the order of [`Across`].
+    /// Lateral motions, in the order of [`LateralRole`].
     across: [Vec<Slice>; 3],
 }
 
@@ -45,9 +45,9 @@ impl Pool {
     /// The pool of a seed at a time step.
     pub fn new(seed: u64, dt_s: f64) -> Pool {
         let mut tables = Tables::default();
-        // The category only keeps the kinds' streams apart here.
-        let draw = |kind: usize, k: u64| Draw::new(Purpose::Pool, seed, Category::CutIn, k, kind);
-        let mut speeds = |kind: usize, make: fn(&mut Draw, f64) -> Vec<f64>| -> Vec<Slice> {
+        // Here the category only separates the streams of the kinds.
+        let draw = |kind: usize, k: u64| CaseRandom::new(Purpose::Pool, seed, Category::CutIn, k, kind);
+        let mut speeds = |kind: usize, make: fn(&mut CaseRandom, f64) -> Vec<f64>| -> Vec<Slice> {
             let mut one = |k| {
                 let series = make(&mut draw(kind, k), dt_s);
                 let slice = Slice { offset: tables.speed.len() as u32, len: series.len() as u32 };
@@ -57,7 +57,7 @@ impl Pool {
             (0..PER_KIND).map(&mut one).collect()
         };
         let (varied, braked) = (speeds(0, varied_speed), speeds(1, braked_speed));
-        let across = [Across::In, Across::Out, Across::Within].map(|across| {
+        let across = [LateralRole::In, LateralRole::Out, LateralRole::Within].map(|across| {
             let mut one = |k| {
                 let series = lateral(&mut draw(2 + across as usize, k), across, dt_s);
                 let slice = Slice { offset: tables.lateral.len() as u32, len: series.len() as u32 };
@@ -70,14 +70,14 @@ impl Pool {
     }
 
     /// A part of a random speed series.
-    pub fn speed(&self, draw: &mut Draw, braked: bool) -> (Speed, Slice) {
+    pub fn speed(&self, draw: &mut CaseRandom, braked: bool) -> (Speed, Slice) {
         let series = if braked { &self.braked } else { &self.varied };
         let slice = part(draw, series);
         (Speed::Sampled(slice.of(&self.tables.speed).to_vec()), slice)
     }
 
     /// A part of a random lateral series.
-    pub fn lateral(&self, draw: &mut Draw, across: Across) -> (Lateral, Slice) {
+    pub fn lateral(&self, draw: &mut CaseRandom, across: LateralRole) -> (Lateral, Slice) {
         let series = &self.across[across as usize];
         let slice = part(draw, series);
         let (position_m, towards_mps) = slice.of(&self.tables.lateral).iter().map(|&[y, w]| (y, w)).unzip();
@@ -92,7 +92,7 @@ impl Slice {
 }
 
 /// One of the series or, one time in three, a part of it: a case's series may begin and end anywhere.
-fn part(draw: &mut Draw, series: &[Slice]) -> Slice {
+fn part(draw: &mut CaseRandom, series: &[Slice]) -> Slice {
     let whole = series[draw.below(series.len())];
     if draw.chance(2.0 / 3.0) {
         return whole;
@@ -102,19 +102,19 @@ fn part(draw: &mut Draw, series: &[Slice]) -> Slice {
     Slice { offset: whole.offset + from, len }
 }
 
-/// Mostly long; one in eight is a handful of steps, down to a single one.
-fn length(draw: &mut Draw) -> usize {
+/// Mostly long; one in eight has a few steps, down to a single one.
+fn length(draw: &mut CaseRandom) -> usize {
     if draw.chance(0.125) { 1 + draw.below(8) } else { 40 + draw.below(LONGEST - 39) }
 }
 
-/// 3t² − 2t³: from 0 to 1 without a kink, and without a transcendental that platforms round differently.
+/// 3t² − 2t³: smooth from 0 to 1, without a transcendental function that platforms round differently.
 fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Between 0 and 38 m/s: smooth between random marks, or a random walk with jerks.
-fn varied_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
+/// Between 0 and 38 m/s: smooth between random points, or a random walk with jerks.
+fn varied_speed(draw: &mut CaseRandom, dt_s: f64) -> Vec<f64> {
     let len = length(draw);
     let mut speed = draw.between(2.0, 34.0);
     let jerky = draw.chance(0.4);
@@ -135,8 +135,8 @@ fn varied_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
     series
 }
 
-/// Held, then braked at up to 9 m/s², often to standstill.
-fn braked_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
+/// Constant, then braking at up to 9 m/s², often to standstill.
+fn braked_speed(draw: &mut CaseRandom, dt_s: f64) -> Vec<f64> {
     let len = length(draw);
     let start = draw.between(6.0, 36.0);
     let end = if draw.chance(0.4) { 0.0 } else { draw.between(0.0, start) };
@@ -146,13 +146,13 @@ fn braked_speed(draw: &mut Draw, dt_s: f64) -> Vec<f64> {
 }
 
 /// Positions and speeds towards the ego's lane; the side is random.
-fn lateral(draw: &mut Draw, across: Across, dt_s: f64) -> Vec<[f64; 2]> {
+fn lateral(draw: &mut CaseRandom, across: LateralRole, dt_s: f64) -> Vec<[f64; 2]> {
     let len = length(draw).max(2);
     let side = draw.sign();
     let (start, end) = match across {
-        Across::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
-        Across::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
-        Across::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
+        LateralRole::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
+        LateralRole::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
+        LateralRole::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
     };
     let (from, seconds) = (draw.below(1 + len / 6) as f64, draw.between(1.5, 7.0));
     let noise = if draw.chance(0.4) { draw.between(0.0, 0.03) } else { 0.0 };
@@ -162,7 +162,7 @@ fn lateral(draw: &mut Draw, across: Across, dt_s: f64) -> Vec<[f64; 2]> {
                 + noise * draw.between(-1.0, 1.0)
         })
         .collect();
-    // Towards the ego is towards y = 0; the first speed is the second one, as in recorded scenarios.
+    // Towards the ego means towards y = 0; the first speed equals the second one, as in recorded scenarios.
     let towards = |k: usize| -(position[k].abs() - position[k - 1].abs()) / dt_s;
     (0..len).map(|k| [position[k], towards(k.max(1))]).collect()
 }

@@ -1,9 +1,9 @@
-//! The random set: cases of every kind that the lanes know, in plausible numbers, at headways from far apart
-//! to behind. Shares of failing lanes are kept away from 0 and 1, so that a wrong verdict shows.
+//! The random set: cases of every kind with plausible numbers, at headways from far ahead to behind. The fraction of
+//! failing lanes stays away from 0 and 1, so that a wrong verdict is detected.
 
 use super::check_categories;
-use super::draw::{Draw, Purpose};
-use super::pool::{Across, Pool, Slice};
+use super::draw::{CaseRandom, Purpose};
+use super::pool::{LateralRole, Pool, Slice};
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
 use crate::model::driver::{MODELS, ModelId};
 use crate::model::profile::{CutOutTarget, Profile};
@@ -13,10 +13,10 @@ use crate::{Error, Place, Result};
 /// Variants of every unit: all motions sampled (`S`), all kinematic, one of each, and corner cases.
 pub const VARIANTS: [&str; 4] = ["S", "kinematic", "mixed", "degenerate"];
 
-/// What a random set holds.
+/// Options of a random set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RandomOptions {
-    /// Seed; another one gives other lanes throughout.
+    /// Seed; it determines all lanes.
     pub seed: u64,
     /// Lanes of each model in each category, rounded up to whole units of 40.
     pub lanes_per_model_and_category: u64,
@@ -37,7 +37,7 @@ impl Default for RandomOptions {
     }
 }
 
-/// What a unit's key says: all that is needed to make its cases again.
+/// A unit's key, from which its cases can be made again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RandomUnit {
     /// Kind of scenario.
@@ -49,7 +49,7 @@ pub struct RandomUnit {
 }
 
 impl RandomUnit {
-    /// From the text that [`RandomUnit`] shows: `random-cut-in-seed157-0000123`.
+    /// Parses the text form of [`RandomUnit`]: `random-cut-in-seed157-0000123`.
     pub fn parse(key: &str) -> Option<RandomUnit> {
         let (rest, unit) = key.strip_prefix("random-")?.rsplit_once('-')?;
         let (category, seed) = rest.rsplit_once("-seed")?;
@@ -74,7 +74,7 @@ fn headways() -> Vec<Headway> {
 /// Plans the random set of a seed.
 ///
 /// # Errors
-/// [`Error::Usage`] where there is no lane, category or model to plan, or a category is named twice.
+/// [`Error::Usage`] without lanes, categories or models, or if a category is named twice.
 pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePlan> {
     check_categories(&options.categories)?;
     if options.lanes_per_model_and_category == 0 {
@@ -103,20 +103,20 @@ struct RandomCases {
     frozen: Vec<Frozen>,
 }
 
-/// A cut-out whose cutting-out vehicle hits the one ahead (only in profiles that look for it). It freezes in
-/// a series of its own, so such pairs are drawn once, with their series, and shared.
+/// A cut-out whose cutting-out vehicle hits the one ahead (only in profiles with this event). The freezing needs an
+/// additional series, so such pairs are drawn once, with their series, and shared.
 struct Frozen {
     lane: LaneCase<f64>,
     case: Case,
 }
 
-/// A case with the places of its series in the pool.
+/// A case with the ranges of its series in the pool.
 struct CaseInPool {
     case: Case,
     slices: [Slices; 2],
 }
 
-/// Where a vehicle's series stand in the pool; not looked at where it has none.
+/// Ranges of a vehicle's series in the pool; ignored if it has none.
 #[derive(Clone, Copy)]
 struct Slices {
     speed: Slice,
@@ -124,7 +124,7 @@ struct Slices {
 }
 
 const NO_SLICES: Slices = Slices { speed: Slice { offset: 0, len: 0 }, lateral: Slice { offset: 0, len: 0 } };
-/// Frozen pairs that are shared, and how many cut-outs are tried for them.
+/// Number of shared frozen pairs, and of cut-outs tried for them.
 const FROZEN: usize = 32;
 const FROZEN_TRIES: u64 = 2048;
 
@@ -145,7 +145,7 @@ impl RandomCases {
 
     fn freeze_some(&mut self) {
         for unit in 0..FROZEN_TRIES {
-            let mut draw = Draw::new(Purpose::Freeze, self.seed, Category::CutOut, unit, 0);
+            let mut draw = CaseRandom::new(Purpose::Freeze, self.seed, Category::CutOut, unit, 0);
             let case = self.draw(&mut draw, Category::CutOut, unit as usize % 3).case;
             let mut own = Tables::default();
             let mut lane = LaneCase::encode(&case, &self.profile, &mut own);
@@ -166,7 +166,7 @@ impl RandomCases {
         }
     }
 
-    fn encode(&self, draw: &mut Draw, mut drawn: CaseInPool) -> LaneCase<f64> {
+    fn encode(&self, draw: &mut CaseRandom, mut drawn: CaseInPool) -> LaneCase<f64> {
         let exposed = !self.frozen.is_empty() && drawn.case.category == Category::CutOut;
         let mut scratch = Tables::default();
         let mut lane = LaneCase::encode(&drawn.case, &self.profile, &mut scratch);
@@ -189,11 +189,11 @@ impl RandomCases {
         lane
     }
 
-    fn draw(&self, draw: &mut Draw, category: Category, variant: usize) -> CaseInPool {
+    fn draw(&self, draw: &mut CaseRandom, category: Category, variant: usize) -> CaseInPool {
         let across = match category {
-            Category::CutIn => Across::In,
-            Category::CutOut => Across::Out,
-            Category::Lvd => Across::Within,
+            Category::CutIn => LateralRole::In,
+            Category::CutOut => LateralRole::Out,
+            Category::Lvd => LateralRole::Within,
         };
         let (principal, slices) = self.vehicle(draw, across, variant, category == Category::Lvd);
         let v = initial_speed(&principal.speed);
@@ -215,7 +215,7 @@ impl RandomCases {
         let mut all = [slices, NO_SLICES];
         let paired = if category == Category::CutOut { 0.9 } else { 0.15 };
         if draw.chance(paired) {
-            let across = if draw.chance(0.85) { Across::Within } else { Across::Out };
+            let across = if draw.chance(0.85) { LateralRole::Within } else { LateralRole::Out };
             let (mut vehicle, slices) = self.vehicle(draw, across, variant, true);
             if variant > 0 && draw.chance(0.35) {
                 vehicle.speed = Speed::constant(if draw.chance(0.5) { 0.0 } else { v * draw.uniform() });
@@ -230,7 +230,13 @@ impl RandomCases {
     }
 
     /// A vehicle whose motions are sampled (variant 0), kinematic (1) or one of each (others).
-    fn vehicle(&self, draw: &mut Draw, across: Across, variant: usize, brakes: bool) -> (Participant, Slices) {
+    fn vehicle(
+        &self,
+        draw: &mut CaseRandom,
+        across: LateralRole,
+        variant: usize,
+        brakes: bool,
+    ) -> (Participant, Slices) {
         let (length_m, width_m) = match draw.uniform() {
             x if x < 0.75 => (draw.between(3.6, 5.2), draw.between(1.6, 2.0)),
             x if x < 0.95 => (draw.between(8.0, 18.75), draw.between(2.3, 2.6)),
@@ -261,7 +267,7 @@ impl RandomCases {
 impl CaseSource for RandomCases {
     fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
         let category = self.categories[block];
-        let mut draw = Draw::new(Purpose::Random, self.seed, category, unit, variant);
+        let mut draw = CaseRandom::new(Purpose::Random, self.seed, category, unit, variant);
         let mut drawn = self.draw(&mut draw, category, variant);
         if variant < 3 {
             return self.encode(&mut draw, drawn);
@@ -281,7 +287,7 @@ impl CaseSource for RandomCases {
 }
 
 impl Frozen {
-    /// The frozen pair before the ego of another case: nothing in the freezing depends on the ego.
+    /// The frozen pair before the ego of another case, because the freezing does not depend on the ego.
     fn before(&self, ego: &Case) -> LaneCase<f64> {
         let mut lane = self.lane;
         let closing = ego.ego_speed_mps - initial_speed(&ego.principal.speed);
@@ -296,7 +302,7 @@ impl Frozen {
     }
 }
 
-/// The vehicle ahead is there until the freezing.
+/// The vehicle ahead is present until the freezing.
 fn froze(lane: &LaneCase<f64>) -> bool {
     lane.pair != 0 && lane.others[1].present_until != NO_STEP
 }
@@ -308,7 +314,7 @@ fn initial_speed(speed: &Speed) -> f64 {
     }
 }
 
-fn kinematic_speed(draw: &mut Draw, braked: bool) -> Speed {
+fn kinematic_speed(draw: &mut CaseRandom, braked: bool) -> Speed {
     let initial_mps = if draw.chance(0.06) { 0.0 } else { draw.between(2.0, 34.0) };
     let acceleration_mps2 = match draw.uniform() {
         _ if braked => draw.between(-9.0, -1.0),
@@ -318,20 +324,20 @@ fn kinematic_speed(draw: &mut Draw, braked: bool) -> Speed {
     Speed::Kinematic { initial_mps, acceleration_mps2, until_s: draw.between(0.0, 6.0) }
 }
 
-fn kinematic_lateral(draw: &mut Draw, across: Across) -> Lateral {
+fn kinematic_lateral(draw: &mut CaseRandom, across: LateralRole) -> Lateral {
     let side = draw.sign();
     let (start, end) = match across {
-        Across::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
-        Across::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
-        Across::Within if draw.chance(0.6) => return Lateral::Centred,
-        Across::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
+        LateralRole::In => (draw.between(1.8, 4.2), draw.between(-0.4, 0.6)),
+        LateralRole::Out => (draw.between(-0.3, 0.4), draw.between(2.2, 4.4)),
+        LateralRole::Within if draw.chance(0.6) => return Lateral::Centred,
+        LateralRole::Within => (draw.between(-0.8, 0.8), draw.between(-0.8, 0.8)),
     };
     let rate = draw.between(0.3, 2.5) * if end > start { 1.0 } else { -1.0 };
     Lateral::Kinematic { start_m: side * start, rate_mps: side * rate, end_m: side * end }
 }
 
-/// None, short, long; a run goes on at least so long.
-fn horizon_steps(draw: &mut Draw) -> f64 {
+/// A horizon: none, short or long.
+fn horizon_steps(draw: &mut CaseRandom) -> f64 {
     let most = match draw.uniform() {
         x if x < 0.15 => 0,
         x if x < 0.80 => 150,
@@ -341,20 +347,20 @@ fn horizon_steps(draw: &mut Draw) -> f64 {
     draw.below(most + 1) as f64
 }
 
-/// Numbers at the ends of their ranges.
-fn degenerate(draw: &mut Draw, corner: usize, case: &mut Case) {
+/// Cases with numbers at the ends of their ranges.
+fn degenerate(draw: &mut CaseRandom, corner: usize, case: &mut Case) {
     let v = initial_speed(&case.principal.speed);
     match corner {
         0 => case.ego_speed_mps = 0.0,
         1 => case.ego_speed_mps = draw.between(0.0, 0.5),
         2 => case.ego_speed_mps = v,
-        // The whole run at the same distance, or everything stands.
+        // Constant distance during the whole lane, or all vehicles stationary.
         3 => {
             let speed = if draw.chance(0.3) { 0.0 } else { v };
             case.principal.speed = Speed::constant(speed);
             case.ego_speed_mps = speed;
         }
-        // Standing in the way of an ego that is not slow.
+        // Stationary in front of a fast ego.
         4 => {
             case.principal.speed = Speed::constant(0.0);
             case.ego_speed_mps = draw.between(3.0, 30.0);
@@ -363,7 +369,7 @@ fn degenerate(draw: &mut Draw, corner: usize, case: &mut Case) {
             case.principal.lateral = Lateral::Centred;
             case.horizon_s = 0.0;
         }
-        // Beside the ego, or just inside its lane, all the time.
+        // Always beside the ego, or just inside its lane.
         6 => {
             let at = draw.sign() * draw.between(0.0, 4.0);
             case.principal.lateral = Lateral::Kinematic { start_m: at, rate_mps: 0.0, end_m: at };
@@ -373,8 +379,8 @@ fn degenerate(draw: &mut Draw, corner: usize, case: &mut Case) {
 }
 
 /// Vehicles that appear late, leave early, or are noticed late.
-fn late(draw: &mut Draw, lane: &mut LaneCase<f64>) {
-    let appear = |draw: &mut Draw, other: &mut LaneOther<f64>| {
+fn late(draw: &mut CaseRandom, lane: &mut LaneCase<f64>) {
+    let appear = |draw: &mut CaseRandom, other: &mut LaneOther<f64>| {
         other.present_from = draw.below(60) as u32;
         if draw.chance(0.5) {
             other.present_until = other.present_from + draw.below(150) as u32;

@@ -1,19 +1,18 @@
-//! The motions of the threshold set: their first step has exactly a number of the lane arithmetic, whether it
-//! is read from a table or worked out.
+//! The motions of the threshold set: their first step is exactly a given f32, from a table or by arithmetic.
 
-use super::draw::{Draw, Purpose};
+use super::draw::{CaseRandom, Purpose};
 use crate::scenario::{Category, LATERAL_SAMPLED, Lateral, Motion, SPEED_SAMPLED, Speed, Tables};
 
-/// Neighbour of 0 on either side: far below what a step moves, and so far from the subnormals, which devices
-/// may flush, that neither its third power (a form of the BTN) nor a quotient of its squares becomes one.
+/// Neighbour of 0: far below the change of one step, and large enough that neither its third power (a form of the
+/// BTN) nor a quotient of its squares is subnormal, which devices may flush.
 pub(super) const TINY: f32 = 1.0 / (1_u64 << 32) as f32;
 
 /// Series per kind.
 const PER_KIND: usize = 32;
 
-/// Where a vehicle is across the road at the first step, and how it moves there.
+/// Lateral position and motion of a vehicle at the first step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Across {
+pub(super) enum LateralStart {
     /// In the ego's lane.
     Ahead,
     /// In the next lane, coming in.
@@ -22,17 +21,17 @@ pub(super) enum Across {
     Beside,
 }
 
-/// The series of the set and what motions are made of.
-pub(super) struct Series {
+/// The series of the set and the tables of its motions.
+pub(super) struct ThresholdSeries {
     dt_s: f64,
     /// All series.
     pub tables: Tables<f64>,
-    /// As lanes read them.
+    /// The tables for lanes.
     pub lane_tables: Tables<f32>,
     /// Begin and length of each speed series.
     speeds: Vec<[u32; 2]>,
-    /// Begin and length of each lateral series, in the order of [`Across`]. Those of `Beside` stand in
-    /// threes: lateral speed 0, −2⁻³², 2⁻³².
+    /// Begin and length of each lateral series, in the order of [`LateralStart`]. Those of `Beside` are in groups of three:
+    /// lateral speed 0, −2⁻³², 2⁻³².
     across: [Vec<[u32; 2]>; 3],
 }
 
@@ -41,10 +40,10 @@ pub(super) fn rounded(x: f64) -> f32 {
     x as f32
 }
 
-impl Series {
-    pub fn new(seed: u64, dt_s: f64) -> Series {
+impl ThresholdSeries {
+    pub fn new(seed: u64, dt_s: f64) -> ThresholdSeries {
         let (mut tables, mut speeds, mut across) = (Tables::default(), Vec::new(), [const { Vec::new() }; 3]);
-        let draw = |kind, k| Draw::new(Purpose::ThresholdPool, seed, Category::CutIn, k as u64, kind);
+        let draw = |kind, k| CaseRandom::new(Purpose::ThresholdPool, seed, Category::CutIn, k as u64, kind);
         for k in 0..PER_KIND {
             let mut draw = draw(0, k);
             let (start, acceleration) = (f64::from(rounded(draw.between(2.0, 30.0))), draw.between(-6.0, 2.0));
@@ -52,12 +51,12 @@ impl Series {
             speeds.push([tables.speed.len() as u32, len as u32]);
             tables.speed.extend((0..len).map(|i| (start + acceleration * dt_s * i as f64).max(0.0)));
         }
-        for kind in [Across::Ahead, Across::Coming, Across::Beside] {
+        for kind in [LateralStart::Ahead, LateralStart::Coming, LateralStart::Beside] {
             for k in 0..PER_KIND {
                 let mut draw = draw(1 + kind as usize, k);
                 let (y, w) = place(&mut draw, kind);
                 let len = 1 + draw.below(90);
-                let every = if kind == Across::Beside { vec![0.0, -TINY, TINY] } else { vec![w] };
+                let every = if kind == LateralStart::Beside { vec![0.0, -TINY, TINY] } else { vec![w] };
                 for w in every.into_iter().map(f64::from) {
                     across[kind as usize].push([tables.lateral.len() as u32, len as u32]);
                     let y = f64::from(y);
@@ -65,13 +64,13 @@ impl Series {
                 }
             }
         }
-        Series { dt_s, lane_tables: tables.cast(), tables, speeds, across }
+        ThresholdSeries { dt_s, lane_tables: tables.cast(), tables, speeds, across }
     }
 
     /// A motion of a kind ([`Motion::kind`]).
-    pub fn motion(&self, draw: &mut Draw, kind: u32, across: Across) -> Motion<f64> {
+    pub fn motion(&self, draw: &mut CaseRandom, kind: u32, across: LateralStart) -> Motion<f64> {
         let (y, w) = place(draw, across);
-        let lateral = if across == Across::Ahead && draw.chance(0.5) {
+        let lateral = if across == LateralStart::Ahead && draw.chance(0.5) {
             Lateral::Centred
         } else {
             let (start_m, rate_mps) = (f64::from(y), -f64::from(y.signum() * w));
@@ -90,7 +89,7 @@ impl Series {
         }
         if kind & LATERAL_SAMPLED != 0 {
             let every = &self.across[across as usize];
-            let step = if across == Across::Beside { 3 } else { 1 };
+            let step = if across == LateralStart::Beside { 3 } else { 1 };
             [motion.lateral_offset, motion.lateral_len] = every[step * draw.below(every.len() / step)];
         }
         motion
@@ -103,7 +102,7 @@ impl Series {
         motion
     }
 
-    /// The same motion with another speed along the road, worked out.
+    /// The same motion with another kinematic speed along the road.
     pub fn with_speed(
         &self,
         motion: Motion<f64>,
@@ -123,7 +122,7 @@ impl Series {
         }
     }
 
-    /// The same motion with another one across the road, worked out.
+    /// The same motion with another kinematic motion across the road.
     pub fn with_lateral(&self, motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
         let other = Motion::encode(&Speed::constant(0.0), lateral, self.dt_s, &mut Tables::default());
         Motion {
@@ -139,12 +138,12 @@ impl Series {
 }
 
 /// Position and speed towards the ego, each a number of the lane arithmetic.
-fn place(draw: &mut Draw, across: Across) -> (f32, f32) {
+fn place(draw: &mut CaseRandom, across: LateralStart) -> (f32, f32) {
     let side = draw.sign();
     let (y, w) = match across {
-        Across::Ahead => (draw.between(0.05, 0.4), 0.0),
-        Across::Coming => (draw.between(1.8, 4.8), draw.between(0.3, 2.0)),
-        Across::Beside => (draw.between(1.8, 4.8), 0.0),
+        LateralStart::Ahead => (draw.between(0.05, 0.4), 0.0),
+        LateralStart::Coming => (draw.between(1.8, 4.8), draw.between(0.3, 2.0)),
+        LateralStart::Beside => (draw.between(1.8, 4.8), 0.0),
     };
     (rounded(side * y), rounded(w))
 }

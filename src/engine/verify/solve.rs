@@ -1,8 +1,8 @@
-//! Solving for lane numbers in the lane arithmetic itself: which f32 makes a rounded expression hit a value,
-//! and between which two neighbours a decision turns.
+//! Solvers in lane arithmetic: the f32 for which a rounded expression equals a value, and the two neighbours between
+//! which a decision changes.
 
-/// The number nearest to `guess` that `f`, which never falls, turns into exactly `target`; `None` where none
-/// does, or only a subnormal one, which devices may flush.
+/// The number nearest to `guess` for which the non-decreasing `f` equals `target`; `None` if there is none or only a
+/// subnormal one, which devices may flush.
 pub(super) fn hit(target: f32, guess: f64, f: impl Fn(f32) -> f32) -> Option<f32> {
     let mut x = guess as f32;
     for _ in 0..8 {
@@ -15,8 +15,8 @@ pub(super) fn hit(target: f32, guess: f64, f: impl Fn(f32) -> f32) -> Option<f32
     None
 }
 
-/// The nearest number below (`up` false) or above `x` that `f` turns into something else: where `f` rounds more
-/// coarsely than its argument, one ULP of the argument would change nothing.
+/// The nearest number below (`up` false) or above `x` with another value of `f`: if `f` rounds more coarsely than its
+/// argument, one ULP changes nothing.
 pub(super) fn next_other(x: f32, up: bool, f: impl Fn(f32) -> f32) -> f32 {
     let mut other = x;
     for _ in 0..1024 {
@@ -28,8 +28,8 @@ pub(super) fn next_other(x: f32, up: bool, f: impl Fn(f32) -> f32) -> f32 {
     other
 }
 
-/// The two neighbours in [low, high] between which `holds` turns from its value at `low` to its value at
-/// `high`; `None` where it is the same at both ends.
+/// The two neighbours in [low, high] between which `holds` changes from its value at `low` to that at `high`; `None`
+/// if both are equal.
 pub(super) fn turn(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> Option<(f32, f32)> {
     let first = holds(low);
     if low >= high || holds(high) == first {

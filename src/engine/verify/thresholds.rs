@@ -1,21 +1,21 @@
-//! The threshold set: lanes whose first step sits exactly on a decision of a model, a gate, a criterion or an
-//! end rule, in the lane arithmetic, with their neighbours one unit in the last place to either side. A
-//! backend that contracts a product, reorders a sum or tests `<` for `≤` shows here first.
+//! The threshold set: lanes whose first step is exactly on a threshold of a model, a gate, a criterion or an end
+//! rule, and neighbours one unit in the last place to each side. It detects contracted products, reordered sums, and
+//! `<` instead of `≤`.
 
 use super::check_categories;
 use super::decision::{HEADWAYS, Threshold};
-use super::scene::Scenes;
-use crate::engine::{Block, CaseSource, LaneCase, LanePlan};
+use super::first_step::ThresholdCases;
+use crate::engine::{Block, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Category, Tables};
+use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
-/// Variants of every unit: on the threshold (`S`), and the quantity that decides one ULP smaller and larger.
-/// Around 0 the neighbours are ±2⁻³², which no device flushes; steps and times move by a step.
+/// Variants of every unit: on the threshold (`S`), and the deciding quantity one ULP smaller and larger. Around 0 the
+/// neighbours are ±2⁻³², which no device flushes; steps and times change by one step.
 pub const SIDES: [&str; 3] = ["S", "below", "above"];
 
-/// What a threshold set holds.
+/// Options of a threshold set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ThresholdOptions {
     /// Seed of the situations around the thresholds.
@@ -39,11 +39,11 @@ impl Default for ThresholdOptions {
     }
 }
 
-/// Plans the threshold set of a seed. Keys are `threshold-rss-lateral-cut-in-seed157-000012`; the number is
-/// that of the unit in its category, whatever the size asked for.
+/// Plans the threshold set of a seed. Keys are `threshold-rss-lateral-cut-in-seed157-000012`; the number is that of
+/// the unit in its category, for any size.
 ///
 /// # Errors
-/// [`Error::Usage`] where there is no unit, category or model to plan, or a category is named twice.
+/// [`Error::Usage`] without units, categories or models, or if a category is named twice.
 pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<LanePlan> {
     check_categories(&options.categories)?;
     if options.units_per_threshold == 0 {
@@ -63,18 +63,6 @@ pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<L
         first_lane: 0,
     };
     let blocks = options.categories.iter().map(block).collect();
-    let source = ThresholdCases(Scenes::new(profile, options.seed, &options.categories));
+    let source = ThresholdCases::new(profile, options.seed, &options.categories);
     LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Box::new(source))
-}
-
-struct ThresholdCases(Scenes);
-
-impl CaseSource for ThresholdCases {
-    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.0.case(block, unit, variant)
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        self.0.tables()
-    }
 }

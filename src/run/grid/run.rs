@@ -138,7 +138,7 @@ impl Map {
             _ => None,
         };
         if let Some(name) = itself {
-            let problem = format!("`{name}` is what is run anyway: there is nothing to compare");
+            let problem = format!("`{name}` runs anyway: there is nothing to compare");
             return Err(Error::usage(Place::option("against"), problem, "name another model or profile"));
         }
         let is_published = matches!(options.grids, MapGrids::Jrc(_))

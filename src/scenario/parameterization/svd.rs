@@ -42,10 +42,7 @@ pub fn fit_svd(
         return Err(Error::input(
             place(),
             format!("{n} scenarios are too few for a decomposition with {needed} parameters"),
-            format!(
-                "at least {} are needed: use more data; the kinematic parameterizations are run all the same",
-                needed + 1
-            ),
+            format!("at least {} are needed: use more data; the kinematic parameterizations still run", needed + 1),
         ));
     }
     let p = rows[0].len();
@@ -66,7 +63,7 @@ pub fn fit_svd(
     if weights.iter().any(|w| !w.is_finite()) {
         return Err(Error::input(
             place(),
-            "a series or an extra is the same in all scenarios, so it has no spread to scale by",
+            "a series or an extra is equal in all scenarios, so its scale is zero",
             "use scenarios that differ in speed, lateral motion, duration and gap",
         ));
     }

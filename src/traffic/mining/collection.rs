@@ -16,7 +16,7 @@ use crate::traffic::trajectory::highd::{self, FileChecksum};
 use crate::traffic::trajectory::{EgoView, Recording};
 use crate::{Error, Result};
 
-/// What one recording gave.
+/// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RecordingSummary {
     /// Its id.
@@ -27,9 +27,9 @@ pub struct RecordingSummary {
     pub samples: u64,
     /// Ego-centric data sets.
     pub data_sets: u64,
-    /// Time that all egos together drive in their data sets, s.
+    /// Total time of all data sets, s.
     pub driven_s: f64,
-    /// Way that they drive in them, m.
+    /// Total distance of all data sets, m.
     pub driven_m: f64,
     /// Samples per second.
     pub frame_rate_hz: f64,
@@ -44,11 +44,11 @@ pub struct Collection {
     pub scenarios: Vec<Scenario>,
     /// The recordings that were used.
     pub recordings: Vec<RecordingSummary>,
-    /// Recordings that were not, and why.
+    /// The errors of recordings that were not used.
     pub problems: Vec<Error>,
-    /// What the data leaves open or what looks wrong, as sentences.
+    /// Warnings about the data, as sentences.
     pub notes: Vec<String>,
-    /// Made up by the program, in whole or in part: nothing that follows is a statement about real traffic.
+    /// At least one recording is synthetic, so results say nothing about real traffic.
     pub synthetic: bool,
 }
 
@@ -169,8 +169,7 @@ fn summary(
     }
 }
 
-/// Time and way of all ego data sets, from each ego's first sample to its last with tags: the exposure in which
-/// scenarios were looked for.
+/// Time and distance of all ego data sets, from each ego's first sample to its last with tags: the exposure.
 fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for (index, ego) in recording.tracks.iter().enumerate() {

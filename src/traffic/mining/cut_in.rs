@@ -1,4 +1,4 @@
-//! Cut-in: another vehicle changes into the ego's lane and becomes its leader (method.md §3).
+//! Cut-in: another vehicle changes into the ego's lane and becomes its leader.
 //!
 //! | item | target | ego |
 //! |---|---|---|
@@ -32,7 +32,7 @@ pub(super) fn scenario(
     first: usize,
     tags: &[Tags],
 ) -> Option<Scenario> {
-    let target = &set.scene.recording.tracks[target_index];
+    let target = &set.recording_tags.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
     let found = FoundScenario { set, target, category: Category::CutIn, start, end };
     let change = lane_change_of(&found, target_index)?;
@@ -41,12 +41,12 @@ pub(super) fn scenario(
         LaneChangeKind::LeftIn | LaneChangeKind::RightOut => Side::Right,
     };
     let mut scenario = found.scenario(side)?;
-    (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_in);
+    (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_in);
     describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_IN, true));
     Some(scenario)
 }
 
-/// The filters of the paper, at t = 0: slower than the ego, and near.
+/// The filters of the paper at t = 0: the target is slower than the ego and its headway is short.
 fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     let (v_target, v_ego) = (scenario.target.v[0], scenario.ego.v0);
     let slower = v_target < options.max_speed_share * v_ego - TOLERANCE;
@@ -64,17 +64,17 @@ fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     }
 }
 
-/// The target's lane change, against the ego's lane, that is going on at t = 0.
+/// The target's lane change relative to the ego's lane that is in progress at t = 0.
 pub(super) fn lane_change_of<'a>(
     found: &FoundScenario<'a>,
     target_index: usize,
 ) -> Option<&'a super::lateral::LaneChange> {
     let set: &'a DataSet<'a> = found.set;
     let j = found.sample_of(found.target, found.start)?;
-    set.scene.activities[target_index].lane_change(set.ego.lane[found.start], j)
+    set.recording_tags.activities[target_index].lane_change(set.ego.lane[found.start], j)
 }
 
-/// Provenance that cut-in and cut-out share.
+/// Sets the origin fields that cut-in and cut-out share.
 pub(super) fn describe(
     scenario: &mut Scenario,
     found: &FoundScenario,
@@ -89,8 +89,7 @@ pub(super) fn describe(
     scenario.end_cause = Some(end_cause.to_owned());
 }
 
-/// What ended a match: `change` is the lane change's tag, `leads` whether the target leads in the last
-/// item.
+/// The event that ended a match. `change` is the lane change's tag; `leads`: the target leads in the last item.
 pub(super) fn end_cause(tags: &[Tags], matched: &Match, change: Tags, leads: bool) -> &'static str {
     let at_end = tags[matched.end];
     if matched.clamped {

@@ -1,4 +1,4 @@
-//! Cut-out: the leader leaves the ego's lane and uncovers a slower vehicle (method.md §3; the mirror of
+//! Cut-out: the leader leaves the ego's lane and uncovers a slower vehicle (the mirror of
 //! the cut-in).
 //!
 //! | item | target | ego |
@@ -6,8 +6,8 @@
 //! | 1 | changes out of the ego's lane (`lo`, `ro`), is the leader | keeps its lane |
 //! | 2 | changes out of the ego's lane, is not the leader | keeps its lane |
 //!
-//! That is *found*. *Kept* besides if the nearest vehicle ahead of the target in the ego's lane at t = 0
-//! stays in that lane and in range until the end, and is slower than the ego at t = 0.
+//! That is *found*. A cut-out is *kept* if the nearest vehicle ahead of the target in the ego's lane at t = 0 stays
+//! in that lane and in range until the end, and is slower than the ego at t = 0.
 
 use super::cut_in::{describe, end_cause, lane_change_of};
 use super::data_set::DataSet;
@@ -34,7 +34,7 @@ pub(super) fn scenario(
     first: usize,
     tags: &[Tags],
 ) -> Option<Scenario> {
-    let target = &set.scene.recording.tracks[target_index];
+    let target = &set.recording_tags.recording.tracks[target_index];
     let (start, end) = (first + matched.start(), first + matched.end);
     let found = FoundScenario { set, target, category: Category::CutOut, start, end };
     let change = lane_change_of(&found, target_index)?;
@@ -51,22 +51,22 @@ pub(super) fn scenario(
             scenario.lead_id = Some(lead.id);
             scenario.lead = Some(found.other(lead, side)?);
             scenario.lead_gap = Some(micrometres(lead_gap));
-            (scenario.kept, scenario.reason) = verdict(&scenario, &set.scene.options.cut_out);
+            (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_out);
         }
         Err(reason) => scenario.reason = reason.to_owned(),
     }
     Some(scenario)
 }
 
-/// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to
-/// the end; else why there is none.
+/// The nearest vehicle ahead of the target in the ego's lane at t = 0, if it stays there and in range to the end;
+/// otherwise the reason.
 fn uncovered<'a>(found: &FoundScenario<'a>) -> Result<&'a Track, &'static str> {
     let set: &'a DataSet<'a> = found.set;
     let nobody = "no vehicle ahead of the target in the ego's lane";
     let j = found.sample_of(found.target, found.start).ok_or(nobody)?;
     let lane = set.ego.lane[found.start];
     let (index, _) = set.ahead_in_lane(found.start, found.target.s_m[j]).next().ok_or(nobody)?;
-    let lead = &set.scene.recording.tracks[index];
+    let lead = &set.recording_tags.recording.tracks[index];
     let stays = (found.start..=found.end)
         .all(|k| found.sample_of(lead, k).is_some_and(|l| set.in_lane(lane, lead.d_m[l]) && set.in_range(k, lead, l)));
     if stays { Ok(lead) } else { Err("vehicle ahead does not stay in the lane and in range") }

@@ -1,20 +1,19 @@
-//! The ego-centric data set (method.md §2): one ego, the part of its track that counts, who is in
-//! range, and who leads. Its extent is that of [`EgoView`]; neighbours come from the frame index instead
-//! of a walk over all vehicles.
+//! The ego-centric data set: one ego, the part of its track in the data set, the vehicles in range, and the leader.
+//! Its extent is that of [`EgoView`]; neighbours come from the frame index.
 
-use super::neighbours::Neighbours;
+use super::frame_index::FrameIndex;
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
 use crate::traffic::trajectory::{Carriageway, EgoView, NO_LANE, Recording, Track};
 
-/// A recording with everything that is computed once for it.
+/// A recording with its activities and neighbours, which are computed once.
 pub(super) struct RecordingTags<'a> {
     pub recording: &'a Recording,
     pub options: &'a MiningOptions,
     /// Activities of every track, in the recording's order.
     pub activities: Vec<Activities>,
     /// Neighbours on every carriageway.
-    pub neighbours: Vec<Neighbours>,
+    pub neighbours: Vec<FrameIndex>,
 }
 
 impl<'a> RecordingTags<'a> {
@@ -24,14 +23,14 @@ impl<'a> RecordingTags<'a> {
             .iter()
             .map(|t| Activities::of(t, &recording.carriageways[t.carriageway], recording.frame_rate_hz, options))
             .collect();
-        let neighbours = (0..recording.carriageways.len()).map(|c| Neighbours::new(recording, c)).collect();
+        let neighbours = (0..recording.carriageways.len()).map(|c| FrameIndex::new(recording, c)).collect();
         RecordingTags { recording, options, activities, neighbours }
     }
 }
 
 /// The data set of one ego.
 pub(super) struct DataSet<'a> {
-    pub scene: &'a RecordingTags<'a>,
+    pub recording_tags: &'a RecordingTags<'a>,
     /// Index of the ego's track.
     pub ego_index: usize,
     pub ego: &'a Track,
@@ -50,18 +49,18 @@ pub(super) struct Stretch {
 }
 
 impl<'a> DataSet<'a> {
-    /// The data set of the track with index `ego_index`; `None` where the vehicle travels less than the
-    /// end cut.
-    pub fn new(scene: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
-        let ego = &scene.recording.tracks[ego_index];
-        let samples = EgoView::of(scene.recording, ego_index, &scene.options.ego_view)?.last_sample() + 1;
-        let carriageway = &scene.recording.carriageways[ego.carriageway];
-        let mut set = DataSet { scene, ego_index, ego, carriageway, samples, leader: Vec::new() };
+    /// The data set of the track with index `ego_index`; `None` if the vehicle travels less than the end cut.
+    pub fn new(recording_tags: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
+        let ego = &recording_tags.recording.tracks[ego_index];
+        let samples =
+            EgoView::of(recording_tags.recording, ego_index, &recording_tags.options.ego_view)?.last_sample() + 1;
+        let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
+        let mut set = DataSet { recording_tags, ego_index, ego, carriageway, samples, leader: Vec::new() };
         set.leader = (0..samples).map(|k| set.leader_at(k)).collect();
         Some(set)
     }
 
-    /// Everyone who is the leader at some sample, once, in the order of first leading.
+    /// All vehicles that lead at some sample, in the order of their first leading sample.
     pub fn leaders(&self) -> Vec<usize> {
         let mut leaders: Vec<usize> = Vec::new();
         let mut last = None;
@@ -78,7 +77,7 @@ impl<'a> DataSet<'a> {
     /// [`EgoView`]) at the ego's sample `k`, the
     /// other's sample `j`.
     pub fn in_range(&self, k: usize, other: &Track, j: usize) -> bool {
-        (other.s_m[j] - self.ego.s_m[k]).abs() <= self.scene.options.ego_view.range_m + TOLERANCE
+        (other.s_m[j] - self.ego.s_m[k]).abs() <= self.recording_tags.options.ego_view.range_m + TOLERANCE
     }
 
     /// The lateral position `d_m` is in `lane`.
@@ -96,30 +95,30 @@ impl<'a> DataSet<'a> {
     /// Vehicles ahead of `s_m` in the ego's lane and in range at the ego's sample `k`, nearest first:
     /// index of the track, its sample.
     pub fn ahead_in_lane(&self, k: usize, s_m: f64) -> impl Iterator<Item = (usize, usize)> {
-        let options = self.scene.options;
+        let options = self.recording_tags.options;
         let lane = self.ego.lane[k];
         let horizon = self.ego.s_m[k] + options.ego_view.range_m + TOLERANCE;
-        self.scene.neighbours[self.ego.carriageway]
+        self.recording_tags.neighbours[self.ego.carriageway]
             .ahead(self.ego_index, k, s_m + TOLERANCE, horizon)
             .map(|n| (n.track as usize, n.sample as usize))
             .filter(move |&(track, sample)| {
-                let other = &self.scene.recording.tracks[track];
+                let other = &self.recording_tags.recording.tracks[track];
                 lane != NO_LANE && self.in_lane(lane, other.d_m[sample]) && self.in_range(k, other, sample)
             })
     }
 
     /// Leader: in front, same lane, gap of at most the leader's THW, nearest of those.
     fn leader_at(&self, k: usize) -> Option<u32> {
-        let options = self.scene.options;
+        let options = self.recording_tags.options;
         let reach = options.leader_max_thw_s * self.ego.v_s_mps[k] + TOLERANCE;
         self.ahead_in_lane(k, self.ego.s_m[k])
-            .find(|&(track, j)| self.gap_m(k, &self.scene.recording.tracks[track], j) <= reach)
+            .find(|&(track, j)| self.gap_m(k, &self.recording_tags.recording.tracks[track], j) <= reach)
             .map(|(track, _)| track as u32)
     }
 
-    /// The tags of the ego and the target with index `target`, wherever the target is in the data set.
+    /// The tags of the ego and the target with index `target`, where the target is in the data set.
     pub fn stretches(&self, target_index: usize) -> Vec<Stretch> {
-        let target = &self.scene.recording.tracks[target_index];
+        let target = &self.recording_tags.recording.tracks[target_index];
         let offset = self.ego.first_frame - target.first_frame; // target's sample = ego's sample + offset
         let first = (-offset).max(0);
         let end = (target.len() as i64 - offset).min(self.samples as i64);
@@ -144,7 +143,8 @@ impl<'a> DataSet<'a> {
 
     fn tags(&self, k: usize, target_index: usize, j: usize) -> Tags {
         let lane = self.ego.lane[k];
-        let (ego, target) = (&self.scene.activities[self.ego_index], &self.scene.activities[target_index]);
+        let (ego, target) =
+            (&self.recording_tags.activities[self.ego_index], &self.recording_tags.activities[target_index]);
         let change = target.lane_change(lane, j).map(|c| c.kind.is_in());
         let decelerates = target.longitudinal_at(j) == Some(super::longitudinal::Longitudinal::Decelerating);
         Tags::default()

@@ -1,11 +1,10 @@
-//! What the three categories share once their tags were found: the pieces of a
-//! [`Scenario`] that are read off the tracks.
+//! The parts of a [`Scenario`] that all categories take from the tracks of a match.
 
 use super::data_set::DataSet;
 use crate::scenario::{Category, Ego, Other, Scenario, Side};
 use crate::traffic::trajectory::{Lane, Track};
 
-/// An ego, a target and the interval in which something was found.
+/// An ego, a target and the interval of a match.
 pub(super) struct FoundScenario<'a> {
     pub set: &'a DataSet<'a>,
     pub target: &'a Track,
@@ -27,22 +26,22 @@ impl FoundScenario<'_> {
         self.set.ego.first_frame + k as i64
     }
 
-    /// The lane the ego is in at t = 0. Series are seen from it throughout, so they have no jumps
-    /// where the ego itself changes lane (possible in an LVD only).
+    /// The ego's lane at t = 0. All series refer to it, so they have no jump if the ego changes lanes (possible in an
+    /// LVD only).
     pub fn lane(&self) -> Option<Lane> {
         self.set.carriageway.lane(usize::from(self.set.ego.lane[self.start]))
     }
 
-    /// The scenario with `y > 0` on `side`, not kept, without what only some categories have. `None`
-    /// if the target is not in view throughout or the ego is in no lane: never, where tags were found.
+    /// The scenario with `y > 0` on `side`, not kept, without what only some categories have. `None` if the target is
+    /// not always in view or the ego is in no lane, which cannot occur in a match.
     pub fn scenario(&self, side: Side) -> Option<Scenario> {
-        let DataSet { ego, scene, .. } = self.set;
+        let DataSet { ego, recording_tags, .. } = self.set;
         let lane = self.lane()?;
         let (first, last) = (self.sample_of(self.target, self.start)?, self.sample_of(self.target, self.end)?);
         let v0 = speed(ego.v_s_mps[self.start]);
         let gap0 = micrometres(self.set.gap_m(self.start, self.target, first));
         let frame0 = self.frame(self.start);
-        let (recording, key) = (&scene.recording.id, self.category.key());
+        let (recording, key) = (&recording_tags.recording.id, self.category.key());
         Some(Scenario {
             id: format!("{recording}_{key}_{}_{}_{frame0}", ego.id, self.target.id),
             category: self.category,
@@ -52,7 +51,7 @@ impl FoundScenario<'_> {
             lead_id: None,
             frame0,
             frame1: self.frame(self.end),
-            fps: scene.recording.frame_rate_hz,
+            fps: recording_tags.recording.frame_rate_hz,
             kept: false,
             reason: String::new(),
             ego: Ego { v0, length: ego.length_m, width: ego.width_m },
@@ -68,11 +67,11 @@ impl FoundScenario<'_> {
             end_cause: None,
             frame_switch: None,
             tag_frames: None,
-            synthetic: scene.recording.synthetic,
+            synthetic: recording_tags.recording.synthetic,
         })
     }
 
-    /// Sizes and series of another vehicle, `y > 0` on `side`; `None` if it is not in view throughout.
+    /// Sizes and series of another vehicle, `y > 0` on `side`; `None` if it is not always in view.
     pub fn other(&self, other: &Track, side: Side) -> Option<Other> {
         let centre_m = self.lane()?.centre_m();
         let (first, last) = (self.sample_of(other, self.start)?, self.sample_of(other, self.end)?);
@@ -85,14 +84,13 @@ impl FoundScenario<'_> {
     }
 }
 
-/// A speed along the road as a scenario has it: recordings give vehicles that stand a few centimetres
-/// per second backwards, scenarios know no driving backwards.
+/// A speed of a scenario, ≥ 0: recordings give stationary vehicles a few centimetres per second backwards.
 pub(super) fn speed(v_mps: f64) -> f64 {
     if v_mps > 0.0 { v_mps } else { 0.0 }
 }
 
-/// A length rounded to 1e-6 m, far below any recording's resolution. What is rounded away depends on the
-/// frame of the file only; without it a recording turned by 180° would differ in the last bits.
+/// A length rounded to 1e-6 m, far below any recording's resolution. Without rounding, a recording rotated by 180°
+/// would differ in the last bits.
 pub(super) fn micrometres(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6 + 0.0 // + 0.0: no negative zero
 }

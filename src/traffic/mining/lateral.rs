@@ -1,14 +1,13 @@
-//! Lateral activities: when a vehicle changes into or out of a given lane (method.md §3).
+//! Lateral activities: when a vehicle changes into or out of a given lane.
 //!
-//! The lane is fixed; the vehicle is seen from it. For each of the four changes, `s` is the distance
-//! past the line that is crossed: negative before, zero at the crossing, positive after. So one
-//! detector serves all four, and left and right are treated alike.
+//! The lane is fixed. For each of the four changes, `s` is the distance past the crossed line: negative before, zero
+//! at the crossing, positive after. So one detector serves all four, and left and right are symmetric.
 
+use super::longitudinal::trailing_min;
 use super::options::{LaneChangeEnd, LateralOptions, TOLERANCE, samples, window_samples};
-use super::window::trailing_min;
 use crate::traffic::trajectory::Lane;
 
-/// The four lane changes, seen from one lane.
+/// The four lane changes relative to one lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LaneChangeKind {
     /// To the left, into the lane (`li`): comes from the right.
@@ -22,8 +21,7 @@ pub enum LaneChangeKind {
 }
 
 impl LaneChangeKind {
-    /// Entering before leaving: a vehicle that jumps over a whole lane between two samples has entered
-    /// it first, whichever way it went.
+    /// Entering before leaving: a vehicle that crosses a whole lane between two samples enters it first.
     const ALL: [LaneChangeKind; 4] =
         [LaneChangeKind::LeftIn, LaneChangeKind::RightIn, LaneChangeKind::LeftOut, LaneChangeKind::RightOut];
 
@@ -46,7 +44,7 @@ impl LaneChangeKind {
 /// One lane change over the samples `start..end` of the track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LaneChange {
-    /// Which one.
+    /// Kind of the change.
     pub kind: LaneChangeKind,
     /// First sample.
     pub start: usize,
@@ -56,8 +54,7 @@ pub struct LaneChange {
     pub end: usize,
 }
 
-/// Lane changes of a whole track with lateral positions `d_m` against `lane`: ascending, not
-/// overlapping.
+/// Lane changes of a whole track with lateral positions `d_m` relative to `lane`: ascending, not overlapping.
 pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &LateralOptions) -> Vec<LaneChange> {
     let crossings = crossings(d_m, lane);
     let mut found: Vec<LaneChange> = Vec::new();
@@ -67,7 +64,7 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
             continue; // already changing
         }
         let s: Vec<f64> = d_m.iter().map(|&d| kind.past_line(d, lane)).collect();
-        let profile = Profile::new(&s, lane.width_m(), frame_rate_hz, options);
+        let profile = LineDistance::new(&s, lane.width_m(), frame_rate_hz, options);
         if let Some(end) = profile.end(k) {
             let start = profile.start(k, free_from).unwrap_or(free_from);
             found.push(LaneChange { kind, start, crossing: k, end });
@@ -76,12 +73,12 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
     found
 }
 
-/// The lane change going on at sample `k`, if any.
+/// The lane change in progress at sample `k`, if any.
 pub fn lane_change_at(changes: &[LaneChange], k: usize) -> Option<&LaneChange> {
     changes.iter().find(|c| c.start <= k && k < c.end)
 }
 
-/// Samples at which a line of the lane is passed, ascending, with the change each may belong to.
+/// Samples at which the vehicle crosses a line of the lane, ascending, with the possible change of each.
 fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
     let mut crossings = Vec::new();
     for k in 1..d_m.len() {
@@ -94,8 +91,8 @@ fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
     crossings
 }
 
-/// `s` over the track, and the limits that say where the change begins and ends.
-struct Profile<'a> {
+/// `s` over the track, and the limits that determine begin and end of the change.
+struct LineDistance<'a> {
     s: &'a [f64],
     least: Vec<f64>,
     window: usize,
@@ -106,10 +103,10 @@ struct Profile<'a> {
     lc_end: LaneChangeEnd,
 }
 
-impl<'a> Profile<'a> {
+impl<'a> LineDistance<'a> {
     fn new(s: &'a [f64], lane_width_m: f64, frame_rate_hz: f64, options: &LateralOptions) -> Self {
         let window = window_samples(options.window_s, frame_rate_hz);
-        Profile {
+        LineDistance {
             s,
             least: trailing_min(s, window),
             window,
@@ -121,7 +118,7 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// Progress over the window that ends at `k` is small. A window that is not complete is not calm.
+    /// Progress over the window that ends at `k` is small. False for an incomplete window.
     fn is_calm(&self, k: usize) -> bool {
         k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.quiescent_gap_m - TOLERANCE
     }

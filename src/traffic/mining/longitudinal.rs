@@ -1,18 +1,19 @@
-//! Longitudinal activities: when a vehicle accelerates, decelerates or cruises (method.md §3).
+//! Longitudinal activities: when a vehicle accelerates, decelerates or cruises.
 //!
-//! Plain f64 of the speeds as they were read, no tolerance: one golden rests on an exact tie.
+//! Exact f64 comparisons of the recorded speeds, without tolerance: one golden case depends on an exact tie.
+
+use std::collections::VecDeque;
 
 use super::options::{LongitudinalOptions, window_samples};
-use super::window::trailing_min;
 
-/// What a vehicle does with its speed.
+/// Longitudinal activity of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Longitudinal {
     /// Neither of the others.
     Cruising,
-    /// Speeding up.
+    /// Accelerating.
     Accelerating,
-    /// Slowing down.
+    /// Decelerating.
     Decelerating,
 }
 
@@ -21,7 +22,7 @@ pub enum Longitudinal {
 pub struct LongitudinalEvent {
     /// First sample.
     pub start: usize,
-    /// What begins there.
+    /// Activity that begins there.
     pub activity: Longitudinal,
 }
 
@@ -35,11 +36,10 @@ pub fn longitudinal_events(v_mps: &[f64], frame_rate_hz: f64, options: &Longitud
     remove_short_cruising(v_mps, &events, options.min_cruise_s * frame_rate_hz)
 }
 
-/// A series seen as rising: for deceleration the negated speed, which is exact, so both activities are
-/// found by the same lines.
+/// A series in which an activity is an increase. Deceleration uses the negated speed, which is exact.
 struct Rise {
     x: Vec<f64>,
-    /// Least value over the trailing window.
+    /// Minimum over the trailing window.
     least: Vec<f64>,
     /// `quiescent_from[j]`: first sample ≥ j from which the next window rises by less than the threshold.
     quiescent_from: Vec<Option<usize>>,
@@ -118,7 +118,7 @@ fn remove_short_cruising(v: &[f64], events: &[LongitudinalEvent], min_cruise: f6
             i += 1;
             continue;
         };
-        // Whole samples against a product of two numbers that may be rounded (4 s at 29.97 Hz).
+        // The product of two numbers may be rounded (4 s at 29.97 Hz); it is compared with whole samples.
         let short = ((after.start - event.start) as f64) < min_cruise - 1e-6;
         if event.activity != Longitudinal::Cruising || !short {
             kept.push(event);
@@ -134,8 +134,43 @@ fn remove_short_cruising(v: &[f64], events: &[LongitudinalEvent], min_cruise: f6
     kept
 }
 
-/// Where the speed last has its minimum (before an acceleration) or maximum in `first..=last`.
+/// The last sample in `first..=last` at which the speed is minimal (before an acceleration) or maximal.
 fn last_extremum(v: &[f64], first: usize, last: usize, next: Longitudinal) -> usize {
     let sign = if next == Longitudinal::Accelerating { 1.0 } else { -1.0 };
     (first..=last).fold(first, |best, k| if sign * v[k] <= sign * v[best] { k } else { best })
+}
+
+/// Minimum over `x[k − window ..= k]` for every `k`, in linear time (monotone queue). For `k < window` the window is incomplete.
+pub(super) fn trailing_min(x: &[f64], window: usize) -> Vec<f64> {
+    let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window.min(x.len()) + 2);
+    x.iter()
+        .enumerate()
+        .map(|(k, &value)| {
+            while candidates.back().is_some_and(|&j| x[j] >= value) {
+                candidates.pop_back();
+            }
+            candidates.push_back(k);
+            while candidates.front().is_some_and(|&j| k - j > window) {
+                candidates.pop_front();
+            }
+            candidates.front().map_or(value, |&j| x[j])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equals_the_minimum_over_each_window() {
+        let x: Vec<f64> = (0..200).map(|i| f64::from((i * 7919) % 101)).collect();
+        for window in [0, 1, 2, 25, 300] {
+            let least = trailing_min(&x, window);
+            for k in 0..x.len() {
+                let expected = x[k.saturating_sub(window)..=k].iter().copied().fold(f64::INFINITY, f64::min);
+                assert_eq!(least[k], expected, "window {window}, sample {k}");
+            }
+        }
+    }
 }

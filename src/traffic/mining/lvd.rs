@@ -1,8 +1,8 @@
-//! LVD, leading vehicle decelerates: one item, the leader decelerates (method.md §3). The ego need not
-//! keep its lane, and there is no pause between two.
+//! LVD, leading vehicle decelerates: one item, the leader decelerates. The ego may change lanes, and there is no
+//! pause between two matches.
 //!
-//! The interval of the tags is trimmed to the first maximum and the first minimum of the leader's speed,
-//! so that it holds the whole loss of speed and nothing else.
+//! The interval of the tags is trimmed to the first maximum and the first minimum of the leader's speed, so that it
+//! contains exactly the loss of speed.
 
 use super::data_set::DataSet;
 use super::found::FoundScenario;
@@ -14,11 +14,11 @@ use crate::scenario::{Category, Scenario, Side};
 /// The items, in order.
 pub const ITEMS: [Item<'static, Tags>; 1] = [&|t: &Tags| t.has(Tags::LEADER | Tags::DECELERATES)];
 
-/// The scenario of one match, with the verdict of the filter; `None` where too little is left after
-/// trimming. `first` is the ego's sample of the first tags of the match's stretch.
+/// The scenario of one match, with the verdict of the filter; `None` if too little is left after trimming. `first` is
+/// the ego's sample of the first tags of the match's stretch.
 pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, first: usize) -> Option<Scenario> {
-    let target = &set.scene.recording.tracks[target_index];
-    let options = set.scene.options;
+    let target = &set.recording_tags.recording.tracks[target_index];
+    let options = set.recording_tags.options;
     let offset = set.ego.first_frame - target.first_frame;
     let v = |k: usize| target.v_s_mps[(k as i64 + offset) as usize];
     let tagged = matched.last_item();
@@ -31,7 +31,7 @@ pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, firs
             end = k;
         }
     }
-    let duration_s = (end as f64 - start as f64) / set.scene.recording.frame_rate_hz;
+    let duration_s = (end as f64 - start as f64) / set.recording_tags.recording.frame_rate_hz;
     if end <= start || duration_s < options.lvd.min_duration_s - TOLERANCE {
         return None;
     }

@@ -1,4 +1,4 @@
-//! The run over a recording: every vehicle once as ego, every category, every target that leads it.
+//! The search in a recording: every vehicle once as ego, every category, every target that leads it.
 
 use super::data_set::{DataSet, RecordingTags, Stretch};
 use super::options::{MiningOptions, TOLERANCE, samples};
@@ -8,7 +8,7 @@ use super::{cut_in, cut_out, lvd};
 use crate::scenario::{Category, Scenario};
 use crate::traffic::trajectory::Recording;
 
-/// What a recording held.
+/// Scenarios of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mined {
     /// Every scenario found, kept or not, ascending by (ego, category, first frame, target).
@@ -17,12 +17,12 @@ pub struct Mined {
     pub data_sets: u64,
 }
 
-/// How many of a category were found, and how many of them passed the filters.
+/// Number of found and of kept scenarios of a category.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CategoryCount {
-    /// All.
+    /// Found.
     pub found: u64,
-    /// Those that the paper's filters keep.
+    /// Kept by the paper's filters.
     pub kept: u64,
 }
 
@@ -37,13 +37,13 @@ impl Mined {
     }
 }
 
-/// Finds every cut-in, cut-out and leader deceleration of a recording (method.md §2 and §3). The result
+/// Finds every cut-in, cut-out and leader deceleration of a recording. The result
 /// depends on the recording and the options only.
 pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
-    let scene = RecordingTags::new(recording, options);
+    let recording_tags = RecordingTags::new(recording, options);
     let mut mined = Mined::default();
     for ego_index in 0..recording.tracks.len() {
-        let Some(set) = DataSet::new(&scene, ego_index) else { continue };
+        let Some(set) = DataSet::new(&recording_tags, ego_index) else { continue };
         mined.data_sets += 1;
         for target_index in set.leaders() {
             mine_pair(&set, target_index, &mut mined.scenarios);
@@ -53,15 +53,15 @@ pub fn mine(recording: &Recording, options: &MiningOptions) -> Mined {
     mined
 }
 
-/// All scenarios of one ego with one target. In every category the target leads at some time, so others
-/// need not be looked at.
+/// All scenarios of one ego with one target. In every category the target leads at some time, so other targets are
+/// skipped.
 fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) {
-    let activities = &set.scene.activities[target_index];
+    let activities = &set.recording_tags.activities[target_index];
     if !activities.decelerates() && !activities.changes_lane() {
         return;
     }
-    let options = set.scene.options;
-    let rate = set.scene.recording.frame_rate_hz;
+    let options = set.recording_tags.options;
+    let rate = set.recording_tags.recording.frame_rate_hz;
     let stretches = set.stretches(target_index);
     if activities.changes_lane() {
         let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - TOLERANCE;
@@ -82,8 +82,8 @@ fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) 
     }
 }
 
-/// Calls `take` for every match that is not discarded; the search goes on `pause` samples after its end.
-/// A discarded match is none: the search goes on at its end.
+/// Calls `take` for every match that is not discarded, and continues `pause` samples after its end. After a discarded
+/// match the search continues at its end.
 fn each_match(
     stretches: &[Stretch],
     items: &[Item<Tags>],

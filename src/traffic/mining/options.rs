@@ -1,5 +1,5 @@
 //! Every threshold of the mining and every filter of the paper, by name, with its published value as
-//! default (method.md §2 and §3). Serialized into `run.json` and read from a study's TOML.
+//! default. Serialized into `run.json` and read from a study's TOML.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,11 +28,11 @@ pub struct MiningOptions {
     pub lvd: LvdOptions,
 }
 
-/// Longitudinal activities (method.md §3, table).
+/// Longitudinal activities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LongitudinalOptions {
-    /// Window over which a speed change is seen, s. Default 1 (k_h).
+    /// Window of a speed change, s. Default 1 (k_h).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub window_s: f64,
     /// Mean acceleration over the window below which a vehicle cruises, m/s². Default 0.1 (a_cruise).
@@ -46,36 +46,36 @@ pub struct LongitudinalOptions {
     pub min_cruise_s: f64,
 }
 
-/// Lane changes (method.md §3, table).
+/// Lane changes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LateralOptions {
-    /// Window over which lateral motion is seen, s. Default 1 (k_h).
+    /// Window of lateral motion, s. Default 1 (k_h).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub window_s: f64,
-    /// Mean lateral speed over the window below which a vehicle is calm, m/s. Default 0.25 (v_lat).
+    /// Mean lateral speed over the window below which lateral motion is steady, m/s. Default 0.25 (v_lat).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub calm_speed_mps: f64,
-    /// Beyond this share of the lane width from the line, the change has certainly ended or not yet
-    /// begun. Default 0.5 (α_max).
+    /// Beyond this fraction of the lane width from the line, the change has certainly ended or not yet begun. Default
+    /// 0.5 (α_max).
     #[schemars(range(min = 0.0, max = 1e6))]
     pub far_share: f64,
-    /// Beyond this share of the lane width from the line, calm means that the change has ended or not
-    /// yet begun. Default 0.1 (α_min).
+    /// Beyond this fraction of the lane width from the line, steady lateral motion means that the change has ended or
+    /// not yet begun. Default 0.1 (α_min).
     #[schemars(range(min = 0.0, max = 1e6))]
     pub near_share: f64,
-    /// How far from the crossing a start and an end are looked for, s. Default 10.
+    /// Maximum time from the crossing to start and end, s. Default 10.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
     pub search_s: f64,
     /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
     pub lc_end: LaneChangeEnd,
 }
 
-/// Where the window lies that finds a vehicle calm at the end of a lane change. It drives T.
+/// Position of the window in which steady lateral motion ends a lane change. It determines T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LaneChangeEnd {
-    /// The window begins at the sample: the published formula; ends the change up to 1 s early.
+    /// The window begins at the sample (the published formula). The change ends up to 1 s early.
     Published,
     /// The window ends at the sample: closest to the true end of the motion.
     #[default]
@@ -92,7 +92,7 @@ pub struct CutInOptions {
     /// The search goes on this long after a cut-in of the same ego and target, s. Default 5.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub pause_s: f64,
-    /// Kept only if the target's initial speed is below this share of the ego's. Default 0.95 (paper).
+    /// Kept only if the target's initial speed is below this fraction of the ego's. Default 0.95 (paper).
     #[schemars(range(min = 0.0, max = 1e6))]
     pub max_speed_share: f64,
     /// Kept only if the initial THW is below this, s. Default 2 (paper).
@@ -110,8 +110,8 @@ pub struct CutOutOptions {
     /// The search goes on this long after a cut-out of the same ego and target, s. Default 5.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub pause_s: f64,
-    /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true
-    /// (paper). A cut-out without a vehicle ahead is never kept: there is nothing to uncover.
+    /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true (paper). A cut-out
+    /// without a vehicle ahead is never kept.
     pub require_slower_lead: bool,
 }
 
@@ -187,11 +187,11 @@ impl Default for LvdOptions {
 }
 
 impl MiningOptions {
-    /// Refuses values with which the definitions lose their meaning.
+    /// Refuses values for which the definitions have no meaning.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a length of time or way
-    /// is needed.
+    /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
+    /// needed.
     pub fn validate(&self) -> Result<()> {
         let positive = [
             ("ego_view.range_m", self.ego_view.range_m),
@@ -239,11 +239,10 @@ impl MiningOptions {
     }
 }
 
-/// Beyond this no time, way or speed tells anything about traffic, and its count in samples gets out of range.
+/// Maximum of all options: larger values have no meaning in traffic, and their number of samples would overflow.
 const LARGEST: f64 = 1e6;
 
-/// Positions in metres, filter values in their unit and times in seconds this near to a limit count as
-/// equal to it (method.md §3).
+/// Positions (m), filter values and times (s) within this distance of a limit count as equal to it.
 pub(super) const TOLERANCE: f64 = LIMIT_TOLERANCE_M;
 
 /// A time in samples, to the nearest whole one: thresholds in seconds hold at any frame rate.

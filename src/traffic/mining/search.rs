@@ -1,18 +1,18 @@
-//! Search for a sequence of items in tags (method.md §3: *scenario = sequence of items*).
+//! Search for a sequence of items in tags (*scenario = sequence of items*).
 //!
-//! An item is a test on the tags of all actors at one sample; it holds over a whole interval; item
-//! i + 1 begins exactly when item i ends. Intervals are half open: first sample with the item to the
-//! first without, clamped to the last sample there is.
+//! An item is a test on the tags of all actors at one sample; it holds over a whole interval; item i + 1 begins
+//! exactly when item i ends. Intervals are half open: from the first sample with the item to the first without, or to
+//! the last sample.
 
 /// A test on the tags of one sample.
 pub type Item<'a, T> = &'a dyn Fn(&T) -> bool;
 
-/// Where a sequence was found.
+/// The samples of a match.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Match {
     /// First sample of each item.
     pub starts: Vec<usize>,
-    /// First sample after the last item; the last sample of the tags where the item still holds there.
+    /// First sample after the last item, or the last sample of the tags if the item still holds there.
     pub end: usize,
     /// The last item holds to the end of the tags, so `end` is one sample with the item.
     pub clamped: bool,
@@ -41,8 +41,8 @@ impl Match {
     }
 }
 
-/// First sequence that begins at `from` or later. Tags before `from` do not exist for the search: an
-/// item that already holds at `from` begins there.
+/// First sequence that begins at `from` or later. The search ignores tags before `from`: an item that already holds
+/// at `from` begins there.
 pub fn find<T>(tags: &[T], items: &[Item<T>], from: usize) -> Option<Match> {
     let mut k = from;
     let first = items.first()?;

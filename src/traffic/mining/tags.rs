@@ -1,4 +1,4 @@
-//! The tags of an ego and a target, sample by sample: what items are tests on (method.md §3).
+//! The tags of an ego and a target per sample, on which items are tests.
 
 use super::lateral::{LaneChange, lane_change_at, lane_changes};
 use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
@@ -39,17 +39,17 @@ impl std::ops::BitOr for Tags {
     }
 }
 
-/// What a vehicle does over its whole track; computed once, whoever looks at it.
+/// Activities of a vehicle over its whole track; computed once for all egos.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Activities {
-    /// Speeding up, slowing down, cruising.
+    /// Accelerating, decelerating, cruising.
     pub longitudinal: Vec<LongitudinalEvent>,
-    /// Lane changes against each lane of the carriageway; empty where the vehicle reaches no line.
+    /// Lane changes relative to each lane of the carriageway; empty if the vehicle reaches no line.
     pub lane_changes: Vec<Vec<LaneChange>>,
 }
 
 impl Activities {
-    /// Detects everything a vehicle does.
+    /// Detects all activities of a vehicle.
     pub fn of(track: &Track, carriageway: &Carriageway, frame_rate_hz: f64, options: &MiningOptions) -> Self {
         let (low, high) = track.d_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &d| (l.min(d), h.max(d)));
         let reaches_a_line =
@@ -76,12 +76,12 @@ impl Activities {
         self.longitudinal.iter().any(|e| e.activity == Longitudinal::Decelerating)
     }
 
-    /// The lane change against `lane` going on at sample `k`.
+    /// The lane change relative to `lane` in progress at sample `k`.
     pub fn lane_change(&self, lane: u16, k: usize) -> Option<&LaneChange> {
         lane_change_at(self.lane_changes.get(usize::from(lane))?, k)
     }
 
-    /// What the vehicle does with its speed at sample `k`.
+    /// The longitudinal activity at sample `k`.
     pub fn longitudinal_at(&self, k: usize) -> Option<Longitudinal> {
         let after = self.longitudinal.partition_point(|e| e.start <= k);
         Some(self.longitudinal.get(after.checked_sub(1)?)?.activity)

@@ -1,10 +1,10 @@
-//! The ego-centric view of a recording (spec section 2): every vehicle is ego once and sees the vehicles
-//! of its carriageway around it, up to a fixed distance before its final position.
+//! The ego-centric view of a recording: every vehicle is ego once and sees the vehicles around it on its carriageway,
+//! up to a fixed distance before its final position.
 
 use super::{Recording, Track};
 
-/// Geometric limits treat values this close to them as equal to them: data have two decimals, and without
-/// a tolerance a recording turned by 180° would give other scenarios. Metres. Spec section 3.
+/// Tolerance of geometric limits, m: data have two decimals, and without a tolerance a recording rotated by 180°
+/// would give other scenarios.
 pub const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
 /// Extent of an ego-centric view.

@@ -1,24 +1,22 @@
-//! A leader's braking that the traffic around it does not explain: one or two phases, each with a rise,
-//! a hold and a release of their own.
+//! Scheduled braking of a leader without a cause in the traffic: one or two phases, each with a rise, a hold and a
+//! release.
 
-use super::random::Stream;
+use super::random::TrafficRandom;
 
-/// Weakest peak of a scheduled braking, m/s². Weaker ones come about by themselves in the traffic, so
-/// only those from here on are raised by the rate factor.
+/// Minimum peak of a scheduled braking, m/s². Weaker braking occurs in the traffic anyway, so the rate factor does
+/// not apply to it.
 pub(super) const WEAKEST_PEAK_MPS2: f64 = 1.4;
-/// Mean excess of the peak over the weakest. Published: 482 of 20,351 leader decelerations exceed
-/// 2 m/s², an exponential tail of about this mean.
+/// Mean excess of the peak over the minimum. Published: 482 of 20,351 leader decelerations exceed 2 m/s², an
+/// exponential tail of about this mean.
 const PEAK_EXCESS_MPS2: f64 = 0.45;
-/// Share of brakings of a second kind with a longer tail, and its mean excess, m/s². Nothing is published on
-/// the tail itself, nor on how long brakings are held; what is published is what they do: Reg157 collides in
-/// 46 % of the paper's LVD simulations, CCHDM in 27 % (TTC 67 %, BTN 51 %), RSS and FSM fail in 0.1–0.7 %.
-/// Tail, hold and rise are set so that the order of these shares comes out within the published rates of
-/// events; ours are milder (Reg157 18 %, CCHDM 1/19/10 %, RSS and FSM 0–0.3 %).
+/// Fraction of brakings of a second kind with a longer tail, and its mean excess, m/s². Tail, hold and rise are not
+/// published. They are chosen to give the order of the paper's LVD failures (Reg157 46 %, CCHDM 27 %, RSS and FSM
+/// 0.1–0.7 %) at the published event rates.
 const HARD_SHARE: f64 = 0.15;
 const HARD_EXCESS_MPS2: f64 = 1.8;
-/// Hardest peak, m/s² (dry road).
+/// Maximum peak, m/s² (dry road).
 const HARDEST_PEAK_MPS2: f64 = 7.5;
-/// Share of brakings with a second phase.
+/// Fraction of brakings with a second phase.
 const SECOND_PHASE: f64 = 0.35;
 
 /// One rise, hold and release.
@@ -29,7 +27,7 @@ struct Phase {
     rise_s: f64,
     hold_s: f64,
     release_s: f64,
-    /// Change of the deceleration over the hold, as a share of the peak.
+    /// Change of the deceleration over the hold, as a fraction of the peak.
     sag: f64,
 }
 
@@ -66,7 +64,7 @@ pub(super) struct Braking {
 
 impl Braking {
     /// Draws peak and shape.
-    pub fn draw(stream: &mut Stream) -> Braking {
+    pub fn draw(stream: &mut TrafficRandom) -> Braking {
         let excess = if stream.chance(HARD_SHARE) { HARD_EXCESS_MPS2 } else { PEAK_EXCESS_MPS2 };
         let peak = (WEAKEST_PEAK_MPS2 + stream.exponential(excess)).min(HARDEST_PEAK_MPS2);
         let first = Self::phase(peak, 0.0, stream);
@@ -78,11 +76,11 @@ impl Braking {
         Braking { first, second, elapsed_s: 0.0 }
     }
 
-    fn phase(peak_mps2: f64, start_s: f64, stream: &mut Stream) -> Phase {
+    fn phase(peak_mps2: f64, start_s: f64, stream: &mut TrafficRandom) -> Phase {
         let rise_s = stream.lognormal_within(0.7, 0.4, 0.3, 2.5);
         let hold_s = stream.exponential(1.6).min(5.0) + 0.04;
         let release_s = stream.lognormal_within(1.3, 0.4, 0.5, 4.0);
-        // No faster than a car's brakes: 12.65 m/s³ on the mean.
+        // Limited by a car's brakes: 12.65 m/s³ on average.
         let quickest_s = peak_mps2 / 12.65;
         Phase {
             peak_mps2,
@@ -90,7 +88,7 @@ impl Braking {
             rise_s: rise_s.max(quickest_s),
             hold_s,
             release_s: release_s.max(quickest_s),
-            // A short hold has no time to sag.
+            // The deceleration changes little in a short hold.
             sag: stream.between(-0.05, 0.35).max(0.0) * hold_s.min(1.0),
         }
     }
@@ -102,7 +100,7 @@ impl Braking {
         -first.max(second)
     }
 
-    /// Over for good.
+    /// The braking has ended.
     pub fn is_over(&self) -> bool {
         self.elapsed_s >= self.second.unwrap_or(self.first).end_s()
     }
@@ -115,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_braking_rises_to_its_peak_without_jumps_and_ends() {
-        let mut stream = Stream::new(5, 0, 0, Purpose::Decision);
+        let mut stream = TrafficRandom::new(5, 0, 0, Purpose::Decision);
         for _ in 0..500 {
             let mut braking = Braking::draw(&mut stream);
             let (mut before, mut peak) = (0.0, 0.0_f64);

@@ -1,35 +1,35 @@
-//! What begins in the traffic at random: lane changes and hard brakings, and how their rates are raised.
+//! Random events of the traffic: lane changes and hard braking, and the factor on their rates.
 //!
-//! Both are hazards: a probability per time that depends on the surroundings. The raised rates hold from
-//! shortly before the camera's view to its end; elsewhere traffic runs at the published rates. A raised
-//! hazard makes an event come sooner or more often; what the event is like is drawn as always.
+//! Both are hazards: a probability per time that depends on the surroundings. The raised rates apply from shortly
+//! before the camera's view to its end; elsewhere the published rates apply. A raised hazard changes how often events
+//! occur, not their shape.
 
 use super::braking::Braking;
 use super::hazards::{DECISION_S, Hazards};
 use super::lane_change::{Way, acceptance, motive_per_s};
-use super::lateral::LaneChange;
+use super::lateral::LaneChangeMotion;
 use super::traffic::{Traffic, centre_of};
 use super::vehicle::draw_line;
 use crate::traffic::trajectory::VehicleClass;
 
-/// The raised event rates begin this far before the view, so that changes are under way at its edge.
+/// Distance before the view at which the raised rates begin, so that changes are in progress at its edge.
 const RAISED_BEFORE_M: f64 = 120.0;
-/// Scheduled hard brakings of one vehicle with a follower, 1/s, at rate factor 1. Calibrates the
-/// published 482 decelerations above 2 m/s² of 109,986 egos' leaders.
+/// Rate of scheduled hard braking of a vehicle with a follower, 1/s, at rate factor 1. Calibrated to the published
+/// 482 decelerations above 2 m/s² in 109,986 data sets.
 const BRAKING_PER_S: f64 = 0.0012;
-/// A follower within this headway makes a vehicle a leader whose braking matters, s.
+/// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
-/// Slowest speed at which a braking is scheduled, m/s.
+/// Minimum speed at which braking is scheduled, m/s.
 const BRAKING_FROM_MPS: f64 = 17.0;
-/// Who already slows down more than this is not made to brake on top of it, m/s².
+/// A vehicle that already decelerates more than this does not start a scheduled braking, m/s².
 const BRAKING_ALREADY_MPS2: f64 = -0.6;
 
 impl Traffic {
-    /// Lane changes and brakings that begin now.
+    /// Starts the lane changes and brakings of this step.
     pub(super) fn decide(&mut self) {
         for place in 0..self.order.len() {
             let i = self.order[place];
-            // Drivers decide in turn, not all in the same step.
+            // Decisions of drivers are spread over the steps.
             if !(self.step + i).is_multiple_of(self.decision_steps) {
                 continue;
             }
@@ -72,7 +72,7 @@ impl Traffic {
                 _ => continue,
             };
             let own = &self.vehicles[i];
-            // Lorries keep off the leftmost of three lanes.
+            // Trucks do not use the leftmost of three lanes.
             if own.class == VehicleClass::Truck && self.lanes > 2 && to == 0 {
                 continue;
             }
@@ -90,7 +90,7 @@ impl Traffic {
         let width = self.setting.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
-        let change = LaneChange::draw(own.lane, to, own.line_m, target_m, &mut self.decisions);
+        let change = LaneChangeMotion::draw(own.lane, to, own.line_m, target_m, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);

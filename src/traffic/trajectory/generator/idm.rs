@@ -1,10 +1,9 @@
 //! Car-following: the Intelligent Driver Model with the constant-acceleration heuristic.
 //!
-//! Free and interacting terms are joined by their minimum, so that a driver settles at his own time
-//! headway (with the original product he settles far behind it near the desired speed). The heuristic
-//! (Kesting, Treiber, Helbing 2010, "Enhanced intelligent driver model", eq. 11.3 ff.) keeps the IDM's
-//! smooth approach but removes its full braking when somebody merges at a short gap, which real drivers
-//! answer by a slow opening of the gap.
+//! The acceleration is the minimum of the free and the interaction term, so that a driver settles at the desired time
+//! headway. With the original sum, the gap is much larger near the desired speed. The heuristic (Kesting, Treiber,
+//! Helbing 2010, "Enhanced intelligent driver model", eq. 11.3 ff.) keeps the IDM's smooth approach but removes its
+//! full braking after a merge with a short gap. Real drivers open such a gap slowly.
 
 /// Parameters of one driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +20,7 @@ pub(super) struct DriverParameters {
     pub comfortable_mps2: f64,
 }
 
-/// What a driver sees of the vehicle ahead.
+/// The vehicle ahead as the driver perceives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LeaderView {
     /// Bumper to bumper, m.
@@ -32,23 +31,23 @@ pub(super) struct LeaderView {
     pub acceleration_mps2: f64,
 }
 
-/// Hardest braking that any driver commands, m/s².
+/// Maximum braking of any driver, m/s².
 pub(super) const HARDEST_BRAKING_MPS2: f64 = 8.0;
 
-/// Share of the heuristic in the mix ("coolness").
+/// Weight of the heuristic ("coolness").
 const COOLNESS: f64 = 0.95;
 
 /// Acceleration on a free road, m/s².
 pub(super) fn free_acceleration(speed_mps: f64, driver: &DriverParameters) -> f64 {
     let ratio = speed_mps / driver.desired_speed_mps;
     let squared = ratio * ratio;
-    // Above the desired speed the fourth power would brake hard; drivers let it roll out instead.
+    // Above the desired speed the fourth power would brake hard; real drivers coast instead.
     (driver.acceleration_mps2 * (1.0 - squared * squared)).max(-0.5 * driver.comfortable_mps2)
 }
 
 /// Acceleration behind a leader, m/s², never harder than [`HARDEST_BRAKING_MPS2`].
 ///
-/// `headway_s` is the headway in force: the driver's own or, after a cut-in, the shorter one he tolerates.
+/// `headway_s` is the present headway: the desired one or, after a cut-in, the shorter one that the driver tolerates.
 pub(super) fn following_acceleration(
     speed_mps: f64,
     headway_s: f64,
@@ -71,7 +70,7 @@ pub(super) fn following_acceleration(
         (1.0 - COOLNESS) * idm + COOLNESS * (heuristic + b * libm::tanh((idm - heuristic) / b))
     };
 
-    // Last resort: what stops the closing before the bumpers meet.
+    // Lower bound: the braking that avoids contact.
     let needed = if closing_mps > 0.0 { closing_mps * closing_mps / (2.0 * (gap_m - 1.0).max(0.5)) } else { 0.0 };
     let guarded = if needed > 2.0 * driver.comfortable_mps2 { mixed.min(-1.2 * needed) } else { mixed };
     guarded.max(-HARDEST_BRAKING_MPS2)

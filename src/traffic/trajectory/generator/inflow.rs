@@ -1,32 +1,32 @@
-//! The upstream end of the road: who arrives in which lane, and when.
+//! The upstream end of the road: the arrivals per lane.
 
 use super::options::GeneratorOptions;
-use super::random::Stream;
+use super::random::TrafficRandom;
 use super::vehicle::Vehicle;
 use crate::traffic::trajectory::VehicleClass;
 
-/// Share of arrivals that follow the vehicle before at their own headway; the others arrive freely.
+/// Fraction of arrivals that follow the previous vehicle at their desired headway; the others arrive freely.
 const FOLLOWERS: f64 = 0.5;
-/// Only who wants to go at most this much faster than the vehicle ahead arrives as its follower, m/s.
+/// Maximum excess of the desired speed over the vehicle ahead for an arrival as its follower, m/s.
 const FOLLOWS_WITHIN_MPS: f64 = 4.0;
-/// Mean number of lanes per direction in the default mix of roads: the published flow belongs to it, and
-/// wider or narrower roads carry more or less.
+/// Mean number of lanes per direction in the default mix of roads: the published flow refers to it; other roads scale
+/// with their lanes.
 const MEAN_LANES: f64 = 8.0 / 3.0;
-/// Some arrivals wait for room; demand is raised by this so that the flow comes out as asked.
+/// Some arrivals wait for space; this factor on the demand compensates for them.
 const QUEUED: f64 = 1.035;
 
-/// What arrives in one lane.
+/// Arrivals of one lane.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LaneDemand {
     /// Mean time between vehicles, s.
     mean_headway_s: f64,
     truck_share: f64,
-    /// Desired speed usual for cars in this lane, m/s.
+    /// Mean desired speed of cars in this lane, m/s.
     car_speed_mps: f64,
 }
 
-/// The demand of every lane of a carriageway, leftmost first. `flow_level`, `truck_level` and
-/// `speed_level` (about 1) tell one recording from another.
+/// The demand of every lane of a carriageway, leftmost first. `flow_level`, `truck_level` and `speed_level` (about 1)
+/// vary between recordings.
 pub(super) fn demand(
     options: &GeneratorOptions,
     lanes: usize,
@@ -54,7 +54,7 @@ pub(super) fn demand(
         .collect()
 }
 
-/// The queue before one lane: the next vehicle and when it is due.
+/// The queue before one lane: the next vehicle and its arrival time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inflow {
     demand: LaneDemand,
@@ -67,20 +67,26 @@ pub(super) struct Inflow {
 
 impl Inflow {
     /// An empty lane's first vehicle.
-    pub fn new(demand: LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Inflow {
+    pub fn new(
+        demand: LaneDemand,
+        lane: usize,
+        centre_m: f64,
+        lane_width_m: f64,
+        stream: &mut TrafficRandom,
+    ) -> Inflow {
         let next = draw(&demand, lane, centre_m, lane_width_m, stream);
         let due_s = stream.between(0.0, 2.0 * demand.mean_headway_s);
         Inflow { demand, lane, centre_m, lane_width_m, due_s, next }
     }
 
-    /// The next vehicle, if it is due and finds room behind the last one of its lane
-    /// (`last`: rear bumper and speed), at `entrance_m`.
+    /// The next vehicle, if it is due and has space behind the last one of its lane (`last`: rear bumper and speed),
+    /// at `entrance_m`.
     pub fn arrive(
         &mut self,
         now_s: f64,
         entrance_m: f64,
         last: Option<(f64, f64)>,
-        stream: &mut Stream,
+        stream: &mut TrafficRandom,
     ) -> Option<Vehicle> {
         if now_s < self.due_s {
             return None;
@@ -93,7 +99,7 @@ impl Inflow {
             if spare_m < 0.0 {
                 return None;
             }
-            // Faster than the one ahead only as far as the room allows a gentle approach.
+            // The excess over the speed ahead must allow a gentle approach in the available space.
             speed_mps = speed_mps.min(last_mps + (0.6 * spare_m).sqrt());
         }
         let mut vehicle =
@@ -104,20 +110,21 @@ impl Inflow {
         Some(vehicle)
     }
 
-    /// Time from one arrival to the next: following, or following plus a free share that restores the mean.
-    fn headway_s(&self, speed_mps: f64, stream: &mut Stream) -> f64 {
+    /// Time from one arrival to the next: the following headway, plus an exponential part for free arrivals that
+    /// restores the mean.
+    fn headway_s(&self, speed_mps: f64, stream: &mut TrafficRandom) -> f64 {
         let own_s = |driver_s: f64, length_m: f64| driver_s + (length_m + 3.4) / speed_mps.max(10.0);
         let following_s = own_s(self.next.driver.time_headway_s, self.next.length_m);
         let share = self.demand.truck_share;
         let mean_following_s = (1.0 - share) * own_s(1.5, 4.6) + share * own_s(1.85, 12.0);
         let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - FOLLOWERS);
-        // Who wants to go much faster than the one ahead is no follower: he has left the lane long ago.
+        // A driver with a much higher desired speed is not a follower: that driver would have changed lanes before.
         let follows = self.next.driver.desired_speed_mps < speed_mps + FOLLOWS_WITHIN_MPS && stream.chance(FOLLOWERS);
         if free_s <= 0.0 || follows { following_s } else { following_s + stream.exponential(free_s) }
     }
 }
 
-fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) -> Vehicle {
+fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) -> Vehicle {
     let class = if stream.chance(demand.truck_share) { VehicleClass::Truck } else { VehicleClass::Car };
     let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, stream);
     vehicle.place(lane, centre_m, lane_width_m, stream);

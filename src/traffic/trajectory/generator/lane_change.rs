@@ -1,44 +1,44 @@
-//! When a driver changes lane: a motive, as a rate per second, times the acceptance of the gaps.
+//! The decision to change lanes: a motive (a rate per second) times the acceptance of the gaps.
 
 use super::idm::DriverParameters;
 
-/// Rate of a change with full motive and accepted gaps, 1/s. Calibrates the published 0.24 line crossings
-/// per vehicle and kilometre at rate factor 1.
+/// Rate of a change with full motive and accepted gaps, 1/s. Calibrated to the published 0.24 line crossings per
+/// vehicle and kilometre at rate factor 1.
 const FULL_MOTIVE_PER_S: f64 = 0.265;
-/// The motive to pull out grows up to this gain in speed, m/s.
+/// The motive to change to a faster lane increases up to this gain in speed, m/s.
 const FULL_GAIN_MPS: f64 = 3.0;
-/// Strength of keeping right, as a share of the full motive.
+/// Strength of keeping right, as a fraction of the full motive.
 const KEEP_RIGHT: f64 = 0.38;
-/// Strength of changes without visible reason (exits, habits), as a share of the full motive.
+/// Strength of changes without visible reason (exits, habits), as a fraction of the full motive.
 const NO_REASON: f64 = 0.08;
-/// The same where the change costs much speed (exits only).
+/// The same if the change costs much speed (exits only).
 const NO_REASON_AT_A_LOSS: f64 = 0.02;
-/// What counts as much speed, m/s.
+/// Minimum loss of speed that counts as much, m/s.
 const GRAVE_LOSS_MPS: f64 = 3.0;
-/// Headway to the new follower at which half of the drivers accept, s. Calibrates the headway at which
-/// vehicles cut in: mode 0.8–1.0 s and 4 % below 0.5 s.
+/// Headway to the new follower at which half of the drivers accept, s. Calibrated to the headway of cut-ins: mode
+/// 0.8–1.0 s and 4 % below 0.5 s.
 const LAG_HALF_S: f64 = 0.48;
-/// A gap that still fits but soon will not is taken at once; with more headway to the follower than this
-/// there is no hurry, s. Calibrates the mode of the headway at which vehicles cut in.
+/// Drivers take a closing gap at once; above this headway to the follower there is no urgency, s. Calibrated to the
+/// mode of the headway of cut-ins.
 const HURRY_S: f64 = 1.0;
-/// Share of the acceptance that is left without hurry.
+/// Factor on the acceptance without urgency.
 const NO_HURRY: f64 = 0.35;
-/// Braking imposed on the new follower that makes acceptance fall by a factor e, m/s². Calibrates how
-/// many cut-ins are slower than the ego (published: 362 of 2,992 below 0.95 of its speed).
+/// Braking of the new follower that reduces acceptance by a factor e, m/s². Calibrated to the slow cut-ins
+/// (published: 362 of 2,992 below 0.95 of the ego's speed).
 const LAG_BRAKING_MPS2: f64 = 0.10;
-/// Shortest time to collision with the new neighbours at the start of a change, s.
+/// Minimum time to collision with the new neighbours at the start of a change, s.
 const MIN_TTC_S: f64 = 3.5;
-/// Shortest gap to the new neighbours at the start, m.
+/// Minimum gap to the new neighbours at the start, m.
 const MIN_GAP_M: f64 = 4.0;
 /// Headway to the new leader at which half of the drivers accept, s.
 const LEAD_HALF_S: f64 = 0.55;
-/// Own braking behind the new leader that makes acceptance fall by a factor e, m/s².
+/// Own braking behind the new leader that reduces acceptance by a factor e, m/s².
 const LEAD_BRAKING_MPS2: f64 = 0.5;
-/// Least sum of the gaps before and behind, m.
+/// Minimum sum of the gaps ahead and behind, m.
 const MIN_ROOM_M: f64 = 15.0;
-/// A leader that is this much further away than the own headway holds nobody up, s.
+/// A leader this much farther away than the desired headway has no influence, s.
 const LOOK_AHEAD_S: f64 = 8.0;
-/// Keeping right may cost this much speed, m/s.
+/// Maximum loss of speed for keeping right, m/s.
 const KEEP_RIGHT_LOSS_MPS: f64 = 0.8;
 
 /// A vehicle next to the deciding one.
@@ -59,7 +59,7 @@ pub(super) struct LaneView {
     pub behind: Option<Neighbour>,
 }
 
-/// Which way a change goes.
+/// Direction of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
     /// To the faster side.
@@ -68,7 +68,7 @@ pub(super) enum Way {
     Right,
 }
 
-/// Speed that a lane promises: the desired one on a free road, the leader's close behind it.
+/// Expected speed in a lane: the desired one on a free road, the leader's close behind it.
 fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neighbour>) -> f64 {
     let desired = driver.desired_speed_mps;
     let Some(leader) = ahead else { return desired };
@@ -80,7 +80,7 @@ fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neigh
     leader.speed_mps + (desired - leader.speed_mps) * freedom
 }
 
-/// Rate of wanting a change, 1/s, at rate factor 1.
+/// Rate of the motive, 1/s, at rate factor 1.
 pub(super) fn motive_per_s(
     way: Way,
     speed_mps: f64,
@@ -114,7 +114,7 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
         }
         let lag_s = lag.gap_m / lag.speed_mps.max(5.0);
         let fits = soft_step(lag_s, LAG_HALF_S);
-        // Drivers know well what is too close: the step is steeper than the others.
+        // This step is steeper, because drivers agree on what is too close.
         accepted *= fits * fits / (fits * fits + (1.0 - fits) * (1.0 - fits));
         accepted *= NO_HURRY + (1.0 - NO_HURRY) * (1.0 - soft_step(lag_s, HURRY_S));
         if closing_mps > 0.0 {

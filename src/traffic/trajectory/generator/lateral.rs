@@ -1,15 +1,15 @@
-//! Motion across the road: the lane change as a quintic, and the wander within a lane.
+//! Lateral motion: the lane change as a quintic, and the wander within a lane.
 
-use super::random::Stream;
+use super::random::TrafficRandom;
 
-/// Published span of lane-change durations, s.
+/// Published range of lane-change durations, s.
 const DURATION_S: [f64; 2] = [2.9, 7.3];
-/// Median of the durations before the span cuts them off, s.
+/// Median of the durations before truncation to the range, s.
 const DURATION_MEDIAN_S: f64 = 5.0;
-/// Spread of the duration's logarithm.
+/// Standard deviation of the duration's logarithm.
 const DURATION_SIGMA: f64 = 0.28;
-/// Spread of the asymmetry: 0 is the symmetric quintic, and at ±1.5 the crossing comes
-/// about a tenth of the duration earlier or later.
+/// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
+/// duration earlier or later.
 const ASYMMETRY_SD: f64 = 0.7;
 
 /// One lane change, from start to end.
@@ -17,7 +17,7 @@ const ASYMMETRY_SD: f64 = 0.7;
 /// `d(t) = from + (to − from) q(φ(t/T))` with the quintic `q(τ) = 10τ³ − 15τ⁴ + 6τ⁵` (rest to rest in
 /// speed and acceleration) and a mild distortion of time `φ(τ) = τ + κ τ²(1−τ)²`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LaneChange {
+pub(super) struct LaneChangeMotion {
     /// Lane it leaves.
     pub from_lane: usize,
     /// Lane it enters.
@@ -31,15 +31,21 @@ pub(super) struct LaneChange {
     asymmetry: f64,
 }
 
-impl LaneChange {
+impl LaneChangeMotion {
     /// Draws duration and shape of a change between two lateral positions.
-    pub fn draw(from_lane: usize, to_lane: usize, from_m: f64, to_m: f64, stream: &mut Stream) -> LaneChange {
+    pub fn draw(
+        from_lane: usize,
+        to_lane: usize,
+        from_m: f64,
+        to_m: f64,
+        stream: &mut TrafficRandom,
+    ) -> LaneChangeMotion {
         let duration_s = stream.lognormal_within(DURATION_MEDIAN_S, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
-        LaneChange { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
+        LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
     }
 
-    /// Share of the duration that has passed, 0 to 1.
+    /// Elapsed fraction of the duration, 0 to 1.
     pub fn phase(&self) -> f64 {
         (self.elapsed_s / self.duration_s).min(1.0)
     }
@@ -57,7 +63,7 @@ impl LaneChange {
     }
 }
 
-/// Wander about the intended line: a damped oscillator driven by white noise.
+/// Wander around the intended position: a damped oscillator driven by white noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Wander {
     /// Deviation, m, left positive.
@@ -67,7 +73,7 @@ pub(super) struct Wander {
 }
 
 impl Wander {
-    /// Spread of the deviation, m.
+    /// Standard deviation of the deviation, m.
     const SD_M: f64 = 0.10;
     /// Natural frequency of a driver's steering corrections, rad/s.
     const FREQUENCY_RADPS: f64 = 0.5;
@@ -79,7 +85,7 @@ impl Wander {
         const W: f64 = Wander::FREQUENCY_RADPS;
         let drive = Self::SD_M * (4.0 * Self::DAMPING * W * W * W * dt_s).sqrt();
         let rate = self.rate_mps - (2.0 * Self::DAMPING * W * self.rate_mps + W * W * self.offset_m) * dt_s;
-        // Position uses the old rate, as the samples' speed is the one at their own time.
+        // Position uses the old rate, because a sample's speed belongs to the same instant.
         self.offset_m += self.rate_mps * dt_s;
         self.rate_mps = rate + drive * normal;
     }
@@ -92,9 +98,9 @@ mod tests {
 
     #[test]
     fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
-        let mut stream = Stream::new(3, 0, 0, Purpose::Decision);
+        let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
-            let mut change = LaneChange::draw(1, 0, -5.6, -1.9, &mut stream);
+            let mut change = LaneChangeMotion::draw(1, 0, -5.6, -1.9, &mut stream);
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;
@@ -114,7 +120,7 @@ mod tests {
 
     #[test]
     fn wander_keeps_its_spread() {
-        let mut stream = Stream::new(3, 0, 0, Purpose::Noise);
+        let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Noise);
         let mut wander = Wander::default();
         let (mut squares, n) = (0.0, 200_000);
         for _ in 0..n {

@@ -1,9 +1,8 @@
-//! Generator of synthetic motorway recordings: what the program runs on when it is given no data.
+//! Generator of synthetic motorway recordings, the default data of the program.
 //!
-//! Here live the traffic simulation and the cut of what a camera above the road would see of it. Here
-//! lives nothing about scenarios: the generator schedules lane changes and brakings of vehicles, and the
-//! miner finds in its recordings what it finds in any other. Data comes from random numbers and
-//! [`GeneratorOptions`] and goes, as [`Recording`]s, where a reader's recordings go.
+//! This room simulates traffic and records the view of a camera above the road. It has no scenarios: it schedules
+//! lane changes and braking, and mining finds scenarios as in any recording. Input is [`GeneratorOptions`] with
+//! random numbers; output is [`Recording`]s.
 //!
 //! # What is modelled
 //! A straight road of 420 m in view (350 m before it, 250 m after it simulated as well), two carriageways
@@ -20,29 +19,26 @@
 //! | `braking` | scheduled hard brakings of one or two phases, two kinds of exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; order of the paper's LVD failure shares |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
-//! `tests/traffic/generator_calibration.rs` prints every one of these figures beside ours and fails where they
-//! part by more than it states.
+//! `tests/traffic/generator_calibration.rs` prints these figures beside ours and fails if the difference exceeds its
+//! limit.
 //!
 //! # The rate factor
-//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are as rare as published: two
-//! or three dozen kept ones of each category in 49 minutes of traffic. The default of 8 raises how *often*
-//! lane changes and hard brakings begin in view, so that each category has at least 150 kept scenarios in
-//! a second of computing. What an event is like is drawn the same way at any factor. Some consequences are
-//! inherent. Rates rise a little less than the factor says, because lane changes get in each other's way.
-//! Gentle decelerations are not raised on purpose (one data set in five has one already), so the share of
-//! LVDs that are kept rises from 2 % to 7 %. And who changes lane eight times as often does it more often
-//! before a faster vehicle: the share of kept cut-ins rises from 13 % to 18 %.
+//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are as rare as published: 24 to 36 kept
+//! ones of each category in 49 minutes of traffic. The default of 8 multiplies the *rate* of lane changes and hard
+//! braking in view, so that each category has at least 150 kept scenarios after a second of computing. The shape of
+//! an event does not depend on the factor. Three consequences follow. Rates rise slightly less than the factor,
+//! because lane changes obstruct each other. Gentle decelerations are not raised (one data set in five already has
+//! one), so the fraction of kept LVDs rises from 2 % to 7 %. More lane changes happen ahead of a faster vehicle, so
+//! the fraction of kept cut-ins rises from 13 % to 18 %.
 //!
-//! # What this data is not
-//! It is not highD, holds no row of it and was fitted to published figures only. No result on it is a
-//! statement about real traffic: no exposure, no risk, no comparison of driver models can be quoted from
-//! it. Drivers here never look away, brake for no visible reason, never abort a lane change, and there
-//! are no ramps, curves, motorcycles, jams by design, weather or measurement errors. Whoever has real
-//! recordings should use those.
+//! # Limits The data contains no row of highD and was fitted to published figures only. It says nothing about real
+//! traffic: do not quote exposure, risk or comparisons of driver models from it. Drivers are never distracted and
+//! never abort a lane change; some braking has no visible cause. There are no ramps, curves, motorcycles, jams,
+//! weather or measurement errors.
 //!
-//! # Same bits everywhere
-//! Random numbers are counter-based and named by (seed, recording, carriageway, purpose); transcendentals
-//! come from `libm`; nothing depends on the order of a hash map or on threads; the time step is fixed.
+//! # Reproducibility Random numbers are counter-based and named by (seed, recording, carriageway, purpose);
+//! transcendentals come from `libm`; nothing depends on the order of a hash map or on threads; the time step is
+//! fixed.
 
 mod braking;
 mod events;
@@ -70,7 +66,7 @@ pub fn generate(options: &GeneratorOptions) -> Result<Vec<Recording>> {
     (0..options.recordings).into_par_iter().map(|index| recording::record(options, index)).collect()
 }
 
-/// The recording with this index (from 0), the same as [`generate`] makes.
+/// The recording with this index (from 0), equal to that of [`generate`].
 pub fn generate_one(options: &GeneratorOptions, index: usize) -> Result<Recording> {
     options.validate()?;
     if index >= options.recordings {

@@ -1,11 +1,11 @@
-//! What a user may choose about the synthetic recordings, and the defaults of the embedded ones.
+//! Options of the synthetic recordings. The defaults are those of a study without data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::support::error::{Error, Place, Result};
 
-/// Options of the generator. The default is the data `lanesweep study` runs on when it is given none.
+/// Options of the generator. `lanesweep study` without data uses the default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GeneratorOptions {
@@ -17,7 +17,7 @@ pub struct GeneratorOptions {
     /// Length of each recording, s.
     #[schemars(range(min = 1.0, max = 7200.0))]
     pub duration_s: f64,
-    /// Samples per second; the simulation's own step is the largest fraction of a sample ≤ 0.04 s.
+    /// Samples per second; the simulation step is the largest fraction of a sample ≤ 0.04 s.
     #[schemars(range(min = 1.0, max = 200.0))]
     pub frame_rate_hz: f64,
     /// Length of road that the camera sees, m.
@@ -30,9 +30,8 @@ pub struct GeneratorOptions {
     /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
     #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_share: f64,
-    /// How much more often than on a real motorway lane changes are made and leaders brake hard, within
-    /// the camera's view; 1 is the published rate. Raised so that a few minutes hold enough scenarios;
-    /// how an event looks, once it happens, does not depend on it.
+    /// Factor on the rates of lane changes and hard braking in the camera's view; 1 is the published rate. The
+    /// default is raised, so that a few minutes have enough scenarios. The shape of an event does not depend on it.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
 }
@@ -77,7 +76,7 @@ impl GeneratorOptions {
         Ok(())
     }
 
-    /// One line that every output made from these recordings should carry.
+    /// The notice of every output made from these recordings.
     pub fn describe(&self) -> String {
         format!(
             "SYNTHETIC recordings: {} of {} s at {} Hz, seed {}, lane changes and hard brakings {} times as frequent \
@@ -86,7 +85,7 @@ impl GeneratorOptions {
         )
     }
 
-    /// Simulation steps per sample: the fewest that keep a step at 0.04 s or below.
+    /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
     pub(super) fn steps_per_sample(&self) -> usize {
         // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.
         ((25.0 / self.frame_rate_hz - 1e-9).ceil() as usize).max(1)

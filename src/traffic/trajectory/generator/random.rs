@@ -1,12 +1,12 @@
-//! Random numbers of the generator: a counter-based stream cipher keyed by everything that names the
-//! draw's purpose, so that no recording depends on another, on the number of threads or on the machine.
+//! Random numbers of the generator: counter-based streams keyed by the purpose of the draw. No recording depends on
+//! another, on the number of threads or on the machine.
 //!
 //! Transcendentals come from `libm`: the system's own differ in their last bits between platforms.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// What a stream is for; streams of different purposes never share a number.
+/// Purpose of a stream; streams of different purposes never share a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Lane counts, flows and truck share of a recording.
@@ -21,21 +21,21 @@ pub(super) enum Purpose {
 
 /// A stream of random numbers.
 #[derive(Debug, Clone)]
-pub(super) struct Stream {
+pub(super) struct TrafficRandom {
     rng: ChaCha8Rng,
     spare_normal: Option<f64>,
 }
 
-impl Stream {
+impl TrafficRandom {
     /// The stream of one purpose in one carriageway of one recording.
-    pub fn new(seed: u64, recording: usize, carriageway: usize, purpose: Purpose) -> Stream {
+    pub fn new(seed: u64, recording: usize, carriageway: usize, purpose: Purpose) -> TrafficRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&(recording as u64).to_le_bytes());
         key[16..24].copy_from_slice(&(carriageway as u64).to_le_bytes());
         let mut rng = ChaCha8Rng::from_seed(key);
         rng.set_stream(purpose as u64);
-        Stream { rng, spare_normal: None }
+        TrafficRandom { rng, spare_normal: None }
     }
 
     /// Uniform in [0, 1), 53 bits.
@@ -66,7 +66,8 @@ impl Stream {
         radius * cos
     }
 
-    /// Normal with this mean and spread, redrawn until inside [low, high] (which must hold some mass).
+    /// Normal with this mean and standard deviation, redrawn until inside [low, high], which must have some
+    /// probability.
     pub fn normal_within(&mut self, mean: f64, sd: f64, low: f64, high: f64) -> f64 {
         self.redraw(low, high, |s| mean + sd * s.normal())
     }
@@ -81,8 +82,8 @@ impl Stream {
         -mean * libm::log(1.0 - self.uniform())
     }
 
-    /// Draws until inside; gives up after many tries and clamps, so that odd options cannot hang it.
-    fn redraw(&mut self, low: f64, high: f64, draw: impl Fn(&mut Stream) -> f64) -> f64 {
+    /// Draws until inside; clamps after many tries, so that unusual options cannot cause an endless loop.
+    fn redraw(&mut self, low: f64, high: f64, draw: impl Fn(&mut TrafficRandom) -> f64) -> f64 {
         let mut value = draw(self);
         for _ in 0..1000 {
             if (low..=high).contains(&value) {
@@ -101,7 +102,7 @@ mod tests {
     #[test]
     fn a_stream_is_named_by_seed_recording_carriageway_and_purpose() {
         let first =
-            |seed, recording, carriageway, purpose| Stream::new(seed, recording, carriageway, purpose).uniform();
+            |seed, recording, carriageway, purpose| TrafficRandom::new(seed, recording, carriageway, purpose).uniform();
         let base = first(1, 0, 0, Purpose::Noise);
         assert_eq!(base, first(1, 0, 0, Purpose::Noise));
         assert_ne!(base, first(2, 0, 0, Purpose::Noise));
@@ -112,7 +113,7 @@ mod tests {
 
     #[test]
     fn normal_and_exponential_have_their_moments() {
-        let mut stream = Stream::new(7, 0, 0, Purpose::Site);
+        let mut stream = TrafficRandom::new(7, 0, 0, Purpose::Site);
         let n = 40_000;
         let (mut sum, mut squares, mut waiting) = (0.0, 0.0, 0.0);
         for _ in 0..n {

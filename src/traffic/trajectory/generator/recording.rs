@@ -1,10 +1,10 @@
-//! From the simulated carriageways to one recording: road, numbering, and the decimals of a highD file,
-//! so that a recording read back from its own files is the same to the last bit.
+//! Makes one recording of the simulated carriageways: road, numbering, and the decimals of a highD file, so that
+//! reading a written recording gives the same bits.
 
 use super::inflow::demand;
 use super::options::GeneratorOptions;
-use super::random::{Purpose, Stream};
-use super::traffic::{Setting, Traffic};
+use super::random::{Purpose, TrafficRandom};
+use super::traffic::{RoadSetup, Traffic};
 use super::vehicle::Vehicle;
 use crate::support::error::Result;
 use crate::traffic::trajectory::highd::{self, Precision};
@@ -16,7 +16,7 @@ const MEDIAN_M: f64 = 4.5;
 
 /// One recording. `index` counts from 0. An error means that a highD file could not hold it.
 pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recording> {
-    let mut site = Stream::new(options.seed, index, 0, Purpose::Site);
+    let mut site = TrafficRandom::new(options.seed, index, 0, Purpose::Site);
     // Two of three recordings have three lanes per direction.
     let lanes = if index % 3 == 2 { 2 } else { 3 };
     let lane_width_m = [3.5, 3.75, 3.6][(site.uniform() * 3.0) as usize % 3];
@@ -24,7 +24,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     let speed_level = site.normal_within(1.0, 0.03, 0.92, 1.08);
     let truck_level = site.normal_within(1.0, 0.15, 0.6, 1.4);
     let steps_per_sample = options.steps_per_sample();
-    let setting = Setting {
+    let setting = RoadSetup {
         lane_width_m,
         window_m: options.window_m,
         step_s: 1.0 / (options.frame_rate_hz * steps_per_sample as f64),
@@ -55,7 +55,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     Ok(recording)
 }
 
-/// Lanes by the centre as it is written: rounding may have moved it over a line.
+/// Lanes by the written centre, because rounding may move it over a line.
 fn label_lanes(recording: &mut Recording) {
     for track in &mut recording.tracks {
         let road = &recording.carriageways[track.carriageway];
@@ -64,8 +64,8 @@ fn label_lanes(recording: &mut Recording) {
     }
 }
 
-/// Lines as the internal model has them for a highD image with `y` down: the upper carriageway (`1`,
-/// towards −x) has d = y, the lower one (`2`) d = −y.
+/// Lane lines of the internal model for a highD image with `y` down: the upper carriageway (`1`, towards −x) has d =
+/// y, the lower one (`2`) d = −y.
 fn carriageways(lanes: [usize; 2], lane_width_m: f64) -> Vec<Carriageway> {
     let upper_end_m = VERGE_M + lanes[0] as f64 * lane_width_m;
     let lines = |first_m: f64, lanes: usize| (0..=lanes).map(|k| first_m - k as f64 * lane_width_m).collect();

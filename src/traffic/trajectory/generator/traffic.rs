@@ -6,34 +6,33 @@ use super::hazards::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
-use super::random::{Purpose, Stream};
+use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
 
-/// Road before the camera's view, m. Long enough for followers to settle behind their leaders and for
-/// motives to arise, short enough that the view does not get only what is left when all have sorted
-/// themselves by speed.
+/// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
+/// vehicles would be sorted by speed before they enter the view.
 const UPSTREAM_M: f64 = 350.0;
-/// Road behind it, m: the last vehicles in view still have leaders.
+/// Road behind it, m, so that the last vehicles in view still have leaders.
 const DOWNSTREAM_M: f64 = 250.0;
-/// Spread of the acceleration noise as commanded, m/s²; the lag below leaves 0.22 of it, the middle of
-/// the published 0.20 to 0.24.
+/// Standard deviation of the commanded acceleration noise, m/s². After the lag below it is 0.22, the middle of the
+/// published 0.20 to 0.24.
 const NOISE_SD_MPS2: f64 = 0.24;
 /// Published correlation time of the noise, s.
 const NOISE_CORRELATION_S: f64 = 1.2;
 /// Lag from the command to the vehicle's acceleration, s (pedal, drivetrain, brakes).
 const ACTUATION_LAG_S: f64 = 0.25;
-/// Time over which drivers take in the leader's acceleration, s.
+/// Time constant with which drivers perceive the leader's acceleration, s.
 const PERCEPTION_S: f64 = 0.6;
-/// Time over which a headway shortened by a cut-in opens again, s.
+/// Time constant with which a headway opens after a cut-in, s.
 const RELAXATION_S: f64 = 15.0;
 /// Shortest headway tolerated right after a cut-in, s.
 const TOLERATED_HEADWAY_S: f64 = 0.25;
-/// Share of the headway kept to a leader whose lane is about to be left.
+/// Fraction of the headway that a driver keeps before leaving the leader's lane.
 const LEAVING_HEADWAY: f64 = 0.5;
 
-/// Where and how long.
+/// Dimensions of a simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Setting {
+pub(super) struct RoadSetup {
     /// m.
     pub lane_width_m: f64,
     /// m.
@@ -48,15 +47,15 @@ pub(super) struct Setting {
 
 /// One carriageway.
 pub(super) struct Traffic {
-    pub(super) setting: Setting,
+    pub(super) setting: RoadSetup,
     pub(super) lanes: usize,
     pub(super) vehicles: Vec<Vehicle>,
     /// Vehicles on the road, front first.
     pub(super) order: Vec<usize>,
     inflows: Vec<Inflow>,
-    arrivals: Stream,
-    noise: Stream,
-    pub(super) decisions: Stream,
+    arrivals: TrafficRandom,
+    noise: TrafficRandom,
+    pub(super) decisions: TrafficRandom,
     pub(super) step: usize,
     pub(super) decision_steps: usize,
     pub(super) hazards_in_view: Hazards,
@@ -70,8 +69,8 @@ pub(super) struct Traffic {
 
 impl Traffic {
     /// An empty road. `key` is (seed, recording, carriageway).
-    pub fn new(setting: Setting, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
-        let stream = |purpose| Stream::new(key.0, key.1, key.2, purpose);
+    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
+        let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
         let width = setting.lane_width_m;
@@ -102,10 +101,10 @@ impl Traffic {
         }
     }
 
-    /// Runs until the road is full, then for `samples` samples; gives what the camera saw of each
-    /// vehicle, in the order of their arrival.
+    /// Runs until the road is full, then for `samples` samples. Returns the camera's samples of each vehicle, in the
+    /// order of arrival.
     pub fn run(mut self, samples: usize) -> Vec<Vehicle> {
-        // The slowest trucks pass the whole road once.
+        // Warm-up: the slowest trucks pass the whole road once.
         let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / 21.0;
         let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;
         let steps = warm_up + (samples.max(1) - 1) * self.setting.steps_per_sample + 1;
@@ -148,7 +147,7 @@ impl Traffic {
         }
     }
 
-    /// Next vehicles ahead and behind in a lane, seen from the vehicle at this place of the order.
+    /// Next vehicles ahead of and behind the vehicle at this position of the order, in a lane.
     pub(super) fn view(&self, place: usize, lane: usize) -> LaneView {
         let own = &self.vehicles[self.order[place]];
         let vehicle = |k: &usize| &self.vehicles[*k];
@@ -160,7 +159,7 @@ impl Traffic {
         }
     }
 
-    /// Commands of all drivers, from one sweep from the front.
+    /// Computes the commands of all drivers, front first.
     fn accelerate(&mut self) {
         let mut last_in: [Option<usize>; 8] = [None; 8];
         for place in 0..self.order.len() {
@@ -177,7 +176,7 @@ impl Traffic {
                 }
             };
 
-            // A new leader at a short distance (somebody cut in, or the own change) is tolerated.
+            // The driver tolerates a short distance to a new leader (after a cut-in or a lane change).
             let mut headway_s = own.headway_s + (own.driver.time_headway_s - own.headway_s) * self.relaxation;
             let mut perceived = own.perceived_mps2;
             if let Some(k) = leader {
@@ -254,7 +253,7 @@ impl Traffic {
                 change.elapsed_s += dt;
                 let (d_m, _) = change.position_and_speed();
                 own.lane = lane_of(d_m, width, self.lanes);
-                // The lane it leaves is free once the whole body is out of it.
+                // The old lane is free when the whole body has left it.
                 let from_m = centre_of(change.from_lane, width);
                 if (d_m - from_m).abs() > 0.5 * (width + own.width_m) + 0.1 {
                     own.occupied = 1 << change.to_lane;

@@ -1,15 +1,15 @@
-//! One vehicle of the simulation: who drives it, what it is, where it is, and what was seen of it.
+//! One vehicle of the simulation: driver, size, state and recorded samples.
 
 use super::braking::Braking;
 use super::idm::DriverParameters;
-use super::lateral::{LaneChange, Wander};
-use super::random::Stream;
+use super::lateral::{LaneChangeMotion, Wander};
+use super::random::TrafficRandom;
 use crate::traffic::trajectory::VehicleClass;
 
-/// Spread of where drivers keep within their lane, m.
+/// Standard deviation of the drivers' lateral positions in their lane, m.
 const LINE_SD_M: f64 = 0.18;
 
-/// What was seen of a vehicle by the camera, one value per sample.
+/// The camera's samples of a vehicle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Samples {
     /// Number of the first sample, from 0.
@@ -41,13 +41,13 @@ pub(super) struct Vehicle {
     pub s_m: f64,
     /// m/s, ≥ 0.
     pub speed_mps: f64,
-    /// m/s², as realised.
+    /// Actual acceleration, m/s².
     pub acceleration_mps2: f64,
-    /// m/s², as the driver wants it; the vehicle follows with a short lag.
+    /// Commanded acceleration, m/s²; the actual one follows with a short lag.
     pub command_mps2: f64,
     /// Correlated noise in the command, m/s².
     pub noise_mps2: f64,
-    /// Headway in force, s: the driver's own, or a shorter one tolerated after a cut-in.
+    /// Present headway, s: the desired one, or a shorter one that is tolerated after a cut-in.
     pub headway_s: f64,
     /// Leader of the last step.
     pub leader: Option<usize>,
@@ -57,26 +57,26 @@ pub(super) struct Vehicle {
     pub lane: usize,
     /// Lanes it occupies or has claimed, one bit each.
     pub occupied: u8,
-    /// Line it keeps to, outside lane changes: lateral position of its centre, m.
+    /// Intended lateral position of its centre outside lane changes, m.
     pub line_m: f64,
-    /// Deviation from the line.
+    /// Deviation from it.
     pub wander: Wander,
-    /// Lane change under way.
-    pub change: Option<LaneChange>,
-    /// Scheduled braking under way.
+    /// Lane change in progress.
+    pub change: Option<LaneChangeMotion>,
+    /// Scheduled braking in progress.
     pub braking: Option<Braking>,
-    /// Time until it may think of another lane change, s.
+    /// Time until the next lane change is possible, s.
     pub settle_s: f64,
-    /// What the camera saw.
+    /// Samples of the camera.
     pub samples: Samples,
 }
 
 impl Vehicle {
-    /// Draws size and driver. `lane_speed_mps` is the desired speed usual for cars in this lane.
-    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut Stream) -> Vehicle {
+    /// Draws size and driver. `lane_speed_mps` is the mean desired speed of cars in this lane.
+    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut TrafficRandom) -> Vehicle {
         let (length_m, width_m) = match class {
             VehicleClass::Car => (stream.normal_within(4.6, 0.5, 3.4, 6.4), stream.normal_within(1.9, 0.09, 1.6, 2.2)),
-            // Articulated lorries, and everything from box vans up: the two peaks of 12 ± 4.7 m.
+            // Articulated and other trucks: two peaks that give the published 12 ± 4.7 m.
             VehicleClass::Truck if stream.chance(0.42) => {
                 (stream.normal_within(16.3, 1.0, 13.5, 18.8), stream.normal_within(2.52, 0.05, 2.4, 2.6))
             }
@@ -124,8 +124,8 @@ impl Vehicle {
         }
     }
 
-    /// Puts it into a lane, on a line of its own choice.
-    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut Stream) {
+    /// Places it in a lane at a random lateral position.
+    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) {
         self.lane = lane;
         self.occupied = 1 << lane;
         self.line_m = draw_line(centre_m, lane_width_m, self.width_m, stream);
@@ -153,16 +153,16 @@ impl Vehicle {
     }
 }
 
-/// Median of the car drivers' time headways, s: with the spread below the mean is the 1.5 s of the
-/// hierarchical IDM fit on highD.
+/// Median time headway of car drivers, s. With the deviation below, the mean is the 1.5 s of the hierarchical IDM fit
+/// on highD.
 pub(super) const CAR_HEADWAY_S: f64 = 1.30;
-/// The same for trucks, s.
+/// Median time headway of truck drivers, s.
 pub(super) const TRUCK_HEADWAY_S: f64 = 1.7;
-/// Spread of the logarithm of the headways.
+/// Standard deviation of the headway's logarithm.
 pub(super) const HEADWAY_SIGMA: f64 = 0.5;
 
-/// The line a driver keeps to in a lane: near the middle, and with the whole body inside the lane.
-pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut Stream) -> f64 {
+/// The intended lateral position in a lane: near the middle, with the whole body inside the lane.
+pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut TrafficRandom) -> f64 {
     let room_m = (0.5 * (lane_width_m - width_m) - 0.3).max(0.05);
     centre_m + stream.normal_within(0.0, LINE_SD_M, -room_m, room_m)
 }

@@ -1,8 +1,8 @@
-//! A comma-separated table with named columns: opens it, finds columns by name, hands out typed fields,
-//! and says file, line and column wherever something is wrong. Knows nothing about traffic.
+//! A comma-separated table with named columns: finds columns by name and returns typed fields. Errors name file, line
+//! and column. Independent of traffic.
 //!
-//! Tolerated silently because they change no value: Windows line ends, a byte order mark, blank lines,
-//! quotes, blanks around a field, columns in another order, columns that nobody asks for.
+//! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
+//! field, columns in another order, additional columns.
 
 use crate::support::hex::hex;
 use std::fs::File;
@@ -17,7 +17,7 @@ use crate::support::input_file;
 use crate::support::near_name::nearest;
 use crate::{Error, Place, Result};
 
-/// What identifies a file's content in a run's record.
+/// Identity of a file's content in the run record.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct FileChecksum {
     /// Name of the file without its folder.
@@ -30,15 +30,15 @@ pub struct FileChecksum {
 
 /// A column that the header has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
+pub(super) struct CsvColumn {
     index: usize,
     name: &'static str,
 }
 
 /// An open table, positioned on one of its lines.
-pub(super) struct Table {
+pub(super) struct CsvTable {
     path: PathBuf,
-    reader: Reader<Hashing<File>>,
+    reader: Reader<HashingReader<File>>,
     known: &'static [&'static str],
     header: Vec<String>,
     record: ByteRecord,
@@ -48,16 +48,16 @@ pub(super) struct Table {
     rows: u64,
 }
 
-/// Read at once from the file: long enough that the disk, not the call, sets the pace.
+/// Size of one read from the file, bytes: the disk, not the call, limits the speed.
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
-/// A line of the format has a few hundred bytes. Where none ends within this, the file is another one, or a quotation
-/// mark is not closed.
+/// Maximum length of a line, bytes. A line of the format has a few hundred; a longer one means another format or an
+/// open quotation mark.
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
-impl Table {
-    /// Opens a file and reads its header. `known` are the names that the format gives its columns: a
-    /// column that bears one of them is never suggested as another one misspelt.
+impl CsvTable {
+    /// Opens a file and reads its header. `known` are the column names of the format: they are never reported as
+    /// misspelt.
     ///
     /// # Errors
     /// If it cannot be read, is empty, or has no comma-separated header in UTF-8.
@@ -66,11 +66,11 @@ impl Table {
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
-            // Not CRLF: with it the line count lags one behind in files with Windows line ends.
+            // Not CRLF, with which the line number is one too small in files with Windows line ends.
             .terminator(Terminator::Any(b'\n'))
             .buffer_capacity(READ_AHEAD_BYTES)
-            .from_reader(Hashing::new(file));
-        let mut table = Table {
+            .from_reader(HashingReader::new(file));
+        let mut table = CsvTable {
             path: path.to_path_buf(),
             reader,
             known,
@@ -115,8 +115,8 @@ impl Table {
     /// The column with this name.
     ///
     /// # Errors
-    /// If the header has none, or two; names the most similar column that is there.
-    pub fn column(&self, name: &'static str) -> Result<Column> {
+    /// If the header has none, or two; names the most similar column.
+    pub fn column(&self, name: &'static str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
             let problem = format!("the column is missing{}", self.strange_names_for_message());
             let help = match self.similar_name(name) {
@@ -131,9 +131,9 @@ impl Table {
     ///
     /// # Errors
     /// If the header has it twice.
-    pub fn optional_column(&self, name: &'static str) -> Result<Option<Column>> {
+    pub fn optional_column(&self, name: &'static str) -> Result<Option<CsvColumn>> {
         let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
-        let first = found.next().map(|(index, _)| Column { index, name });
+        let first = found.next().map(|(index, _)| CsvColumn { index, name });
         if found.next().is_some() {
             return Err(Error::input(
                 Place::file(&self.path).row(1).column(name),
@@ -150,8 +150,8 @@ impl Table {
     }
 
     /// The bytes of a field.
-    pub fn bytes(&self, column: Column) -> &[u8] {
-        // Every line has as many fields as the header, so the field is there.
+    pub fn bytes(&self, column: CsvColumn) -> &[u8] {
+        // Every line has as many fields as the header, so the field exists.
         let field = self.record.get(column.index).unwrap_or_default();
         // Windows line ends leave this in the last field.
         field.strip_suffix(b"\r").unwrap_or(field)
@@ -161,7 +161,7 @@ impl Table {
     ///
     /// # Errors
     /// If it is not UTF-8.
-    pub fn text(&self, column: Column) -> Result<&str> {
+    pub fn text(&self, column: CsvColumn) -> Result<&str> {
         match std::str::from_utf8(self.bytes(column)) {
             Ok(text) => Ok(text.trim()),
             Err(_) => Err(self.bad(
@@ -172,11 +172,11 @@ impl Table {
         }
     }
 
-    /// A field as a number between ±10¹²: finite, and what is computed from it stays finite.
+    /// A field as a number between ±10¹², so that derived values stay finite.
     ///
     /// # Errors
-    /// If it is no number, infinite, NaN or beyond the bounds.
-    pub fn real(&self, column: Column) -> Result<f64> {
+    /// If it is not a number, infinite, NaN or out of range.
+    pub fn real(&self, column: CsvColumn) -> Result<f64> {
         match number::real(self.bytes(column)) {
             Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
             Some(value) if value.is_finite() => {
@@ -194,8 +194,8 @@ impl Table {
     /// A field as a finite number above zero.
     ///
     /// # Errors
-    /// If it is no such number.
-    pub fn positive(&self, column: Column) -> Result<f64> {
+    /// If it is not such a number.
+    pub fn positive(&self, column: CsvColumn) -> Result<f64> {
         let value = self.real(column)?;
         if value > 0.0 {
             return Ok(value);
@@ -206,18 +206,18 @@ impl Table {
     /// A field as a whole number.
     ///
     /// # Errors
-    /// If it is none.
-    pub fn integer(&self, column: Column) -> Result<i64> {
+    /// If it is not a whole number.
+    pub fn integer(&self, column: CsvColumn) -> Result<i64> {
         number::integer(self.bytes(column)).ok_or_else(|| self.not_a_number(column, "a whole number"))
     }
 
     /// The error for a field of the present line.
-    pub fn bad(&self, column: Column, problem: impl Into<String>, help: impl Into<String>) -> Error {
+    pub fn bad(&self, column: CsvColumn, problem: impl Into<String>, help: impl Into<String>) -> Error {
         Error::input(self.field(column), problem, help)
     }
 
-    /// A field of the present line.
-    pub fn field(&self, column: Column) -> Place {
+    /// The place of a field of the present line.
+    pub fn field(&self, column: CsvColumn) -> Place {
         self.place().column(column.name)
     }
 
@@ -226,17 +226,17 @@ impl Table {
         Place::file(&self.path).row(self.line)
     }
 
-    /// The whole file.
+    /// The place of the whole file.
     pub fn file_place(&self) -> Place {
         Place::file(&self.path)
     }
 
     /// A field as messages show it.
-    pub fn shown(&self, column: Column) -> String {
+    pub fn shown(&self, column: CsvColumn) -> String {
         quoted(&String::from_utf8_lossy(self.bytes(column)))
     }
 
-    /// Closes the file; the checksum is of what was read, which is all of it after the last row.
+    /// Closes the file; the checksum covers the bytes read, which is the whole file after the last row.
     pub fn finish(self) -> FileChecksum {
         let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let hashing = self.reader.into_inner();
@@ -251,7 +251,7 @@ impl Table {
             if !self.reader.read_byte_record(&mut self.record).map_err(|error| self.unreadable(error))? {
                 return Ok(false);
             }
-            // The reader stands on the line after the record, unless no line end closed it.
+            // The reader is on the line after the record, unless the record has no line end.
             let end_line = self.reader.position().line().saturating_sub(u64::from(!self.ends_open()));
             let spans_lines = end_line > self.last_line + 1;
             self.line = if spans_lines { end_line.saturating_sub(self.inner_line_ends()) } else { end_line };
@@ -266,39 +266,38 @@ impl Table {
         match error.into_kind() {
             csv::ErrorKind::Io(_) if self.reader.get_ref().is_endless => Error::input(
                 Place::file(&self.path).row(self.last_line + 1),
-                format!("no line ends here within {} MiB, nor a quotation mark", MAX_LINE_BYTES >> 20),
-                "remove a quotation mark that is not closed; or copy or export the file again",
+                format!("neither line nor quotation ends here within {} MiB", MAX_LINE_BYTES >> 20),
+                "remove an open quotation mark, or copy or export the file again",
             ),
             csv::ErrorKind::Io(source) => Error::io(&self.path, "read", source),
-            // Bytes are not decoded and the number of fields is free: nothing else is left to go wrong.
+            // Only reading can fail: bytes are not decoded, and the number of fields is free.
             other => Error::Internal(format!("{}: {other:?}", self.path.display())),
         }
     }
 
-    /// Whether the record just read ends with the file and not with a line end: only then had the end of
-    /// the file to be seen.
+    /// Does the last record end with the file instead of a line end?
     fn ends_open(&self) -> bool {
         let hashing = self.reader.get_ref();
         hashing.at_end && self.reader.position().byte() == hashing.bytes
     }
 
-    /// Line ends inside the fields of the record, where quotes allow them.
+    /// Number of line ends inside quoted fields of the record.
     fn inner_line_ends(&self) -> u64 {
         self.record.as_slice().iter().filter(|&&byte| byte == b'\n').count() as u64
     }
 
-    /// Header names that the format does not know.
+    /// Header names that are not part of the format.
     fn strange_names(&self) -> impl Iterator<Item = &str> {
         self.header.iter().map(String::as_str).filter(|name| !self.known.contains(name))
     }
 
-    /// What of the header helps to find a misnamed column.
+    /// A hint from the header about a misnamed column.
     fn strange_names_for_message(&self) -> String {
         let strange: Vec<&str> = self.strange_names().collect();
         if strange.is_empty() {
             return String::new();
         }
-        format!("; the header has names that the format does not have: {}", list(&strange))
+        format!("; the header has names that are not part of the format: {}", list(&strange))
     }
 
     fn check_header(&self) -> Result<()> {
@@ -352,7 +351,7 @@ impl Table {
         }
     }
 
-    fn not_a_number(&self, column: Column, expected: &str) -> Error {
+    fn not_a_number(&self, column: CsvColumn, expected: &str) -> Error {
         let field = self.bytes(column);
         if field.trim_ascii().is_empty() {
             return self.bad(column, format!("the field is empty; expected {expected}"), "fill in the value");
@@ -371,7 +370,7 @@ fn header_name(field: &[u8]) -> String {
     String::from_utf8_lossy(field).trim().trim_start_matches('\u{feff}').to_owned()
 }
 
-/// Column names for a message, the first few of many, without control characters.
+/// The first few column names for a message, without control characters.
 fn list(names: &[&str]) -> String {
     const SHOWN: usize = 10;
     let mut shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
@@ -381,34 +380,34 @@ fn list(names: &[&str]) -> String {
     shown.join(", ")
 }
 
-/// Text of a user's file as messages show it: in quotes, without control characters, not too long.
+/// Text of a user's file in messages: quoted, without control characters, truncated.
 pub(super) fn quoted(text: &str) -> String {
     const SHOWN: usize = 40;
     let end = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
     format!("`{}{end}`", text.chars().take(SHOWN).flat_map(char::escape_debug).collect::<String>())
 }
 
-/// Hashes and counts what passes through, so that no file is read twice.
-struct Hashing<R> {
+/// Hashes and counts the bytes read, so that no file is read twice.
+struct HashingReader<R> {
     inner: R,
     hash: Sha256,
     bytes: u64,
     at_end: bool,
-    /// Where the line begins that is being read, bytes.
+    /// Offset of the present line, bytes.
     line_from: u64,
-    /// That line was given up.
+    /// That line is too long.
     is_endless: bool,
 }
 
-impl<R> Hashing<R> {
+impl<R> HashingReader<R> {
     fn new(inner: R) -> Self {
-        Hashing { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
+        HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
     }
 }
 
-impl<R: Read> Read for Hashing<R> {
+impl<R: Read> Read for HashingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        // More is asked for where all that came belongs to the line: it would be held in memory as a whole.
+        // The line has no end so far, and memory would have to hold all of it.
         if self.bytes - self.line_from.min(self.bytes) > MAX_LINE_BYTES {
             self.is_endless = true;
             return Err(io::Error::from(io::ErrorKind::InvalidData));

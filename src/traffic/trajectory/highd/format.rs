@@ -1,4 +1,4 @@
-//! Column names of the three highD files in the order of the format (spec section 1).
+//! Column names of the three highD files in the order of the format.
 
 /// `NN_tracks.csv`: one line per vehicle and frame.
 pub(super) const TRACKS_COLUMNS: [&str; 25] = [
@@ -49,7 +49,7 @@ pub(super) const TRACKS_META_COLUMNS: [&str; 16] = [
     "numLaneChanges",
 ];
 
-/// `NN_recordingMeta.csv`: one line. The last column is ours and only there where the recording is made up.
+/// `NN_recordingMeta.csv`: one line. The last column is ours; only synthetic recordings have it.
 pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
     "id",
     "frameRate",
@@ -69,17 +69,16 @@ pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
     "synthetic",
 ];
 
-/// What the header line of a file is.
+/// Returns the header line of a file.
 pub(super) fn header(columns: &[&str]) -> String {
     columns.join(",") + "\n"
 }
 
-/// Frame rates outside these bounds are mistakes (a period instead of a rate, for one), and the counts
-/// that follow from them would not fit anywhere.
+/// Valid frame rates. Others are errors, for instance a period instead of a rate, and derived counts would overflow.
 pub(super) const FRAME_RATES_HZ: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
 
-/// Most lane lines of one carriageway; more is damage.
+/// Maximum number of lane lines of one carriageway; more indicates damage.
 pub(super) const LANE_LINES_LIMIT: usize = 256;
 
-/// Frames farther from zero are damage; the bound keeps every difference of two frames small.
+/// Maximum magnitude of a frame number; it keeps differences of two frames small.
 pub(super) const FRAME_LIMIT: i64 = 1_000_000_000_000;

@@ -1,10 +1,9 @@
-//! The two frames and the two lane numberings, both ways: highD's image (corner of the box, y down,
-//! `laneId` ascending with y) and the internal one (centre, forward and left, lane 0 leftmost).
-//! Reader and writer share these few lines, so that neither can drift from the other. Spec section 1.
+//! Transformations between highD's image (corner of the box, y down, `laneId` ascending with y) and the internal
+//! frame (centre, forward and left, lane 0 leftmost). Reader and writer share them.
 
 use crate::traffic::trajectory::NO_LANE;
 
-/// Which half of the image a vehicle drives in.
+/// Half of the image in which a vehicle drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Direction {
     /// `drivingDirection` 1: the upper lanes, towards −x.
@@ -70,18 +69,18 @@ impl Direction {
         self.leftward(y + width_m / 2.0)
     }
 
-    /// Left edge of the box, m: the way back from [`Direction::s_of`] up to rounding.
+    /// Left edge of the box, m: the inverse of [`Direction::s_of`] up to rounding.
     pub fn x_of(self, s_m: f64, length_m: f64) -> f64 {
         self.forward(s_m) - length_m / 2.0
     }
 
-    /// Upper edge of the box, m: the way back from [`Direction::d_of`] up to rounding.
+    /// Upper edge of the box, m: the inverse of [`Direction::d_of`] up to rounding.
     pub fn y_of(self, d_m: f64, width_m: f64) -> f64 {
         self.leftward(d_m) - width_m / 2.0
     }
 }
 
-/// Translates `laneId` (1 + number of lane lines above) for one recording.
+/// Converts `laneId` (1 + number of lane lines above) for one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct LaneNumbers {
     /// Number of upper lane lines: n bound n − 1 lanes, with the ids 2..=n.

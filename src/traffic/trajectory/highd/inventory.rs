@@ -10,7 +10,7 @@ use crate::{Error, Place, Result};
 /// The three files of one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HighdFiles {
-    /// What stands before `_tracks.csv`, `01` for instance: the recording's name.
+    /// The prefix before `_tracks.csv`, for instance `01`: the recording's name.
     pub id: String,
     /// `NN_tracks.csv`: one line per vehicle and frame.
     pub tracks: PathBuf,
@@ -28,12 +28,12 @@ impl HighdFiles {
     }
 }
 
-/// What a folder holds.
+/// The recordings of a folder.
 #[derive(Debug)]
 pub struct Inventory {
     /// Complete recordings, ascending by [`HighdFiles::id`].
     pub recordings: Vec<HighdFiles>,
-    /// One error for each incomplete recording; the complete ones can be used all the same.
+    /// One error per incomplete recording; the complete ones can be used.
     pub problems: Vec<Error>,
 }
 
@@ -43,13 +43,13 @@ const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.c
 /// Finds the recordings of a folder (not of its subfolders).
 ///
 /// # Errors
-/// If the folder cannot be listed, is none, or holds no complete recording.
+/// If it is not a folder, cannot be listed, or holds no complete recording.
 pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
     let unfinished = crate::support::run_dir::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
-        let problem = "`lanesweep synth` ended here before all of its recordings had their names: it is no data set";
-        let help = "give that command again, which completes the folder, or remove the folder";
+        let problem = "`lanesweep synth` did not finish here, so recordings are missing";
+        let help = "repeat that command, which completes the folder, or remove the folder";
         return Err(Error::input(Place::file(dir), problem, help));
     }
     let mut inventory = Inventory { recordings: Vec::new(), problems: Vec::new() };
@@ -76,11 +76,11 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     Ok(inventory)
 }
 
-/// File that `lanesweep synth` leaves beside its recordings, for people, and for folders of versions that did not mark the
-/// recordings themselves.
+/// File that `lanesweep synth` writes beside its recordings, for readers and for folders of versions without marks in
+/// the recordings.
 pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 
-/// What the marker of a folder says of its recordings, in one line; `None` without a marker.
+/// The text of a folder's marker in one line; `None` without a marker.
 pub fn made_up(dir: &Path) -> Option<String> {
     let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::MAX_SETTINGS_BYTES).ok()?;
     text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
@@ -91,7 +91,7 @@ pub(super) fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Every prefix that occurs, with which of the three files are there. The map sorts them.
+/// Every prefix with the presence of its three files, sorted.
 fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
     let facts = fs::metadata(dir).map_err(|source| Error::io(dir, "read the folder", source))?;
     if !facts.is_dir() {
@@ -104,10 +104,10 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
     let mut found: BTreeMap<String, [bool; 3]> = BTreeMap::new();
     for entry in fs::read_dir(dir).map_err(|source| Error::io(dir, "read the folder", source))? {
         let entry = entry.map_err(|source| Error::io(dir, "read the folder", source))?;
-        // A name that is no text cannot become part of a scenario's key; names with a leading point are
-        // what some systems leave beside the real files.
+        // A name that is not UTF-8 cannot be part of a scenario's key. Some systems write additional files with a
+        // leading point.
         let Ok(name) = entry.file_name().into_string() else { continue };
-        // Not `Path::is_file`: it says no to everything in a folder that may be listed but not entered.
+        // Not `Path::is_file`, which is false for all files of a folder that may be listed but not entered.
         let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
         let leads_nowhere = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && !entry.path().exists();
         if name.starts_with('.') || is_folder || leads_nowhere {
@@ -146,7 +146,7 @@ fn nothing_complete(dir: &Path, mut problems: Vec<Error>) -> Error {
     }
 }
 
-/// highD is handed out as an archive that unpacks into `data/`: naming the outer folder is a likely slip.
+/// The highD archive unpacks into `data/`, so users often name the outer folder.
 fn subfolder_with_recordings(dir: &Path) -> Option<PathBuf> {
     let mut folders: Vec<PathBuf> =
         fs::read_dir(dir).ok()?.flatten().map(|entry| entry.path()).filter(|path| path.is_dir()).collect();

@@ -1,7 +1,7 @@
 //! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
 //! (size, class and direction of each vehicle).
 
-use super::columns::{Column, FileChecksum, Table, quoted};
+use super::columns::{CsvColumn, CsvTable, FileChecksum, quoted};
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TRACKS_META_COLUMNS};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
@@ -10,16 +10,16 @@ use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::traffic::trajectory::{Carriageway, VehicleClass};
 use crate::{Error, Place, Result};
 
-/// What `recordingMeta` says.
+/// Content of `recordingMeta`.
 pub(super) struct RecordingMeta {
     pub frame_rate_hz: f64,
     pub lane_numbers: LaneNumbers,
-    /// Those of the two carriageways that have lane lines.
+    /// The carriageways with lane lines, at most two.
     pub carriageways: Vec<Carriageway>,
-    /// The line says that the program made the recording up.
+    /// The recording is synthetic.
     pub synthetic: bool,
     pub checksum: FileChecksum,
-    /// The line that says all this.
+    /// Line number of these values.
     place: Place,
 }
 
@@ -30,21 +30,21 @@ impl RecordingMeta {
     }
 }
 
-/// What `tracksMeta` says about one vehicle.
-pub(super) struct Vehicle {
+/// Content of `tracksMeta` for one vehicle.
+pub(super) struct VehicleMeta {
     pub id: u32,
     pub class: VehicleClass,
     pub length_m: f64,
     pub width_m: f64,
     pub direction: Direction,
     pub carriageway: usize,
-    /// Number of lines it must have in `tracks`, where the file says so.
+    /// Required number of lines in `tracks`, if given.
     pub samples: Option<u64>,
 }
 
 /// Reads `recordingMeta`.
 pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
-    let mut table = Table::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
+    let mut table = CsvTable::open(&files.recording_meta, &RECORDING_META_COLUMNS)?;
     let frame_rate = table.column("frameRate")?;
     let upper_column = table.column(Direction::Upper.markings_column())?;
     let lower_column = table.column(Direction::Lower.markings_column())?;
@@ -84,7 +84,7 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     if table.next_row()? {
         return Err(Error::input(
             table.place(),
-            "a second line; expected only one, for this recording",
+            "a second line; expected one line for this recording",
             "keep the line of this recording and remove the others",
         ));
     }
@@ -97,12 +97,12 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
 }
 
-fn judge(table: &Table, column: Column, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
+fn judge(table: &CsvTable, column: CsvColumn, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
     let judged = doubts.judge(quantity, value, || table.field(column).to_string());
     judged.map_err(|problem| table.bad(column, problem, HELP))
 }
 
-fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
+fn yes_or_no(table: &CsvTable, column: CsvColumn) -> Result<bool> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "1" | "true" | "yes" => Ok(true),
         "" | "0" | "false" | "no" => Ok(false),
@@ -110,7 +110,7 @@ fn yes_or_no(table: &Table, column: Column) -> Result<bool> {
     }
 }
 
-fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
+fn frames_per_second(table: &CsvTable, column: CsvColumn) -> Result<f64> {
     let frame_rate_hz = table.real(column)?;
     if FRAME_RATES_HZ.contains(&frame_rate_hz) {
         return Ok(frame_rate_hz);
@@ -118,7 +118,7 @@ fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
     let (least, most) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
     Err(table.bad(
         column,
-        format!("{} is no frame rate; expected between {least} and {most} frames per second", table.shown(column)),
+        format!("{} is not a frame rate; expected between {least} and {most} frames per second", table.shown(column)),
         "give the number of frames per second (highD: 25)",
     ))
 }
@@ -126,7 +126,7 @@ fn frames_per_second(table: &Table, column: Column) -> Result<f64> {
 /// Lane lines of the image, from top to bottom, as a carriageway.
 fn carriageway(direction: Direction, lines_y: &[f64]) -> Carriageway {
     let mut lane_lines_m: Vec<f64> = lines_y.iter().map(|&y| direction.leftward(y)).collect();
-    // Leftmost first: against the order of the image where the travel is against x.
+    // Leftmost first, so in reverse order of the image for travel against x.
     if direction == Direction::Upper {
         lane_lines_m.reverse();
     }
@@ -137,7 +137,7 @@ const MARKINGS_HELP: &str =
     "give the y of the lane lines in metres from top to bottom, separated by semicolons, such as 8.51;12.59;16.43";
 
 /// The lane lines of one cell, from top to bottom; none for an empty cell.
-fn markings(table: &Table, column: Column) -> Result<Vec<f64>> {
+fn markings(table: &CsvTable, column: CsvColumn) -> Result<Vec<f64>> {
     let text = table.text(column)?;
     if text.is_empty() {
         return Ok(Vec::new());
@@ -167,10 +167,10 @@ pub(super) fn read_tracks_meta(
     files: &HighdFiles,
     recording: &RecordingMeta,
     doubts: &mut Doubts,
-) -> Result<(Vec<Vehicle>, FileChecksum)> {
-    let mut table = Table::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
+) -> Result<(Vec<VehicleMeta>, FileChecksum)> {
+    let mut table = CsvTable::open(&files.tracks_meta, &TRACKS_META_COLUMNS)?;
     let columns = MetaColumns::of(&table)?;
-    let mut vehicles: Vec<(Vehicle, Place)> = Vec::new();
+    let mut vehicles: Vec<(VehicleMeta, Place)> = Vec::new();
     while table.next_row()? {
         let vehicle = columns.vehicle(&table, recording)?;
         judge(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
@@ -184,33 +184,33 @@ pub(super) fn read_tracks_meta(
             "remove the three files of this recording from the folder, or copy them again",
         ));
     }
-    // Stable, so that of two lines with one id the later one is called the surplus one.
+    // Stable, so that the error names the later one of two lines with one id.
     vehicles.sort_by_key(|(vehicle, _)| vehicle.id);
     if let Some([_, (vehicle, place)]) = vehicles.array_windows().find(|[(a, _), (b, _)]| a.id == b.id) {
         return Err(Error::input(
             place.clone().column("id").of(format!("vehicle {}", vehicle.id)),
             "an earlier line has the same id; expected one line per vehicle",
-            "remove the surplus line, or give the vehicle an id of its own in both files",
+            "remove the surplus line, or give the vehicle its own id in both files",
         ));
     }
     Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()))
 }
 
 struct MetaColumns {
-    id: Column,
-    length: Column,
-    width: Column,
-    class: Column,
-    direction: Column,
-    samples: Option<Column>,
-    first_and_last_frame: Option<(Column, Column)>,
+    id: CsvColumn,
+    length: CsvColumn,
+    width: CsvColumn,
+    class: CsvColumn,
+    direction: CsvColumn,
+    samples: Option<CsvColumn>,
+    first_and_last_frame: Option<(CsvColumn, CsvColumn)>,
 }
 
 impl MetaColumns {
-    fn of(table: &Table) -> Result<Self> {
+    fn of(table: &CsvTable) -> Result<Self> {
         Ok(MetaColumns {
             id: table.column("id")?,
-            // highD's box is that of the image: its width is the vehicle's length.
+            // The box belongs to the image: its width is the vehicle's length.
             length: table.column("width")?,
             width: table.column("height")?,
             class: table.column("class")?,
@@ -220,16 +220,16 @@ impl MetaColumns {
         })
     }
 
-    fn vehicle(&self, table: &Table, recording: &RecordingMeta) -> Result<Vehicle> {
+    fn vehicle(&self, table: &CsvTable, recording: &RecordingMeta) -> Result<VehicleMeta> {
         let id = table.integer(self.id)?;
         let id = u32::try_from(id).map_err(|_| {
-            table.bad(self.id, format!("{id} is no vehicle id; expected 0 to {}", u32::MAX), "correct the id")
+            table.bad(self.id, format!("{id} is not a vehicle id; expected 0 to {}", u32::MAX), "correct the id")
         })?;
         let direction = Direction::from_number(table.integer(self.direction)?).ok_or_else(|| {
             let found = table.shown(self.direction);
             table.bad(
                 self.direction,
-                format!("{found} is no driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
+                format!("{found} is not a driving direction; expected 1 (upper lanes) or 2 (lower lanes)"),
                 "correct the value",
             )
         })?;
@@ -240,7 +240,7 @@ impl MetaColumns {
                 MARKINGS_HELP,
             )
         })?;
-        Ok(Vehicle {
+        Ok(VehicleMeta {
             id,
             class: class(table, self.class)?,
             length_m: table.positive(self.length)?,
@@ -251,8 +251,8 @@ impl MetaColumns {
         })
     }
 
-    /// How many lines the vehicle has in `tracks`: as counted, or as follows from its first and last frame.
-    fn samples(&self, table: &Table) -> Result<Option<u64>> {
+    /// Number of lines of the vehicle in `tracks`: as given, or from its first and last frame.
+    fn samples(&self, table: &CsvTable) -> Result<Option<u64>> {
         let (column, count) = match (self.samples, self.first_and_last_frame) {
             (Some(column), _) => (column, table.integer(column)?),
             (None, Some((first, last))) => {
@@ -269,14 +269,14 @@ impl MetaColumns {
     }
 }
 
-/// highD knows `Car` and `Truck`; the names of its sibling formats are understood too.
-fn class(table: &Table, column: Column) -> Result<VehicleClass> {
+/// highD has `Car` and `Truck`; names of related formats are accepted too.
+fn class(table: &CsvTable, column: CsvColumn) -> Result<VehicleClass> {
     match table.text(column)?.to_ascii_lowercase().as_str() {
         "car" | "van" | "motorcycle" => Ok(VehicleClass::Car),
         "truck" | "bus" | "trailer" => Ok(VehicleClass::Truck),
         _ => Err(table.bad(
             column,
-            format!("{} is no known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
+            format!("{} is not a known class of vehicle; expected `Car` or `Truck`", table.shown(column)),
             "write `Car` or `Truck`",
         )),
     }

@@ -1,9 +1,9 @@
 //! The highD format: a recording is three comma-separated files, `NN_tracks.csv`, `NN_tracksMeta.csv`
-//! and `NN_recordingMeta.csv` (spec section 1).
+//! and `NN_recordingMeta.csv`.
 //!
-//! Here live the inventory of a folder, the reader and the writer, and the two frames' translation that
-//! both share. Paths come in, [`Recording`](super::Recording)s go out, and back. Nothing outside this
-//! folder knows a column name of the format.
+//! This room has the inventory of a folder, the reader, the writer, and the coordinate transformation that both
+//! share. It converts between paths and [`Recording`](super::Recording)s. No other room uses a column name of the
+//! format.
 
 mod columns;
 mod format;

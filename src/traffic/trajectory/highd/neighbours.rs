@@ -1,5 +1,4 @@
-//! Who drives around whom, frame by frame: what highD's neighbour columns say. The writer needs it;
-//! nothing downstream does, since the program computes its own gaps.
+//! Neighbours of each vehicle per frame, for highD's neighbour columns. Only the writer needs them.
 
 use crate::traffic::trajectory::{Recording, Track};
 
@@ -165,11 +164,11 @@ mod tests {
         let left = Beside { preceding: 4, alongside: 3, following: 5 };
         let first = Around { preceding: 1, following: NOBODY, left, right: NOBODY_BESIDE };
         assert_eq!(around[0][0], first);
-        // Vehicle 3 arrives one frame later; in the first frame it was not there.
+        // Vehicle 3 arrives one frame later.
         assert_eq!(around[0][1], Around { following: 2, ..first });
         assert_eq!(around[2][0].preceding, 0);
         assert_eq!(around[3][0].right, Beside { preceding: 1, alongside: 0, following: NOBODY });
-        // At its second sample nobody else is there any more.
+        // At its second sample it is alone.
         assert_eq!(around[2][1], ALONE);
         assert_eq!(around[6], [ALONE; 2]);
     }

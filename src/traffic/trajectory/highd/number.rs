@@ -1,6 +1,5 @@
-//! Numbers out of bytes. Most of reading a recording is this, so the plain decimals that highD consists
-//! of take a short way; every other spelling goes to the standard library. Both round correctly, so the
-//! way taken never shows in a value.
+//! Parses numbers from bytes. Most of the reading time is spent here, so plain decimals have a fast path; the
+//! standard library parses all others. Both round correctly, so the values are equal.
 
 /// Powers of ten that `f64` holds exactly.
 const EXACT_POWERS: [f64; 23] = [
@@ -11,18 +10,17 @@ const EXACT_POWERS: [f64; 23] = [
 /// Digits below which any integer is exact in `f64` (10^15 < 2^53).
 const EXACT_DIGITS: usize = 15;
 
-/// Largest magnitude that a recording's numbers may have. Nothing on a road comes near it; sums and
-/// products of a few numbers below it stay finite, and hundredths of it are exact.
+/// Maximum magnitude of a recording's numbers. Sums and products of a few such numbers stay finite, and hundredths
+/// are exact.
 pub(super) const REAL_LIMIT: f64 = 1e12;
 
-/// The number a field spells, `None` if it spells none. Infinities and NaN are numbers here: the caller
-/// says what it thinks of them. Blanks around the number are allowed.
+/// The number in a field; `None` if it is not a number. Infinities and NaN count as numbers. Blanks around the number
+/// are allowed.
 pub(super) fn real(field: &[u8]) -> Option<f64> {
     short_decimal(field).or_else(|| std::str::from_utf8(field).ok()?.trim().parse().ok())
 }
 
-/// The whole number a field spells; `7.0` counts as 7, because tables that went through a data frame
-/// often spell it so.
+/// The whole number in a field; `7.0` counts as 7, because data frames often write it so.
 pub(super) fn integer(field: &[u8]) -> Option<i64> {
     short_integer(field).or_else(|| {
         let text = std::str::from_utf8(field).ok()?.trim();
@@ -40,7 +38,7 @@ fn short_decimal(field: &[u8]) -> Option<f64> {
         [b'-', rest @ ..] => (true, rest),
         _ => (false, field),
     };
-    // One more byte than digits, for the point.
+    // One more byte than digits for the decimal point.
     if digits.is_empty() || digits.len() > EXACT_DIGITS + 1 {
         return None;
     }

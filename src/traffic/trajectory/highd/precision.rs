@@ -1,4 +1,4 @@
-//! How many decimals a written number has, and what reading it back gives.
+//! Decimals of written numbers, and the value after reading them.
 
 use super::number::REAL_LIMIT;
 
@@ -8,15 +8,15 @@ pub enum Precision {
     /// Two, as highD has.
     #[default]
     Hundredths,
-    /// As many as it takes to read the same `f64` back.
+    /// The minimum number that reads back to the same `f64`.
     Shortest,
 }
 
 impl Precision {
-    /// What reading the text of `value` gives; `value` within ±10¹².
+    /// The value that the text of `value` reads as; `value` within ±10¹².
     pub(super) fn rounded(self, value: f64) -> f64 {
         match self {
-            // One correctly rounded division of two exact integers: what any correct parser gives too.
+            // One correctly rounded division of two exact integers equals the result of any correct parser.
             Precision::Hundredths => hundredths(value) as f64 / 100.0,
             Precision::Shortest => value,
         }
@@ -39,7 +39,7 @@ impl Precision {
     }
 }
 
-/// Appends a whole number. By hand, because a recording has millions of them.
+/// Appends a whole number. Own code, because a recording has millions of them.
 pub(super) fn push_integer(line: &mut Vec<u8>, value: u64) {
     let (mut digits, mut at, mut rest) = ([0u8; 20], 20, value);
     loop {
@@ -53,7 +53,7 @@ pub(super) fn push_integer(line: &mut Vec<u8>, value: u64) {
     line.extend_from_slice(&digits[at..]);
 }
 
-/// Number of hundredths next to `value`; never the negative zero that a float would keep.
+/// Nearest number of hundredths of `value`; an integer has no negative zero.
 fn hundredths(value: f64) -> i64 {
     (value.clamp(-REAL_LIMIT, REAL_LIMIT) * 100.0).round() as i64
 }

@@ -1,17 +1,16 @@
-//! One recording's three files into the internal model. Only the columns that the model needs are
-//! looked at, each line once, and nothing is kept but the model itself.
+//! Reads one recording's three files into the internal model, in one pass, from the needed columns only.
 
 use std::path::Path;
 
-use super::columns::{Column, FileChecksum, Table};
+use super::columns::{CsvColumn, CsvTable, FileChecksum};
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
 use super::inventory::{HighdFiles, folder_of, made_up};
-use super::meta::{self, RecordingMeta, Vehicle};
+use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Result};
 
-/// A recording as read, with what a run's record says about its files.
+/// A recording with the facts about its files for the run record.
 #[derive(Debug)]
 pub struct Loaded {
     /// The recording.
@@ -22,11 +21,11 @@ pub struct Loaded {
     pub rows: u64,
     /// Size of the three files together, bytes.
     pub bytes: u64,
-    /// What the data leaves open or what looks wrong without being an error, as sentences.
+    /// Warnings about the data, as sentences.
     pub notes: Vec<String>,
 }
 
-/// As [`read_judged`], where implausible values are accepted.
+/// As [`read_judged`], but accepts implausible values.
 ///
 /// # Errors
 /// As [`read_judged`].
@@ -41,12 +40,12 @@ pub fn read(files: &HighdFiles) -> Result<Loaded> {
 /// `laneId` or, where that column is absent, from position and lane lines.
 ///
 /// # Errors
-/// Anything that is not as it must be, with file, line and column or vehicle.
+/// Any violation of the format, with file, line and column or vehicle.
 pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
-    let mut table = Table::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let mut table = CsvTable::open(&files.tracks, &TRACKS_COLUMNS)?;
     let columns = TrackColumns::of(&table)?;
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
@@ -67,20 +66,20 @@ pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loade
 }
 
 struct TrackColumns {
-    frame: Column,
-    id: Column,
-    x: Column,
-    y: Column,
-    velocity_x: Column,
-    velocity_y: Column,
-    acceleration_x: Column,
-    lane: Option<Column>,
+    frame: CsvColumn,
+    id: CsvColumn,
+    x: CsvColumn,
+    y: CsvColumn,
+    velocity_x: CsvColumn,
+    velocity_y: CsvColumn,
+    acceleration_x: CsvColumn,
+    lane: Option<CsvColumn>,
 }
 
 impl TrackColumns {
-    fn of(table: &Table) -> Result<Self> {
+    fn of(table: &CsvTable) -> Result<Self> {
         let lane = match table.optional_column("laneId")? {
-            // The geometry can stand in for an absent column, but not for a misspelt one.
+            // The geometry replaces an absent column, but not a misspelt one.
             None if table.similar_name("laneId").is_some() => Some(table.column("laneId")?),
             lane => lane,
         };
@@ -97,18 +96,17 @@ impl TrackColumns {
     }
 }
 
-/// Fills the empty tracks, one per vehicle, and returns them ascending by id, without those that the meta file
-/// announces with no sample.
+/// Fills the empty tracks, one per vehicle, and returns those with samples, ascending by id.
 fn read_tracks(
-    table: &mut Table,
+    table: &mut CsvTable,
     columns: &TrackColumns,
     meta: &RecordingMeta,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleMeta],
     mut tracks: Vec<Track>,
     doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
     let judge = SampleJudge::new(meta.frame_rate_hz);
-    // Sums of the accelerations of each vehicle's last second: single samples are noisy.
+    // Sums of the accelerations over each vehicle's last second, because single samples are noisy.
     let mut sums_mps2 = vec![0.0; vehicles.len()];
     let mut at = 0;
     while table.next_row()? {
@@ -131,16 +129,16 @@ fn read_tracks(
     Ok(tracks)
 }
 
-/// Is the tracks file large enough for all samples that the meta file announces? A small file could announce any
+/// Is the tracks file large enough for all samples that the meta file claims? A damaged meta file can claim any
 /// number.
-fn can_hold(tracks: &Path, vehicles: &[Vehicle]) -> bool {
+fn can_hold(tracks: &Path, vehicles: &[VehicleMeta]) -> bool {
     let announced = vehicles.iter().fold(0_u64, |sum, vehicle| sum.saturating_add(vehicle.samples.unwrap_or(0)));
     let bytes = std::fs::metadata(tracks).map_or(0, |file| file.len());
     announced <= bytes / MIN_ROW_BYTES
 }
 
-/// A track without samples; `reserve` gives it room for the announced ones.
-fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
+/// A track without samples; `reserve` allocates memory for the claimed ones.
+fn empty_track(vehicle: &VehicleMeta, reserve: bool) -> Track {
     let samples = if reserve { vehicle.samples.unwrap_or(0) as usize } else { 0 };
     Track {
         id: vehicle.id,
@@ -158,9 +156,9 @@ fn empty_track(vehicle: &Vehicle, reserve: bool) -> Track {
     }
 }
 
-/// Index of the present line's vehicle. Lines come grouped by vehicle or by frame, so it is mostly the
-/// same as before or the next one.
-fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usize) -> Result<usize> {
+/// Index of the present line's vehicle. Lines are grouped by vehicle or by frame, so it is mostly the same or the
+/// next one.
+fn find_vehicle(table: &CsvTable, column: CsvColumn, vehicles: &[VehicleMeta], before: usize) -> Result<usize> {
     let id = table.integer(column)?;
     let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
     if is(before) {
@@ -179,10 +177,10 @@ fn find_vehicle(table: &Table, column: Column, vehicles: &[Vehicle], before: usi
 }
 
 fn add_sample(
-    table: &Table,
+    table: &CsvTable,
     columns: &TrackColumns,
     meta: &RecordingMeta,
-    vehicle: &Vehicle,
+    vehicle: &VehicleMeta,
     track: &mut Track,
     doubts: &mut Doubts,
 ) -> Result<()> {
@@ -197,7 +195,7 @@ fn add_sample(
     }
     let direction = vehicle.direction;
     let d_m = direction.d_of(table.real(columns.y)?, vehicle.width_m);
-    // Everything is parsed before anything is stored: the series keep the same length.
+    // All fields are parsed before any is stored, so that the series keep equal lengths.
     let s_m = direction.s_of(table.real(columns.x)?, vehicle.length_m);
     let text = || table.field(columns.velocity_x).to_string();
     let v_s_mps = doubts.speed(direction.forward(table.real(columns.velocity_x)?), text);
@@ -205,7 +203,7 @@ fn add_sample(
         return Err(table.bad(
             columns.velocity_x,
             format!("{v_s_mps} m/s along its drivingDirection: vehicle {} drives backwards", vehicle.id),
-            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s is taken as 0)",
+            "correct its sign or drivingDirection, or remove the vehicle (noise above -0.5 m/s counts as 0)",
         ));
     }
     let v_d_mps = direction.leftward(table.real(columns.velocity_y)?);
@@ -232,7 +230,7 @@ struct SampleJudge {
     inverse_window: f64,
 }
 
-/// What is judged of one sample; a quantity that it does not have yet is 0.
+/// The judged quantities of one sample; 0 if not yet defined.
 struct JudgedSample {
     speed_mps: f64,
     lateral_speed_mps: f64,
@@ -281,14 +279,14 @@ impl JudgedSample {
     }
 }
 
-/// Counts what is implausible about a sample.
+/// Counts the implausible values of a sample.
 ///
 /// # Errors
-/// A value beyond the physical range, unless such are accepted.
+/// A value outside the physical range, unless such values are accepted.
 #[cold]
 fn report(
     sample: &JudgedSample,
-    table: &Table,
+    table: &CsvTable,
     columns: &TrackColumns,
     track: &Track,
     doubts: &mut Doubts,
@@ -304,12 +302,12 @@ fn report(
 }
 
 /// The error for a frame that is not the one after the vehicle's last.
-fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
+fn out_of_step(table: &CsvTable, track: &Track, frame: i64) -> Error {
     let (first, last) = (track.first_frame, track.last_frame());
     let (problem, help) = if (first..=last).contains(&frame) {
         (
-            format!("frame {frame} of this vehicle is there twice"),
-            "remove one of the two lines, or give the second vehicle an id of its own",
+            format!("frame {frame} of this vehicle occurs twice"),
+            "remove one of the two lines, or give the second vehicle its own id",
         )
     } else if frame < first {
         (
@@ -319,14 +317,14 @@ fn out_of_step(table: &Table, track: &Track, frame: i64) -> Error {
     } else {
         (
             format!("a gap, or the frames are out of order: {frame} comes after {last}; expected {}", last + 1),
-            "sort the lines by id and frame; give the parts of a track with a gap ids of their own",
+            "sort the lines by id and frame; if a track has a gap, give each part its own id",
         )
     };
     Error::input(table.place().column("frame").of(format!("vehicle {}", track.id)), problem, help)
 }
 
-/// The meta file says how many lines each vehicle has: the only way to notice a file that ends early.
-fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result<()> {
+/// Compares the number of lines per vehicle with the meta file, which detects truncated files.
+fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) -> Result<()> {
     let mut mismatches = vehicles.iter().zip(tracks).filter(|(vehicle, track)| match vehicle.samples {
         Some(samples) => samples != track.len() as u64,
         None => track.is_empty(),
@@ -334,7 +332,7 @@ fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result
     let Some((vehicle, track)) = mismatches.next() else { return Ok(()) };
     let (found, more) = (track.len() as u64, mismatches.count());
     let expected = match vehicle.samples {
-        Some(samples) => format!("the tracksMeta file announces {samples}"),
+        Some(samples) => format!("the tracksMeta file claims {samples}"),
         None => "it is in the tracksMeta file".to_owned(),
     };
     let more = if more == 0 { String::new() } else { format!(" ({more} more vehicles do not fit either)") };
@@ -346,14 +344,14 @@ fn check_counts(table: &Table, vehicles: &[Vehicle], tracks: &[Track]) -> Result
     ))
 }
 
-/// What a user should hear of although the data can be used.
-fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<String> {
+/// Warnings about usable data.
+fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track]) -> Vec<String> {
     let mut notes = Vec::new();
     if columns.lane.is_none() {
         notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
     }
     if vehicles.iter().any(|vehicle| vehicle.samples.is_none()) {
-        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file would not be noticed".to_owned());
+        notes.push("the tracksMeta file has no `numFrames`: a truncated tracks file cannot be detected".to_owned());
     }
     let mut note = |what: &str, applies: &dyn Fn(&Track) -> bool| {
         let mut affected = tracks.iter().filter(|track| applies(track));
@@ -371,5 +369,5 @@ fn notes(columns: &TrackColumns, vehicles: &[Vehicle], tracks: &[Track]) -> Vec<
 /// Bytes of the shortest line: eight columns of one digit.
 const MIN_ROW_BYTES: u64 = 16;
 
-/// Way backwards, in metres, that is more than noise of a standing vehicle.
+/// Minimum backward distance, m, that is not noise of a stationary vehicle.
 const BACKWARDS_M: f64 = 5.0;

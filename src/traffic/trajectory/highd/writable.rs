@@ -1,4 +1,4 @@
-//! What a recording must be so that the format can hold it, and what of it the format keeps.
+//! Requirements of the format on a recording, and the values that it preserves.
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
@@ -7,16 +7,15 @@ use super::precision::Precision;
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
-/// Changes a recording into what would be read back from its own files: with `q` the quantized recording,
-/// reading what [`write`](super::write) wrote of `q` gives `q` bit for bit, at the same precision.
+/// Rounds a recording to the values that its own files hold: writing the quantized recording with
+/// [`write`](super::write) and reading it gives the same bits, at the same precision.
 ///
-/// Every value goes the writer's and the reader's way (transform, round to the decimals, transform back)
-/// until that changes nothing more.
+/// Every value is transformed, rounded to the decimals and transformed back until it no longer changes.
 ///
 /// # Errors
 /// If the format cannot hold the recording, see [`write`](super::write).
 pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
-    let layout = Layout::of(recording, precision)?;
+    let layout = ImageLayout::of(recording, precision)?;
     let settle = |values: &mut [f64], to_file: &dyn Fn(f64) -> f64, from_file: &dyn Fn(f64) -> f64| {
         for value in values {
             // Twice is enough: fl(fl(a + h) − h) is a fixed point of its own repetition (Knuth, The Art of
@@ -49,8 +48,8 @@ pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
     Ok(())
 }
 
-/// The image a recording becomes: which half each carriageway is, and its lane lines from top to bottom.
-pub(super) struct Layout {
+/// The image of a recording: the half of each carriageway, and its lane lines from top to bottom.
+pub(super) struct ImageLayout {
     /// By index of the carriageway.
     pub directions: Vec<Direction>,
     /// y of the upper lane lines, rounded, ascending; empty without that carriageway.
@@ -61,14 +60,14 @@ pub(super) struct Layout {
     pub lane_numbers: LaneNumbers,
 }
 
-impl Layout {
+impl ImageLayout {
     /// The layout of a recording that the format can hold.
     ///
     /// # Errors
     /// The first reason why it cannot.
     pub fn of(recording: &Recording, precision: Precision) -> Result<Self> {
         check_frame(recording)?;
-        let mut layout = Layout {
+        let mut layout = ImageLayout {
             directions: Vec::new(),
             upper_y: Vec::new(),
             lower_y: Vec::new(),
@@ -77,7 +76,7 @@ impl Layout {
         for carriageway in &recording.carriageways {
             let bad = |problem: &str, help: &str| {
                 let item = format!("recording {}, carriageway `{}`", recording.id, carriageway.name);
-                Error::input(Place::item(item), format!("{problem}; highD files cannot hold it"), help)
+                Error::input(Place::item(item), format!("{problem}; highD files cannot represent it"), help)
             };
             let direction = Direction::BOTH
                 .into_iter()
@@ -120,8 +119,7 @@ impl Layout {
         Ok(layout)
     }
 
-    /// `laneId` of a lane; for [`NO_LANE`] a number that is read as no lane, the true count of lines above
-    /// where possible.
+    /// `laneId` of a lane; for [`NO_LANE`] a number that reads as no lane, if possible the number of lines above.
     pub fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
         self.lane_numbers.id_of(direction, lane).unwrap_or_else(|| {
             let y = direction.leftward(d_m);
@@ -133,7 +131,7 @@ impl Layout {
 }
 
 fn in_range(value: f64) -> bool {
-    // Half, so that a position plus half a length stays readable; false for NaN.
+    // Half of the maximum, so that a position plus half a length stays valid; false for NaN.
     value.abs() <= 0.5 * REAL_LIMIT
 }
 
@@ -148,7 +146,7 @@ fn check_frame(recording: &Recording) -> Result<()> {
         return bad("the frame rate is out of range", "use a rate between 0.01 and 10000 frames per second");
     }
     if recording.carriageways.is_empty() || recording.tracks.is_empty() {
-        return bad("no carriageway or no vehicle; highD files cannot hold it", "add at least one of each");
+        return bad("no carriageway or no vehicle; highD files cannot represent it", "add at least one of each");
     }
     if recording.tracks.array_windows().any(|[a, b]| a.id >= b.id) {
         return bad("the vehicles are not sorted by id, or two have the same", "sort them, each with its own id");
@@ -160,7 +158,11 @@ fn check_tracks(recording: &Recording, precision: Precision) -> Result<()> {
     for track in &recording.tracks {
         if let Some(problem) = track_problem(track, recording, precision) {
             let place = Place::item(format!("recording {}, vehicle {}", recording.id, track.id));
-            return Err(Error::input(place, format!("{problem}; highD files cannot hold it"), "correct the recording"));
+            return Err(Error::input(
+                place,
+                format!("{problem}; highD files cannot represent it"),
+                "correct the recording",
+            ));
         }
     }
     Ok(())
@@ -170,7 +172,7 @@ fn track_problem(track: &Track, recording: &Recording, precision: Precision) -> 
     let series = [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2];
     let size_is_good = |size: f64| in_range(size) && precision.rounded(size) > 0.0;
     if track.carriageway >= recording.carriageways.len() {
-        Some("it drives on a carriageway that is not there")
+        Some("it drives on a carriageway that does not exist")
     } else if !size_is_good(track.length_m) || !size_is_good(track.width_m) {
         Some("its size is not above zero")
     } else if track.is_empty() || track.lane.len() != track.len() || series.iter().any(|s| s.len() != track.len()) {

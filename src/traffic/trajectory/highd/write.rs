@@ -1,5 +1,5 @@
-//! A recording as the three highD files, with every column that the format has. What the internal model
-//! does not hold is computed (neighbours, headways, sight distances) or given by [`RecordingInfo`].
+//! Writes a recording as the three highD files with every column of the format. Neighbours, headways and sight
+//! distances are computed; [`RecordingInfo`] has the other missing values.
 
 use std::fs;
 use std::path::Path;
@@ -9,16 +9,15 @@ use super::frame::Direction;
 use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
 use super::precision::{Precision, push_integer};
-use super::writable::Layout;
+use super::writable::ImageLayout;
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
 
-/// What the files say about a recording beyond its content. The texts must hold no comma, quotation mark
-/// or line end.
+/// Metadata of a recording for its files. The texts must not contain commas, quotation marks or line ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingInfo {
-    /// Number of the place.
+    /// Number of the location.
     pub location_id: u32,
     /// Speed limit, m/s; `None` without limit.
     pub speed_limit_mps: Option<f64>,
@@ -28,7 +27,7 @@ pub struct RecordingInfo {
     pub week_day: String,
     /// Time of day of the first frame, hours and minutes.
     pub start_time: String,
-    /// Decimals of the measured values. Columns computed for the format's sake have two at any precision.
+    /// Decimals of the measured values. Computed columns always have two.
     pub precision: Precision,
 }
 
@@ -48,8 +47,8 @@ impl Default for RecordingInfo {
 /// Writes a recording into `dir` (made if it is not there) as `NN_tracks.csv`, `NN_tracksMeta.csv` and
 /// `NN_recordingMeta.csv` with NN the recording's id, in place of files of these names.
 ///
-/// [`read`](super::read) gives the recording back up to the decimals of `info.precision`, and bit for bit
-/// after [`quantize`](super::quantize). All three files are complete before the first gets its name.
+/// [`read`](super::read) returns the recording rounded to the decimals of `info.precision`, and bit for bit after
+/// [`quantize`](super::quantize). All three files are complete before the first gets its name.
 ///
 /// `dhw` is the gap from bumper to bumper (never negative), `thw` = dhw / speed, `ttc` = dhw / closing
 /// speed (negative where the gap opens); all 0 without a preceding vehicle.
@@ -59,8 +58,8 @@ impl Default for RecordingInfo {
 /// that are not finite, …) or the system refuses to write.
 pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<()> {
     let staged = stage(dir, recording, info)?;
-    // An older recording of the same name loses its main file first and the new one gets it last: a crash
-    // in between leaves a recording that is incomplete for everyone to see, never a mixture.
+    // The main file of an older recording with the same name is removed first, and the new one is written last. A
+    // crash in between leaves a visibly incomplete recording, never a mixture.
     let tracks = HighdFiles::named(dir, &recording.id).tracks;
     if tracks.exists() {
         fs::remove_file(&tracks).map_err(|source| Error::io(&tracks, "replace", source))?;
@@ -68,12 +67,12 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
     staged.into_iter().try_for_each(StagedFile::publish)
 }
 
-/// The three files of a recording, complete, without their names; that of the tracks comes last.
+/// The three complete temporary files of a recording; that of the tracks comes last.
 ///
 /// # Errors
 /// As [`write`].
 pub(crate) fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
-    let layout = Layout::of(recording, info.precision)?;
+    let layout = ImageLayout::of(recording, info.precision)?;
     check_texts(info)?;
     fs::create_dir_all(dir).map_err(|source| Error::io(dir, "create the folder", source))?;
     let files = HighdFiles::named(dir, &recording.id);
@@ -99,12 +98,12 @@ fn check_texts(info: &RecordingInfo) -> Result<()> {
 
 struct Writer<'a> {
     recording: &'a Recording,
-    layout: Layout,
+    layout: ImageLayout,
     info: &'a RecordingInfo,
     extent: Extent,
 }
 
-/// The stretch of the image that the boxes of all vehicles cover, m.
+/// The range of the image that the boxes of all vehicles cover, m.
 struct Extent {
     left: f64,
     right: f64,
@@ -125,7 +124,7 @@ impl Extent {
     }
 }
 
-/// Headways of one instant. What is not defined is written as 0, as highD does without a preceding vehicle.
+/// Headways of one instant. Undefined ones are written as 0, as in highD without a preceding vehicle.
 #[derive(Default)]
 struct Headways {
     dhw_m: f64,
@@ -136,7 +135,7 @@ struct Headways {
     preceding_v_s_mps: f64,
 }
 
-/// Least headways of one vehicle; `None` if it never follows another.
+/// Minimum headways of one vehicle; `None` if it never follows another.
 #[derive(Default, Clone)]
 struct Summary {
     min_dhw_m: Option<f64>,
@@ -163,7 +162,7 @@ impl Writer<'_> {
         file.append(header(&TRACKS_COLUMNS).as_bytes())?;
         let around = neighbours(self.recording);
         let mut summaries = vec![Summary::default(); self.recording.tracks.len()];
-        let mut line = Line::new(self.info.precision);
+        let mut line = CsvLine::new(self.info.precision);
         for ((track, around), summary) in self.recording.tracks.iter().zip(&around).zip(&mut summaries) {
             for (sample, around) in around.iter().enumerate() {
                 let headways = self.headways(track, sample, around);
@@ -177,13 +176,12 @@ impl Writer<'_> {
         Ok((file.stage()?, summaries))
     }
 
-    fn track_line(&self, line: &mut Line, track: &Track, sample: usize, around: &Around, headways: &Headways) {
+    fn track_line(&self, line: &mut CsvLine, track: &Track, sample: usize, around: &Around, headways: &Headways) {
         let direction = self.direction(track);
         let (s_m, d_m) = (track.s_m[sample], track.d_m[sample]);
         line.integer(track.first_frame + sample as i64);
         line.integer(i64::from(track.id));
-        // The format's box is that of the image: its width is the vehicle's length, which is the rounded
-        // one to whoever reads it.
+        // The box belongs to the image: its width is the vehicle's length, rounded as a reader sees it.
         let length_m = self.info.precision.rounded(track.length_m);
         let width_m = self.info.precision.rounded(track.width_m);
         line.measured(direction.x_of(s_m, length_m));
@@ -217,7 +215,7 @@ impl Writer<'_> {
         line.integer(self.layout.lane_id(direction, track.lane[sample], d_m));
     }
 
-    /// Slope of the lateral speed over the samples beside this one, m/s².
+    /// Slope of the lateral speed between the neighbouring samples, m/s².
     fn leftward_acceleration(&self, track: &Track, sample: usize) -> f64 {
         let (from, to) = (sample.saturating_sub(1), (sample + 1).min(track.len() - 1));
         if from == to {
@@ -241,7 +239,7 @@ impl Writer<'_> {
     fn tracks_meta(&self, path: &Path, summaries: &[Summary]) -> Result<StagedFile> {
         let mut file = AtomicFile::create_inside(path)?;
         file.append(header(&TRACKS_META_COLUMNS).as_bytes())?;
-        let mut line = Line::new(self.info.precision);
+        let mut line = CsvLine::new(self.info.precision);
         for (track, summary) in self.recording.tracks.iter().zip(summaries) {
             line.integer(i64::from(track.id));
             line.measured(track.length_m);
@@ -274,8 +272,8 @@ impl Writer<'_> {
         let first = tracks.iter().map(|track| track.first_frame).min().unwrap_or(0);
         let last = tracks.iter().map(Track::last_frame).max().unwrap_or(0);
         let trucks = tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
-        let mut line = Line::new(self.info.precision);
-        // The format's id is a number; the name of the files is what identifies the recording.
+        let mut line = CsvLine::new(self.info.precision);
+        // The format's id is a number; the file name identifies the recording.
         line.integer(id.parse::<u32>().map_or(1, i64::from));
         line.text(&frame_rate_hz.to_string());
         line.integer(i64::from(self.info.location_id));
@@ -303,26 +301,26 @@ impl Writer<'_> {
     }
 }
 
-/// Speeds below this give no headway in time: a division by them would say nothing. m/s.
+/// Minimum speed of a time headway, m/s.
 const STANDSTILL_MPS: f64 = 1e-3;
 
 fn driven_m(track: &Track) -> f64 {
     track.s_m.last().zip(track.s_m.first()).map_or(0.0, |(last, first)| (last - first).abs())
 }
 
-/// One line of a file, field by field; its buffer is used again.
-struct Line {
+/// One line of a file, written field by field into a reused buffer.
+struct CsvLine {
     bytes: Vec<u8>,
     precision: Precision,
     ended: bool,
 }
 
-impl Line {
+impl CsvLine {
     fn new(precision: Precision) -> Self {
-        Line { bytes: Vec::with_capacity(256), precision, ended: true }
+        CsvLine { bytes: Vec::with_capacity(256), precision, ended: true }
     }
 
-    /// The place for the next field.
+    /// The buffer at the next field.
     fn field(&mut self) -> &mut Vec<u8> {
         if self.ended {
             self.bytes.clear();
@@ -351,7 +349,7 @@ impl Line {
         }
     }
 
-    /// A value that only completes the format.
+    /// A value that is not read back.
     fn computed(&mut self, value: f64) {
         Precision::Hundredths.push(self.field(), value);
     }

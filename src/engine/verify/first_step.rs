@@ -1,35 +1,35 @@
-//! Scenes on a threshold: the numbers of a first step, solved in f32 so that both sides of one comparison are
-//! equal, and the lane records that begin with exactly these numbers.
+//! Cases on a threshold: the numbers of a first step, solved in f32 so that both sides of one comparison are equal,
+//! and the lane records that begin with these numbers.
 
 use super::decision::{HEADWAYS, Threshold};
-use super::draw::{Draw, Purpose};
-use super::series::{Across, Series, TINY, rounded};
+use super::draw::{CaseRandom, Purpose};
+use super::series::{LateralStart, TINY, ThresholdSeries, rounded};
 use super::solve::{hit, next_other, turn};
-use crate::engine::{Constants, LaneCase, LaneOther, NO_STEP, Start};
+use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP, Start};
 use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::model::driver::{DriverModel, MODELS, View};
 use crate::model::flag::Flag;
 use crate::model::profile::Profile;
 use crate::scenario::{Category, Lateral, Motion, Tables};
 
-/// Neighbours of gap 0 where 2⁻³² cannot be had (behind a start of 10 m): one ULP of 10 m.
+/// Neighbours of gap 0 for starts of 10 m, where 2⁻³² is too small: one ULP of 10 m.
 const SMALL: f32 = 1.0 / (1 << 20) as f32;
 /// Tries per unit: not every speed has a gap that f32 hits exactly.
 const TRIES: usize = 64;
-/// Farther than any threshold, m.
+/// A gap beyond any threshold, m.
 const FAR: f32 = 600.0;
 
-/// Scenes of all units.
-pub(super) struct Scenes {
+/// Cases of all units.
+pub(super) struct ThresholdCases {
     seed: u64,
     profile: Profile,
     categories: Vec<Category>,
     /// One per category.
     constants: Vec<Constants<f32>>,
-    series: Series,
+    series: ThresholdSeries,
 }
 
-/// The first step of a lane, with what decides later ones.
+/// The first step of a lane, with the data of later ones.
 #[derive(Debug, Clone, Copy)]
 struct FirstStep {
     v_ego: f32,
@@ -45,39 +45,41 @@ struct FirstStep {
     horizon: u32,
     /// Index of the headway that the gap is solved for.
     start: usize,
-    /// 0 alone, 1 before a second vehicle that does not matter, 2 behind one.
+    /// 0 alone, 1 before a second vehicle without effect, 2 behind one.
     pairing: u64,
 }
 
-impl Scenes {
-    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> Scenes {
-        Scenes {
+impl CaseSource for ThresholdCases {
+    /// A pure function of seed, category, unit and side.
+    fn case(&self, block: usize, unit: u64, side: usize) -> LaneCase<f64> {
+        let draw = |attempt| CaseRandom::new(Purpose::Threshold, self.seed, self.categories[block], unit, attempt);
+        let exact = (0..TRIES).find_map(|attempt| {
+            let cases = self.cases(&mut draw(attempt), block, unit)?;
+            let offsets = cases.map(|first_step| self.gap_offset(&first_step, block));
+            offsets.iter().all(Option::is_some).then_some(())?;
+            Some(self.record(&cases[side], offsets[side]?))
+        });
+        // Without an exact solution the unit is still an ordinary lane.
+        exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, LateralStart::Ahead), 10.0))
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.series.tables
+    }
+}
+
+impl ThresholdCases {
+    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> ThresholdCases {
+        ThresholdCases {
             seed,
             profile: profile.clone(),
             categories: categories.to_vec(),
             constants: categories.iter().map(|&c| Constants::resolve(profile, c)).collect(),
-            series: Series::new(seed, profile.frame.dt_s),
+            series: ThresholdSeries::new(seed, profile.frame.dt_s),
         }
     }
 
-    pub fn tables(&self) -> &Tables<f64> {
-        &self.series.tables
-    }
-
-    /// A pure function of seed, category, unit and side.
-    pub fn case(&self, block: usize, unit: u64, side: usize) -> LaneCase<f64> {
-        let draw = |attempt| Draw::new(Purpose::Threshold, self.seed, self.categories[block], unit, attempt);
-        let exact = (0..TRIES).find_map(|attempt| {
-            let scenes = self.scenes(&mut draw(attempt), block, unit)?;
-            let offsets = scenes.map(|scene| self.gap_offset(&scene, block));
-            offsets.iter().all(Option::is_some).then_some(())?;
-            Some(self.record(&scenes[side], offsets[side]?))
-        });
-        // Without an exact scene the unit is still an ordinary lane.
-        exact.unwrap_or_else(|| self.record(&self.base(&mut draw(TRIES), unit, Across::Ahead), 10.0))
-    }
-
-    fn base(&self, draw: &mut Draw, unit: u64, across: Across) -> FirstStep {
+    fn base(&self, draw: &mut CaseRandom, unit: u64, across: LateralStart) -> FirstStep {
         let turn = unit / Threshold::ALL.len() as u64;
         let motion = self.series.motion(draw, (turn % 4) as u32, across);
         let v_other = motion.cast::<f32>().speed(&self.series.lane_tables, 0);
@@ -91,7 +93,7 @@ impl Scenes {
             motion,
             attend_from: 0,
             present_from: 0,
-            // Half of the vehicles are there for one step only: then that step alone decides.
+            // Half of the vehicles are present for one step only, so that this step alone decides.
             present_until: if draw.chance(0.5) { 1 } else { NO_STEP },
             horizon: draw.below(60) as u32,
             start: draw.below(HEADWAYS.len()),
@@ -99,20 +101,20 @@ impl Scenes {
         }
     }
 
-    /// The scene on its threshold and its two neighbours; `None` where these numbers have none.
-    fn scenes(&self, draw: &mut Draw, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
+    /// The case on its threshold and its two neighbours; `None` if these numbers have no exact solution.
+    fn cases(&self, draw: &mut CaseRandom, block: usize, unit: u64) -> Option<[FirstStep; 3]> {
         let threshold = Threshold::of_unit(unit);
         let across = match threshold {
             Threshold::Reg157Gate | Threshold::CchdmGate | Threshold::RssLateral => {
-                [Across::Coming, Across::Beside][draw.below(2)]
+                [LateralStart::Coming, LateralStart::Beside][draw.below(2)]
             }
-            Threshold::LateralGap | Threshold::EgoWidth => [Across::Coming, Across::Beside][draw.below(2)],
-            Threshold::FsmGate | Threshold::LateralEvent => Across::Coming,
-            Threshold::LateralSpeed => Across::Beside,
-            Threshold::Centres => [Across::Ahead, Across::Beside][draw.below(2)],
-            _ => Across::Ahead,
+            Threshold::LateralGap | Threshold::EgoWidth => [LateralStart::Coming, LateralStart::Beside][draw.below(2)],
+            Threshold::FsmGate | Threshold::LateralEvent => LateralStart::Coming,
+            Threshold::LateralSpeed => LateralStart::Beside,
+            Threshold::Centres => [LateralStart::Ahead, LateralStart::Beside][draw.below(2)],
+            _ => LateralStart::Ahead,
         };
-        let scene = self.base(draw, unit, across);
+        let first_step = self.base(draw, unit, across);
         match threshold {
             Threshold::Attention
             | Threshold::Appearance
@@ -120,25 +122,31 @@ impl Scenes {
             | Threshold::SpeedEvent
             | Threshold::LateralEvent
             | Threshold::Horizon
-            | Threshold::StepCap => self.in_time(draw, block, threshold, scene),
+            | Threshold::StepCap => self.in_time(draw, block, threshold, first_step),
             Threshold::Reg157Gate
             | Threshold::CchdmGate
             | Threshold::RssLateral
             | Threshold::LateralSpeed
             | Threshold::LateralGap
-            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, scene),
-            _ => self.along_the_road(draw, block, threshold, scene),
+            | Threshold::EgoWidth => self.across_the_road(draw, block, threshold, first_step),
+            _ => self.along_the_road(draw, block, threshold, first_step),
         }
     }
 
-    /// Thresholds that a gap or the ego's speed meets.
-    fn along_the_road(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
+    /// Thresholds that are reached by the gap or the ego's speed.
+    fn along_the_road(
+        &self,
+        draw: &mut CaseRandom,
+        block: usize,
+        on: Threshold,
+        mut s: FirstStep,
+    ) -> Option<[FirstStep; 3]> {
         let constants = &self.constants[block];
         let criteria = &constants.criteria;
         let dv = s.v_ego - s.v_other;
-        // The smallest gap that matters: centres side by side.
+        // The smallest relevant gap: centres side by side.
         let nearest = -s.half_lengths;
-        let signed = |draw: &mut Draw, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
+        let signed = |draw: &mut CaseRandom, gap: f32| if gap < -nearest && draw.chance(0.25) { -gap } else { gap };
         let judged = |gap: f32| criteria.btn.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, dv, true);
         let fsm = &constants.fsm;
         s.gap = match on {
@@ -160,7 +168,7 @@ impl Scenes {
             Threshold::CfsSafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) > 0.0)?.1,
             Threshold::CfsUnsafe => turn(nearest, FAR, |gap| fsm.cfs(s.v_ego, s.v_other, gap, 0.0) >= 1.0)?.0,
             Threshold::FsmGate => {
-                // A gap well inside PFS, then the width that closes the gate about there.
+                // A gap well inside PFS, then a width near the threshold of the gate.
                 let reach = turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.0;
                 let about = rounded(draw.between(0.1, 0.8)) * reach;
                 let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
@@ -188,7 +196,7 @@ impl Scenes {
             }
             Threshold::EqualSpeeds => {
                 s.v_ego = s.v_other;
-                // At gap 0 one ULP of closing speed is a danger; at larger gaps only the FSM looks.
+                // At gap 0 one ULP of closing speed is unsafe; at larger gaps only for FSM.
                 s.gap = if draw.chance(0.5) { 0.0 } else { s.gap };
                 let at = |v_ego: f32| FirstStep { v_ego, ..s };
                 return Some([at(s.v_ego), at(s.v_ego.next_down()), at(s.v_ego.next_up())]);
@@ -208,7 +216,7 @@ impl Scenes {
             .then(|| [s.gap, s.gap.next_down(), s.gap.next_up()].map(|gap| FirstStep { gap, ..s }))
     }
 
-    /// Where both sides are products, the turn may jump over equality: only scenes that meet it count.
+    /// If both sides are products, the decision may change without equality; only exact solutions count.
     fn products_meet(&self, on: Threshold, s: &FirstStep) -> bool {
         let dv = s.v_ego - s.v_other;
         let criteria = &self.profile.criteria;
@@ -228,10 +236,10 @@ impl Scenes {
         }
     }
 
-    /// Thresholds that a width or a lateral speed meets.
+    /// Thresholds that are reached by a width or a lateral speed.
     fn across_the_road(
         &self,
-        draw: &mut Draw,
+        draw: &mut CaseRandom,
         block: usize,
         on: Threshold,
         mut s: FirstStep,
@@ -266,7 +274,7 @@ impl Scenes {
                 return Some([y, y.next_down(), y.next_up()].map(|ego_width| FirstStep { ego_width, ..s }));
             }
             _ => {
-                // With dv = 0 the FSM's gate hangs on the lateral speed alone.
+                // With dv = 0 FSM's gate depends only on the lateral speed.
                 s.v_ego = if draw.chance(0.7) { s.v_other } else { s.v_ego };
                 s.gap = rounded(draw.between(0.5, 5.0));
                 s.half_widths = s.half_widths.min(y - 0.2);
@@ -280,8 +288,8 @@ impl Scenes {
         (width >= 0.2).then(|| widths.map(|half_widths| FirstStep { half_widths, ..s }))
     }
 
-    /// Thresholds that a step meets.
-    fn in_time(&self, draw: &mut Draw, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
+    /// Thresholds that are reached by a step index.
+    fn in_time(&self, draw: &mut CaseRandom, block: usize, on: Threshold, mut s: FirstStep) -> Option<[FirstStep; 3]> {
         let (dt, dt_s) = (self.constants[block].frames[0].dt, self.profile.frame.dt_s);
         let dv = s.v_ego - s.v_other;
         let step = 1 + draw.below(5) as u32;
@@ -289,7 +297,7 @@ impl Scenes {
         s.present_until = NO_STEP;
         match on {
             Threshold::Attention | Threshold::Appearance => {
-                // Every model is afraid 0.4 s before the contact.
+                // For every model 0.4 s before the contact is unsafe.
                 s.gap = dv * (0.4 + dt * step as f32);
                 Some(around(step).map(|step| match on {
                     Threshold::Attention => FirstStep { attend_from: step, ..s },
@@ -313,7 +321,7 @@ impl Scenes {
                 let lateral = s.motion.cast::<f32>().lateral(&self.series.lane_tables, 0);
                 let (start, rate) = (f64::from(lateral.position), f64::from(lateral.towards));
                 let travel = rate * dt_s * f64::from(step);
-                // The RSS looks first where the lateral speed just ends, and its safe distance with it.
+                // RSS becomes safe at the step at which the lateral speed ends.
                 let rss = &self.constants[block].rss;
                 let (still, moving) = (rss.lateral_distance(0.0), rss.lateral_distance(lateral.towards));
                 let h = still + rounded(draw.between(0.1, 0.9)) * (moving - still);
@@ -339,7 +347,8 @@ impl Scenes {
         }
     }
 
-    /// First step at which an ego that keeps its speed touches the vehicle; `None` where it does not soon.
+    /// First step at which an ego that keeps its speed touches the vehicle; `None` if it does not within the searched
+    /// steps.
     fn contact_step(&self, s: &FirstStep, dt: f32) -> Option<u32> {
         let motion = s.motion.cast::<f32>();
         let mut gap = s.gap;
@@ -366,7 +375,7 @@ impl Scenes {
         }
     }
 
-    /// What is added to the headway so that the lane's first gap is the scene's.
+    /// The offset to the headway that gives the lane this first gap.
     fn gap_offset(&self, s: &FirstStep, block: usize) -> Option<f32> {
         let frame = &self.constants[block].frames[0];
         let start = match HEADWAYS[s.start].start::<f32>() {

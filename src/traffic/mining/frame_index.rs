@@ -1,11 +1,10 @@
-//! Who is where at a frame: the vehicles of one carriageway, frame by frame, from rear to front. So an
-//! ego looks at its neighbours only, not at everyone who ever passed.
+//! The vehicles of one carriageway per frame, from rear to front, so that a search visits only the ego's neighbours.
 
 use crate::traffic::trajectory::Recording;
 
 /// One vehicle at one frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbour {
+pub(super) struct VehicleAtFrame {
     /// Centre along the road, m.
     pub s_m: f64,
     /// Index into [`Recording::tracks`].
@@ -15,25 +14,25 @@ pub(super) struct Neighbour {
 }
 
 /// The vehicles of one carriageway at every frame, ascending by position along the road.
-pub(super) struct Neighbours {
+pub(super) struct FrameIndex {
     /// First slot of each track of the recording (unused for tracks of other carriageways). A track has
     /// no gaps, so its sample `k` is in slot `base + k`.
     base: Vec<usize>,
-    /// Where each slot's entries begin; one more than there are slots.
+    /// Begin of each slot's entries; one more than the number of slots.
     begin: Vec<usize>,
-    entries: Vec<Neighbour>,
+    entries: Vec<VehicleAtFrame>,
 }
 
-impl Neighbours {
-    /// Sorts the tracks of a carriageway by frame and place. Memory is proportional to the samples,
-    /// however far apart the frame numbers are.
+impl FrameIndex {
+    /// Sorts the tracks of a carriageway by frame and position. Memory is proportional to the samples, for any
+    /// distance of the frame numbers.
     pub fn new(recording: &Recording, carriageway: usize) -> Self {
         let tracks = &recording.tracks;
         let mut order: Vec<usize> =
             (0..tracks.len()).filter(|&i| tracks[i].carriageway == carriageway && !tracks[i].is_empty()).collect();
         order.sort_by_key(|&i| (tracks[i].first_frame, i));
 
-        // Frames that no vehicle has get no slot: consecutive tracks either overlap or start a new block.
+        // Frames without vehicles get no slot: consecutive tracks either overlap or start a new block.
         let mut base = vec![0; tracks.len()];
         let (mut slots, mut block_slot, mut block_frame, mut block_last) = (0, 0, 0, i64::MIN);
         for &i in &order {
@@ -55,23 +54,23 @@ impl Neighbours {
             begin[slot + 1] += begin[slot];
         }
         let mut fill = begin.clone();
-        let mut entries = vec![Neighbour { s_m: 0.0, track: 0, sample: 0 }; begin[slots]];
+        let mut entries = vec![VehicleAtFrame { s_m: 0.0, track: 0, sample: 0 }; begin[slots]];
         for &i in &order {
             for (k, &s_m) in tracks[i].s_m.iter().enumerate() {
                 let slot = base[i] + k;
-                entries[fill[slot]] = Neighbour { s_m, track: i as u32, sample: k as u32 };
+                entries[fill[slot]] = VehicleAtFrame { s_m, track: i as u32, sample: k as u32 };
                 fill[slot] += 1;
             }
         }
         for slot in 0..slots {
             entries[begin[slot]..begin[slot + 1]].sort_by(|a, b| a.s_m.total_cmp(&b.s_m).then(a.track.cmp(&b.track)));
         }
-        Neighbours { base, begin, entries }
+        FrameIndex { base, begin, entries }
     }
 
-    /// Everyone on the carriageway at sample `k` of the track with index `track`, that vehicle included,
-    /// whose centre is ahead of `s_m` (by more than nothing) and at most at `s_max_m`; nearest first.
-    pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &Neighbour> {
+    /// All vehicles on the carriageway at sample `k` of the track with index `track`, that vehicle included, whose
+    /// centre is ahead of `s_m` and at most at `s_max_m`; nearest first.
+    pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &VehicleAtFrame> {
         let slot = self.base[track] + k;
         let entries = &self.entries[self.begin[slot]..self.begin[slot + 1]];
         let from = entries.partition_point(|n| n.s_m <= s_m);
@@ -118,7 +117,7 @@ mod tests {
                 track(5, (1 << 60) + 1, vec![7.0]),
             ],
         };
-        let neighbours = Neighbours::new(&recording, 0);
+        let neighbours = FrameIndex::new(&recording, 0);
         let ids = |track: usize, k: usize, s: f64, max: f64| -> Vec<u32> {
             neighbours.ahead(track, k, s, max).map(|n| recording.tracks[n.track as usize].id).collect()
         };
