@@ -20,7 +20,7 @@ use lanesweep::run::sampling::{
     plan_samples, sample_into,
 };
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
 use lanesweep::stats::estimate::{BinomialInterval, StopRule};
@@ -167,7 +167,7 @@ fn density() -> DensityModel {
         DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let scenarios = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios;
-    DensityModel::fit(ParameterizationId::find(Category::CutIn, "2").unwrap(), &scenarios, &facts, &options)
+    DensityModel::fit(Parameterization::find(Category::CutIn, "2").unwrap(), &scenarios, &facts, &options)
         .unwrap()
         .model
 }

@@ -16,7 +16,7 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
     CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
 };
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
 use lanesweep::stats::estimate::{BinomialInterval, StopRule};
@@ -56,7 +56,7 @@ fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityMode
     let facts =
         DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
-    DensityModel::fit(ParameterizationId::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
+    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
 }
 
 fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {

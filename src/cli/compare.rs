@@ -19,7 +19,7 @@ use crate::report::compare::{CompareFile, rates};
 use crate::report::html::PageFigure;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
@@ -177,7 +177,7 @@ impl Compare {
         &self,
         data: &str,
         plan: &LanePlan,
-        ids: &[ParameterizationId],
+        ids: &[Parameterization],
         opened: &Opened,
         before_s: f64,
     ) -> Result<Exit> {

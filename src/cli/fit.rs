@@ -16,7 +16,7 @@ use super::synth::GeneratorFlags;
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::scenario::write_scenarios_to;
 use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use crate::support::files::{check_folder_of, make_folder};
@@ -150,12 +150,12 @@ impl Fit {
     }
 
     /// What is fitted, in the registry's order.
-    fn ids(&self) -> Result<Vec<ParameterizationId>> {
+    fn ids(&self) -> Result<Vec<Parameterization>> {
         self.parameterizations.list(&self.categories.list()?)
     }
 
     /// One file per density, none of them an input.
-    fn files(&self, ids: &[ParameterizationId], configured: &Configured) -> Result<Vec<PathBuf>> {
+    fn files(&self, ids: &[Parameterization], configured: &Configured) -> Result<Vec<PathBuf>> {
         let single = self.is_single();
         if single && ids.len() != 1 {
             return Err(Error::usage(
@@ -164,7 +164,7 @@ impl Fit {
                 "give a folder, or choose one with --parameterizations",
             ));
         }
-        let name = |id: &ParameterizationId| match single {
+        let name = |id: &Parameterization| match single {
             true => self.out.clone(),
             false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
         };

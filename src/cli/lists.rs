@@ -8,7 +8,7 @@ use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::Driven;
 use crate::{Error, Place, Result};
 
@@ -45,7 +45,7 @@ impl ParameterizationsFlag {
     ///
     /// # Errors
     /// As [`parameterizations`].
-    pub fn list(&self, categories: &[Category]) -> Result<Vec<ParameterizationId>> {
+    pub fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
         parameterizations(categories, &self.parameterizations)
     }
 }
@@ -179,15 +179,15 @@ pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
 ///
 /// # Errors
 /// [`Error::Usage`] for one that the categories do not have.
-fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<ParameterizationId>> {
-    let of_categories = || ParameterizationId::ALL.into_iter().filter(|p| categories.contains(&p.category));
+fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Parameterization>> {
+    let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
     let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
     if wanted.is_empty() || wanted.contains(&"all") {
         return Ok(of_categories().collect());
     }
     if let Some(unknown) = wanted.iter().find(|key| of_categories().all(|p| p.key != **key)) {
         let of = |c: &Category| {
-            let keys: Vec<_> = ParameterizationId::of(*c).map(|p| p.key).collect();
+            let keys: Vec<_> = Parameterization::of(*c).map(|p| p.key).collect();
             format!("{}: {}", c.label(), keys.join(" "))
         };
         let names: Vec<&str> = categories.iter().map(|c| c.label()).collect();

@@ -197,7 +197,7 @@ mod tests {
     use crate::run::study::plan_file::{BlockHead, StudyHead};
     use crate::run::study::unit_record;
     use crate::run::study::unit_record::UnitRecords;
-    use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis};
+    use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
     use crate::scenario::{Category, Scenario};
     use crate::stats::density::{Mixture, ParameterSpace};
 
@@ -279,7 +279,7 @@ mod tests {
         for (category, key) in
             [(Category::CutIn, "2"), (Category::CutOut, "a"), (Category::Lvd, "ii"), (Category::CutIn, "6")]
         {
-            let id = ParameterizationId::find(category, key).unwrap();
+            let id = Parameterization::find(category, key).unwrap();
             let reduction = id.coefficients().is_some().then(|| reduction(category, &options));
             let space = ParameterSpace::new(id, &options, reduction.as_ref(), false).unwrap();
             let d = space.dimensions();

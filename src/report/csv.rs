@@ -2,7 +2,7 @@
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{Cell, ClaimResult, Interval, ScoreTable, f1, precision, recall};
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::support::table::cell_text;
 use crate::{Error, Result};
 
@@ -74,7 +74,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
     for category in &scores.categories {
         for cell in category.cells.iter().filter(|c| c.variant > 0) {
             let name = &category.variants[cell.variant];
-            let parameters = ParameterizationId::find(category.category, name)
+            let parameters = Parameterization::find(category.category, name)
                 .map_or(String::new(), |p| p.parameter_count().to_string());
             let c = &cell.counts;
             let end = |pick: fn(Interval) -> f64| number(cell.f1_interval.map(pick));

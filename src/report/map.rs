@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::html::PageFigure;
-use super::map_page::{MapSheet, agreements, outcomes};
+use super::map_sheet::{MapSheet, agreements, outcomes};
 use super::plot::Fill;
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};

@@ -15,7 +15,7 @@ use crate::model::driver::ModelId;
 use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1, published_failures, published_lvd_f1};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ModeShape, ParameterizationId};
+use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
 use serde_json::Value;
 
@@ -186,7 +186,7 @@ fn published() -> Value {
             }))
         })
     });
-    let lvd = ParameterizationId::of(Category::Lvd);
+    let lvd = Parameterization::of(Category::Lvd);
     let f1 = lvd.flat_map(|id| {
         cells().filter_map(move |(model, criterion)| {
             let theirs = published_lvd_f1(&id.key, model, criterion)?;

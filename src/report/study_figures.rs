@@ -8,7 +8,7 @@ use crate::model::driver::ModelId;
 use crate::run::score::{CategoryScores, f1, precision, recall};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ModeShape, ParameterizationId};
+use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.
@@ -201,7 +201,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
 }
 
 /// The mean F1 of every parameterization over the cells that all of them define; none where there is no such cell.
-fn mean_f1(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(ParameterizationId, f64)> {
+fn mean_f1(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(Parameterization, f64)> {
     let variants = 1..scores.variants.len();
     let value = |variant: usize, model: ModelId, criterion: Criterion| {
         scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
@@ -211,7 +211,7 @@ fn mean_f1(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(Parameteriza
         cells.filter(|&(m, c)| variants.clone().all(|variant| value(variant, m, c).is_some())).collect();
     let mean = |variant: usize| {
         let sum: f64 = shared.iter().filter_map(|&(m, c)| value(variant, m, c)).sum();
-        let id = ParameterizationId::find(scores.category, &scores.variants[variant])?;
+        let id = Parameterization::find(scores.category, &scores.variants[variant])?;
         (!shared.is_empty()).then(|| (id, sum / shared.len() as f64))
     };
     variants.clone().filter_map(mean).collect()
@@ -295,7 +295,7 @@ pub fn distributions(category: Category, histograms: &[ParameterHistogram], data
 /// `2: constant acceleration, constant lateral speed`.
 pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
     let key = &scores.variants[variant];
-    ParameterizationId::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description()))
+    Parameterization::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description()))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::tables;
 use crate::model::criterion::Criterion;
 use crate::run::score::{CategoryScores, ClaimVerdict, precision, recall};
 use crate::scenario::Category;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
 use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
@@ -242,7 +242,7 @@ fn shares_table(scores: &CategoryScores) -> PageTable {
 }
 
 fn variants_table(scores: &CategoryScores) -> PageTable {
-    let known = scores.variants.iter().skip(1).filter_map(|key| ParameterizationId::find(scores.category, key));
+    let known = scores.variants.iter().skip(1).filter_map(|key| Parameterization::find(scores.category, key));
     let rows = known.map(|id| {
         vec![id.key.to_string(), id.description(), id.family.name().to_owned(), id.parameter_count().to_string()]
     });

@@ -9,7 +9,7 @@ use crate::run::sampling::{
 };
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
 use crate::stats::estimate::Enough;
 use crate::traffic::mining::counts_text;
@@ -21,7 +21,7 @@ pub struct CompareOptions {
     /// Categories, models, headways, options of the parameterizations.
     pub study: StudyOptions,
     /// Parameterizations that densities are fitted for.
-    pub parameterizations: Vec<ParameterizationId>,
+    pub parameterizations: Vec<Parameterization>,
     /// Samples of each density; every sample runs from every headway.
     pub samples: u64,
     /// Seed of the draws.
@@ -38,7 +38,7 @@ pub struct CompareOptions {
 /// use lanesweep::run::compare::{Compare, CompareOptions};
 /// use lanesweep::run::study::StudyOptions;
 /// use lanesweep::scenario::Category;
-/// use lanesweep::scenario::parameterization::ParameterizationId;
+/// use lanesweep::scenario::parameterization::Parameterization;
 /// # use lanesweep::stats::density::DataFacts;
 /// # use lanesweep::stats::estimate::Enough;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -50,7 +50,7 @@ pub struct CompareOptions {
 /// # let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
 /// let options = CompareOptions {
 ///     study: StudyOptions { headways: vec![Headway::ThwS(0.6)], ..StudyOptions::default() },
-///     parameterizations: ParameterizationId::find(Category::CutIn, "2").into_iter().collect(),
+///     parameterizations: Parameterization::find(Category::CutIn, "2").into_iter().collect(),
 ///     samples: 1000,
 ///     seed: 157,
 ///     enough: Enough::default(),
@@ -188,7 +188,7 @@ impl<'a> Compare<'a> {
     /// One parameterization, with the scenarios that its density leaves out.
     fn parameterization(
         &self,
-        id: ParameterizationId,
+        id: Parameterization,
         counts: &Partial,
         executor: &Executor,
         summary: &mut SweepSummary,

@@ -15,7 +15,7 @@ use crate::run::sampling::weighted_plan::{self, WeightedFacts, WeightedPlan};
 use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
 use crate::run::study::Study;
 use crate::scenario::Category;
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{DataFacts, DensityModel, FitOptions};
 use crate::traffic::mining::{Collection, MiningOptions, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
@@ -34,7 +34,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let profile = Profile::load("paper").unwrap();
     let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
-    let id = ParameterizationId::find(Category::CutIn, "2").unwrap();
+    let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let density = DensityModel::fit(id, &scenarios, &facts, &options).unwrap().model;
     let headway = Headway::ThwS(0.6);
     let plan_options = SamplePlanOptions {

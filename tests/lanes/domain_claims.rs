@@ -5,7 +5,7 @@ use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::{Counting, Real};
-use lanesweep::scenario::parameterization::{ParameterizationId, ParameterizationOptions, TimeGrid, recorded_case};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::scenario::{Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
@@ -172,7 +172,7 @@ fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
     let options = ParameterizationOptions::default();
     for (key, scenario) in pairs {
         let recorded = recorded_case(&scenario, profile.frame.dt_s).unwrap();
-        let id = ParameterizationId::find(scenario.category, key).unwrap();
+        let id = Parameterization::find(scenario.category, key).unwrap();
         let parameterized = id.case(&scenario, profile.frame.dt_s, &options, None).unwrap();
         for model in ModelId::ALL {
             for thw in headways() {
@@ -201,7 +201,7 @@ fn what_a_scenario_holds_beyond_the_time_cap_changes_no_lane_and_takes_no_memory
             scenario(Category::CutOut, waves(24.0), outgoing.clone(), Some(waves(20.0))),
             scenario(Category::Lvd, waves(24.0), vec![0.0; n], None),
         ] {
-            let sinusoid = ParameterizationId::find(Category::Lvd, "ii").unwrap();
+            let sinusoid = Parameterization::find(Category::Lvd, "ii").unwrap();
             let grid = TimeGrid::of(&profile);
             let mut pairs = vec![[TimeGrid::from(grid.dt_s), grid].map(|grid| recorded_case(&scenario, grid).unwrap())];
             if scenario.category == Category::Lvd {

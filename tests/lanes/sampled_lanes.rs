@@ -14,7 +14,7 @@ use lanesweep::run::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, generator_of, generator_of_points, plan_points, plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
@@ -29,7 +29,7 @@ fn scenarios() -> &'static [Scenario] {
     })
 }
 
-fn density(id: ParameterizationId, with_thw: bool) -> DensityModel {
+fn density(id: Parameterization, with_thw: bool) -> DensityModel {
     let facts =
         DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };
@@ -54,7 +54,7 @@ fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 1
 #[test]
 fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
-        for id in ParameterizationId::ALL {
+        for id in Parameterization::ALL {
             let density = density(id.clone(), false);
             let points: Vec<Vec<f64>> = density.kde.points().to_vec();
             let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();
@@ -99,7 +99,7 @@ fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
 
 #[test]
 fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
-    let id = ParameterizationId::find(Category::CutIn, "2").unwrap();
+    let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
     let mixture = density.mixture().unwrap();
@@ -140,7 +140,7 @@ fn draws_have_the_mean_and_the_spread_of_their_mixture_and_stay_valid() {
 #[test]
 fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
-    for id in ParameterizationId::ALL {
+    for id in Parameterization::ALL {
         for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
             let density = density(id.clone(), false);
             let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
@@ -162,7 +162,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
     let Some(backend) = common::device::software_backend() else { return };
     let mut compared = 0;
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
-        for id in ParameterizationId::ALL {
+        for id in Parameterization::ALL {
             for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
                 let n = 400;
                 let density = density(id.clone(), with_thw);
@@ -185,7 +185,7 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
     let profile = Profile::load("paper").unwrap();
     let n = 500;
     for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
-        let id = ParameterizationId::find(id.1, id.0).unwrap();
+        let id = Parameterization::find(id.1, id.0).unwrap();
         let density = density(id.clone(), true);
         let kernels = density.mixture().unwrap();
         // A second mixture of another shape beside: weights and two factors.
@@ -213,7 +213,7 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
 
 #[test]
 fn indices_beyond_32_bits_are_samples_of_their_own() {
-    let id = ParameterizationId::find(Category::CutIn, "1").unwrap();
+    let id = Parameterization::find(Category::CutIn, "1").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
     let plan =
@@ -236,7 +236,7 @@ fn indices_beyond_32_bits_are_samples_of_their_own() {
 
 #[test]
 fn verdicts_of_samples_come_without_their_values_too() {
-    let id = ParameterizationId::find(Category::Lvd, "iv").unwrap();
+    let id = Parameterization::find(Category::Lvd, "iv").unwrap();
     let density = density(id, false);
     let profile = Profile::load("paper").unwrap();
     let plan =
@@ -272,7 +272,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
     };
     let densities: Vec<DensityModel> = [(Category::CutIn, "1"), (Category::CutOut, "a"), (Category::Lvd, "i")]
         .into_iter()
-        .map(|(category, key)| density(ParameterizationId::find(category, key).unwrap(), false))
+        .map(|(category, key)| density(Parameterization::find(category, key).unwrap(), false))
         .collect();
     let shares = |dt_s: f64| -> Vec<Vec<f64>> {
         let profile = Profile::load("paper").unwrap().with_dt(dt_s).unwrap();
@@ -301,7 +301,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
 
 #[test]
 fn a_plan_has_no_more_samples_than_points() {
-    let density = density(ParameterizationId::find(Category::CutIn, "1").unwrap(), false);
+    let density = density(Parameterization::find(Category::CutIn, "1").unwrap(), false);
     let profile = Profile::load("paper").unwrap();
     let mixture = density.mixture().unwrap();
     let plan = |samples| plan_samples(&density, &mixture, &profile, &options(samples, SampleSource::Sobol));

@@ -12,7 +12,7 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::read_sealed_line;
 use lanesweep::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -172,7 +172,7 @@ fn sampled_lanes_are_the_runs_lanes_too() {
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let mut lanes = 0;
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {
-        let id = ParameterizationId::find(category, key).unwrap();
+        let id = Parameterization::find(category, key).unwrap();
         let density = DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model;
         let options = SamplePlanOptions {
             samples: 5000,

@@ -14,7 +14,7 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
     MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
 };
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -31,7 +31,7 @@ fn density(category: Category, key: &str) -> DensityModel {
     let facts =
         DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
-    DensityModel::fit(ParameterizationId::find(category, key).unwrap(), scenarios(), &facts, &options).unwrap().model
+    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios(), &facts, &options).unwrap().model
 }
 
 /// A folder with a density file in it.

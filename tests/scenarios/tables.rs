@@ -8,7 +8,7 @@ use crate::common::tables::run;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, write_density};
 use lanesweep::support::plausibility::LIMITS;
@@ -127,7 +127,7 @@ fn sampled_rows_are_the_same_in_every_format() {
     let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
     let facts = DataFacts { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
-    let id = ParameterizationId::find(Category::Lvd, "i").unwrap();
+    let id = Parameterization::find(Category::Lvd, "i").unwrap();
     write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();
     for (name, threads) in [("r.csv", "2"), ("r.jsonl", "2"), ("r.parquet", "2"), ("again.parquet", "1")] {
         let args = ["-q", "sample", "d.json", "--samples", "300", "--thw", "0.6,1.2", "--backend", "cpu"];

@@ -6,7 +6,7 @@ use crate::common;
 use std::sync::OnceLock;
 
 use lanesweep::scenario::parameterization::{
-    Family, Kinematic, LaneChange, ParameterizationId, ParameterizationOptions, Reduction, SeriesScale, Sizes,
+    Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, SeriesScale, Sizes,
     SpeedProfile, SvdLateral, Variable, fit_svd,
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
@@ -280,7 +280,7 @@ fn kept(category: Category) -> Vec<&'static Scenario> {
     scenarios().iter().filter(|s| s.category == category && s.kept).collect()
 }
 
-fn space(id: ParameterizationId, options: &ParameterizationOptions, with_thw: bool) -> ParameterSpace {
+fn space(id: Parameterization, options: &ParameterizationOptions, with_thw: bool) -> ParameterSpace {
     let reduction = Reduction::fit(id.category, &kept(id.category), options).unwrap();
     ParameterSpace::new(id, options, Some(&reduction), with_thw).unwrap()
 }
@@ -295,7 +295,7 @@ fn facts() -> DataFacts {
 }
 
 fn model(category: Category, key: &str) -> DensityModel {
-    let id = ParameterizationId::find(category, key).unwrap();
+    let id = Parameterization::find(category, key).unwrap();
     let options = FitOptions { valid_draws: 20_000, representativeness: false, with_thw: true, ..Default::default() };
     DensityModel::fit(id, scenarios(), &facts(), &options).unwrap().model
 }
@@ -357,7 +357,7 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
     for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
         let options = ParameterizationOptions { svd_lateral, ..ParameterizationOptions::default() };
         let mut compared = 0;
-        for id in ParameterizationId::ALL {
+        for id in Parameterization::ALL {
             let space = space(id.clone(), &options, true);
             for scenario in kept(id.category) {
                 let what = format!("{} under {}", scenario.id, id.key);
@@ -386,7 +386,7 @@ fn an_instance_that_no_registry_lists_encodes_and_decodes() {
     let options = ParameterizationOptions::default();
     let kept = kept(Category::Lvd);
     let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
-    let six = ParameterizationId { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
+    let six = Parameterization { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
     let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
     assert_eq!(point.len(), six.parameters(&options).len());
     let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();
@@ -395,14 +395,14 @@ fn an_instance_that_no_registry_lists_encodes_and_decodes() {
     let decoded = six.decode(&point[1..], &Sizes::of(kept[0]), 0.04, &options, Some(&reduction));
     assert!(decoded.is_err(), "without a coefficient");
     let features = Kinematic { speed: SpeedProfile::Constant, lane_change: LaneChange::None };
-    let steady = ParameterizationId { family: Family::Kinematic(features), ..six };
+    let steady = Parameterization { family: Family::Kinematic(features), ..six };
     assert!(steady.encode(kept[0], &options, None).is_err(), "an LVD that does not decelerate");
 }
 
 #[test]
 fn every_kind_of_impossible_point_is_refused_by_its_parameter() {
     let options = ParameterizationOptions::default();
-    let find = |category, key| space(ParameterizationId::find(category, key).unwrap(), &options, true);
+    let find = |category, key| space(Parameterization::find(category, key).unwrap(), &options, true);
     let refused = |space: &ParameterSpace, point: &[f64]| space.check(point).unwrap_err().parameter;
     let two = find(Category::CutIn, "2");
     // v_target, lateral speed, v_ego, acceleration, T, THW
@@ -443,7 +443,7 @@ fn every_kind_of_impossible_point_is_refused_by_its_parameter() {
 fn a_reconstruction_is_refused_where_its_own_duration_speed_or_gap_is_impossible() {
     let options = ParameterizationOptions::default();
     for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "g"), (Category::Lvd, "v")] {
-        let space = space(ParameterizationId::find(category, key).unwrap(), &options, false);
+        let space = space(Parameterization::find(category, key).unwrap(), &options, false);
         let reduction = space.reduction().unwrap();
         let (mut refused, mut clamped) = (std::collections::BTreeSet::new(), 0);
         let stream = Stream { seed: 8, purpose: 3 };
@@ -481,7 +481,7 @@ fn a_reconstruction_is_refused_where_its_own_duration_speed_or_gap_is_impossible
 #[test]
 fn the_valid_share_counts_what_the_density_says() {
     // Ego speeds near 0: the share above it is known of the normal kernels.
-    let id = ParameterizationId::find(Category::CutIn, "3").unwrap();
+    let id = Parameterization::find(Category::CutIn, "3").unwrap();
     let space = ParameterSpace::new(id, &ParameterizationOptions::default(), None, false).unwrap();
     let kde = with_bandwidth(vec![vec![1.0, 0.5], vec![2.0, 3.0]], vec![1.0, 1.0], 1.0);
     let expected = 0.5 * (normal_cdf(1.0) * normal_cdf(0.5) + normal_cdf(2.0) * normal_cdf(3.0));
@@ -593,7 +593,7 @@ fn white_space_may_change_but_lengths_must_fit() {
 
 #[test]
 fn scenarios_without_a_headway_are_left_out_of_a_density_with_it_and_counted() {
-    let id = ParameterizationId::find(Category::CutIn, "1").unwrap();
+    let id = Parameterization::find(Category::CutIn, "1").unwrap();
     let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
     some[0].thw0 = None;
     some[1].target.v[0] = 0.0;

@@ -15,7 +15,7 @@ use lanesweep::run::sampling::{
     CrudeOptions, LaneLimitState, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
     sample_crude, truncated,
 };
-use lanesweep::scenario::parameterization::ParameterizationId;
+use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
@@ -27,7 +27,7 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 const LEVEL: f64 = 0.999;
 
-fn density(id: ParameterizationId, scenarios: &[Scenario]) -> DensityModel {
+fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
     let facts = DataFacts { data: "mined".to_owned(), synthetic: false, scenarios_sha256: String::new(), driven: None };
     // P_valid must be known better than the probabilities: it is in no interval.
     let options = FitOptions { representativeness: false, valid_draws: 4_000_000, ..FitOptions::default() };
@@ -105,7 +105,7 @@ fn rare(density: &DensityModel, profile: &Profile, least: f64, most: f64) -> Opt
 
 fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, samples: u64, n: u64) {
     let profile = Profile::load("paper").unwrap();
-    let id = ParameterizationId::find(category, key).unwrap();
+    let id = Parameterization::find(category, key).unwrap();
     let density = density(id, scenarios);
     let kernels = density.kde.points().len();
     let Some((model, thw_s)) = rare(&density, &profile, 2e-4, 2e-2) else {

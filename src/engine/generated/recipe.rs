@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::engine::lane_case::{LaneCase, LaneOther};
 use crate::model::driver::{AttentionRule, MODELS};
 use crate::model::scalar::Real;
-use crate::scenario::parameterization::{LaneChange, ParameterizationId, SpeedProfile, Variable};
+use crate::scenario::parameterization::{LaneChange, Parameterization, SpeedProfile, Variable};
 use crate::scenario::{Category, Motion};
 
 use super::points::MAX_PARAMETERS;
@@ -32,7 +32,7 @@ pub enum CasePath {
 
 impl CasePath {
     /// That of a parameterization.
-    pub fn of(id: &ParameterizationId) -> CasePath {
+    pub fn of(id: &Parameterization) -> CasePath {
         match id.features().map(|features| features.speed) {
             None => CasePath::Reduced,
             Some(SpeedProfile::Sinusoidal) => CasePath::Sinusoid,
@@ -57,7 +57,7 @@ pub enum LateralPath {
 
 impl LateralPath {
     /// That of a parameterization; unused on reduced paths.
-    pub fn of(id: &ParameterizationId) -> LateralPath {
+    pub fn of(id: &Parameterization) -> LateralPath {
         let is_gradual = id.features().is_some_and(|features| features.lane_change == LaneChange::Gradual);
         match (id.category, is_gradual) {
             (Category::CutIn, true) => LateralPath::Entering,

@@ -9,7 +9,7 @@ use crate::engine::{Constants, LaneCase, NO_STEP, Outcome, Silent, Start};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, recorded_case};
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
 use crate::scenario::{Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
@@ -58,7 +58,7 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
             let case = match param {
                 "S" => recorded_case(scenario, dt_s)?,
                 // One by SVD needs the fit of the study that the table came from.
-                _ => ParameterizationId::find(scenario.category, param)
+                _ => Parameterization::find(scenario.category, param)
                     .filter(|id| id.features().is_some())
                     .ok_or_else(|| {
                         let problem =

@@ -1,5 +1,6 @@
 //! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
 
+use super::svg::Place;
 use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
@@ -219,6 +220,29 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
 pub(in crate::report) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
+}
+
+/// Where values are: on two axes, or at a turn (x) and radius (y) around a centre.
+pub(super) struct Axes {
+    pub x: Axis,
+    pub y: Axis,
+    pub centre: Option<Place>,
+}
+
+impl Axes {
+    pub fn at(&self, (x, y): (f64, f64)) -> Place {
+        let place = (self.x.at(x), self.y.at(y));
+        self.centre.map_or(place, |centre| on_circle(centre, place.1, place.0))
+    }
+
+    pub fn shows(&self, (x, y): (f64, f64)) -> bool {
+        self.x.shows(x) && self.y.shows(y)
+    }
+}
+
+/// The point at `turn` (radians, clockwise from the top) on a circle.
+pub(super) fn on_circle((x, y): Place, radius: f64, turn: f64) -> Place {
+    (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
 }
 
 #[cfg(test)]

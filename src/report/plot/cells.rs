@@ -1,6 +1,6 @@
 //! Cells: rectangles whose colour or hatching says what is in them.
 
-use super::layer::Axes;
+use super::axis::Axes;
 use super::svg::{Canvas, GRID, Paint, Place, WHITE};
 
 const HATCH_GREY: &str = "#9a9a9a";

@@ -1,7 +1,7 @@
 //! What stands around a plot: ticks with their numbers, names, the scale of colours.
 
 use super::axis::Axis;
-use super::layer::on_circle;
+use super::axis::on_circle;
 use super::svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, set};
 use super::{
     ColourBar, HEADING, INDENT_PX, NAME_GAP_PX, NAME_PX, NOTE_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK,

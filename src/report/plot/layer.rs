@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::axis::{Axis, number};
+use super::axis::{Axes, number, on_circle};
 use super::cells::Cells;
 use super::svg::{Anchor, Canvas, GREY, Paint, Place, Type, WHITE, set};
 
@@ -95,29 +95,6 @@ impl Look {
     }
 }
 
-/// The point at `turn` (radians, clockwise from the top) on a circle.
-pub(super) fn on_circle((x, y): Place, radius: f64, turn: f64) -> Place {
-    (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
-}
-
-/// Where values are: on two axes, or at a turn (x) and radius (y) around a centre.
-pub(super) struct Axes {
-    pub x: Axis,
-    pub y: Axis,
-    pub centre: Option<Place>,
-}
-
-impl Axes {
-    pub fn at(&self, (x, y): (f64, f64)) -> Place {
-        let place = (self.x.at(x), self.y.at(y));
-        self.centre.map_or(place, |centre| on_circle(centre, place.1, place.0))
-    }
-
-    fn shows(&self, value: &Value) -> bool {
-        self.x.shows(value.x) && self.y.shows(value.y)
-    }
-}
-
 /// How the values of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
@@ -152,6 +129,12 @@ pub struct Value {
 impl From<(f64, f64)> for Value {
     fn from((x, y): (f64, f64)) -> Self {
         Value { x, y, ..Value::default() }
+    }
+}
+
+impl Value {
+    fn place(&self) -> (f64, f64) {
+        (self.x, self.y)
     }
 }
 
@@ -240,7 +223,7 @@ impl Series {
     /// last value has the first as its neighbour.
     fn runs<'a>(&'a self, axes: &Axes) -> Vec<(Vec<&'a Value>, bool)> {
         let shown: Vec<Option<&Value>> =
-            self.values.iter().map(|value| Some(value).filter(|value| axes.shows(value))).collect();
+            self.values.iter().map(|value| Some(value).filter(|value| axes.shows(value.place()))).collect();
         let first_gap = shown.iter().position(Option::is_none);
         let from = if axes.centre.is_some() { first_gap.unwrap_or(0) } else { 0 };
         let closes = axes.centre.is_some() && first_gap.is_none();
@@ -274,7 +257,7 @@ impl Series {
     pub(super) fn bars_and_line(&self, canvas: &mut Canvas, axes: &Axes, look: &Look) {
         for mark in &self.marks {
             let Mark::Bars(width) = mark else { continue };
-            for value in self.values.iter().filter(|value| axes.shows(value) && value.y != 0.0) {
+            for value in self.values.iter().filter(|value| axes.shows(value.place()) && value.y != 0.0) {
                 let (from, to) = ((value.x - width / 2.0, 0.0), (value.x + width / 2.0, value.y));
                 let paint = Paint { stroke: Some((WHITE, 0.8)), ..Paint::fill(look.colour) };
                 canvas.rect(axes.at(from), axes.at(to), paint);
@@ -306,12 +289,13 @@ impl Series {
         quantities: (&str, &str),
         taken: &mut Vec<(f64, f64, f64)>,
     ) {
-        let is_shown = |k: Option<usize>| k.and_then(|k| self.values.get(k)).is_some_and(|value| axes.shows(value));
+        let is_shown =
+            |k: Option<usize>| k.and_then(|k| self.values.get(k)).is_some_and(|value| axes.shows(value.place()));
         let is_crowded = self.has(Mark::Line) && self.values.len() > MAX_MARKERS;
         for (k, value) in self.values.iter().enumerate() {
             let attributes = if self.attributes.is_empty() { "class=\"value\"" } else { &self.attributes };
             let own = (if self.is_sideways { value.x } else { value.y }, value.interval.map_or(f64::NAN, |i| i.1));
-            if !axes.shows(value) {
+            if !axes.shows(value.place()) {
                 let axis = if self.is_sideways { &axes.x } else { &axes.y };
                 if let Some((_, upper)) = self.ends(value, axes).filter(|_| own.0 == 0.0 && axis.shows(own.1)) {
                     canvas.group("class=\"limit\"", &value.tip, |canvas| self.limit(canvas, upper, look));
@@ -411,7 +395,7 @@ fn without_inner_points(places: &[Place]) -> Vec<Place> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::AxisScale;
+    use super::super::axis::{Axis, AxisScale};
     use super::*;
 
     #[test]

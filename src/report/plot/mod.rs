@@ -25,8 +25,8 @@ pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, WHITE,
 
 use super::csv;
 use crate::Result;
+use axis::{Axes, on_circle};
 use frame::{colour_bar, numbers_left, spoke_name};
-use layer::{Axes, on_circle};
 
 const WIDTH_PX: f64 = 1000.0;
 const BORDER_PX: f64 = 36.0;

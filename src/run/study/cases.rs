@@ -14,7 +14,7 @@ use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
 use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{
-    ParameterizationId, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
+    Parameterization, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
 };
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
@@ -168,15 +168,15 @@ impl StudyCases {
         let scenario = record.and_then(|record| unit_record::read(record, block.category));
         let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
         let reduction = self.reductions[at].as_ref();
-        let ids: Vec<ParameterizationId> = parameterizations(block.category, reduction.is_some()).collect();
+        let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
         let grid = TimeGrid::of(&self.outline.profile);
         cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)
     }
 }
 
 /// Those of a category, with or without a decomposition.
-pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = ParameterizationId> {
-    ParameterizationId::of(category).filter(move |id| id.features().is_some() || has_reduction)
+pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = Parameterization> {
+    Parameterization::of(category).filter(move |id| id.features().is_some() || has_reduction)
 }
 
 /// Entries of the cases that are in memory at once, at any time step: 2 GiB.
@@ -184,8 +184,8 @@ const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
 
 /// Values in the series of a scenario per step, with its parameterizations: speed, lateral position and lateral speed of
 /// each that is sampled; in a cut-out the speed of the vehicle ahead; an LVD is centred.
-pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = ParameterizationId>) -> f64 {
-    let sampled = ids.filter(ParameterizationId::has_series).count() + 1;
+pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Parameterization>) -> f64 {
+    let sampled = ids.filter(Parameterization::has_series).count() + 1;
     let series = match category {
         Category::CutIn => 3,
         Category::CutOut => 4,
@@ -197,7 +197,7 @@ pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Par
 /// S, then every S', of one scenario.
 fn cases_of(
     scenario: &Scenario,
-    ids: &[ParameterizationId],
+    ids: &[Parameterization],
     reduction: Option<&Reduction>,
     grid: TimeGrid,
     options: &ParameterizationOptions,
@@ -233,7 +233,7 @@ mod tests {
         let (plan, options) = (study.outline(), ParameterizationOptions::default());
         for (at, block) in plan.blocks.iter().enumerate() {
             let reduction = &reductions[at];
-            let ids: Vec<ParameterizationId> = parameterizations(block.category, true).collect();
+            let ids: Vec<Parameterization> = parameterizations(block.category, true).collect();
             let kept = scenarios.iter().filter(|s| s.kept && s.category == block.category);
             for (unit, scenario) in kept.enumerate().step_by(3) {
                 let window = study.window(block.first_unit + unit as u64..block.first_unit + unit as u64 + 1).unwrap();

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::scenario::parameterization::{Parameter, ParameterizationId, ParameterizationOptions, SpeedProfile};
+use crate::scenario::parameterization::{Parameter, Parameterization, ParameterizationOptions, SpeedProfile};
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::ParameterSpace;
 use crate::support::round_step::plain_step;
@@ -39,10 +39,10 @@ pub fn parameter_histograms(
     options: &ParameterizationOptions,
 ) -> Result<Vec<ParameterHistogram>> {
     // Of cut-ins with a recorded start only those without a gradual lane change have a density.
-    let accelerates = |id: &ParameterizationId| {
+    let accelerates = |id: &Parameterization| {
         id.features().is_some_and(|features| features.speed == SpeedProfile::ConstantAcceleration)
     };
-    let ids = ParameterizationId::of(category).filter(accelerates);
+    let ids = Parameterization::of(category).filter(accelerates);
     let Some(space) = ids.filter_map(|id| ParameterSpace::new(id, options, None, false).ok()).next() else {
         return Ok(Vec::new());
     };

@@ -9,7 +9,7 @@ use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::unit_record::{self, UnitRecords};
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, SvdBasis};
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, problem_of};
 use crate::support::hex::hex;
 use crate::{Error, Place, Result};
@@ -44,7 +44,7 @@ pub(crate) struct BlockHead {
 impl BlockHead {
     /// Of the decomposition, what cases are made with.
     pub fn new(category: Category, units: u64, reduction: Option<&Reduction>) -> BlockHead {
-        let used = ParameterizationId::max_coefficients(category);
+        let used = Parameterization::max_coefficients(category);
         let basis = reduction.map(|reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();
             let directions = directions.into_iter().take(used).collect();
@@ -117,7 +117,7 @@ impl StudyHead {
             return wrong("a headway is out of range (0 to 1e6)");
         }
         for block in &self.blocks {
-            let used = ParameterizationId::max_coefficients(block.category);
+            let used = Parameterization::max_coefficients(block.category);
             if block.basis.as_ref().is_some_and(|basis| basis.directions.len() != used) {
                 return wrong("a decomposition does not have the directions of its parameterizations");
             }

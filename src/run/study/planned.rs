@@ -14,7 +14,7 @@ use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
 use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
-use crate::scenario::parameterization::ParameterizationId;
+use crate::scenario::parameterization::Parameterization;
 use crate::support::hex::sha256;
 use crate::support::input_file;
 use crate::support::run_dir::Results;
@@ -279,7 +279,7 @@ impl Study {
 fn check_variants(plan: &LanePlan, place: &Place) -> Result<()> {
     for block in &plan.blocks {
         for (at, name) in block.variants.iter().enumerate() {
-            let is_known = if at == 0 { name == "S" } else { ParameterizationId::find(block.category, name).is_some() };
+            let is_known = if at == 0 { name == "S" } else { Parameterization::find(block.category, name).is_some() };
             if !is_known || block.variants[..at].contains(name) {
                 let problem = format!("`{name}` is no variant {at} of a {} study", block.category.label());
                 return Err(crate::Error::input(place.clone(), problem, AGAIN));

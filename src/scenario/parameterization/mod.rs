@@ -4,8 +4,8 @@
 //! value decomposition. Here lives nothing about headways, models or verdicts. Scenarios come from
 //! [`crate::scenario`]; cases go to [`crate::engine`].
 //!
-//! A [`ParameterizationId`] is data: all that others ask of it (parameters, description, encoding, decoding) follows
-//! from its category and its [`Family`]. To add one of a known family: a line in [`ParameterizationId::ALL`].
+//! A [`Parameterization`] is data: all that others ask of it (parameters, description, encoding, decoding) follows
+//! from its category and its [`Family`]. To add one of a known family: a line in [`Parameterization::ALL`].
 
 mod kinematic;
 mod options;
@@ -53,7 +53,7 @@ impl Family {
 
 /// The specification of one parameterization.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct ParameterizationId {
+pub struct Parameterization {
     /// Kind of scenario.
     pub category: Category,
     /// Name, unique in its category; in the paper `1`…`7`, `a`…`g`, `i`…`v`.
@@ -67,18 +67,18 @@ const fn kinematic(
     key: &'static str,
     speed: SpeedProfile,
     lane_change: LaneChange,
-) -> ParameterizationId {
+) -> Parameterization {
     let family = Family::Kinematic(Kinematic { speed, lane_change });
-    ParameterizationId { category, key: Cow::Borrowed(key), family }
+    Parameterization { category, key: Cow::Borrowed(key), family }
 }
 
-const fn svd(category: Category, key: &'static str, coefficients: usize) -> ParameterizationId {
-    ParameterizationId { category, key: Cow::Borrowed(key), family: Family::Svd(coefficients) }
+const fn svd(category: Category, key: &'static str, coefficients: usize) -> Parameterization {
+    Parameterization { category, key: Cow::Borrowed(key), family: Family::Svd(coefficients) }
 }
 
-impl ParameterizationId {
+impl Parameterization {
     /// The paper's 19, in the order of every table.
-    pub const ALL: [ParameterizationId; 19] = {
+    pub const ALL: [Parameterization; 19] = {
         use Category::{CutIn, CutOut, Lvd};
         use LaneChange::{Gradual, Instantaneous, None};
         use SpeedProfile::{Constant, ConstantAcceleration, Sinusoidal};
@@ -106,12 +106,12 @@ impl ParameterizationId {
     };
 
     /// Those of one category, in order.
-    pub fn of(category: Category) -> impl Iterator<Item = ParameterizationId> {
+    pub fn of(category: Category) -> impl Iterator<Item = Parameterization> {
         Self::ALL.into_iter().filter(move |p| p.category == category)
     }
 
     /// By category and name.
-    pub fn find(category: Category, key: &str) -> Option<ParameterizationId> {
+    pub fn find(category: Category, key: &str) -> Option<Parameterization> {
         Self::of(category).find(|p| p.key == key)
     }
 
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn counts_names_and_descriptions_follow_from_the_features() {
         let told = |category, key| {
-            let id = ParameterizationId::find(category, key).unwrap();
+            let id = Parameterization::find(category, key).unwrap();
             let parameters = id.parameters(&ParameterizationOptions::default());
             let names: Vec<String> = parameters.into_iter().map(|p| p.name).collect();
             format!("{}: {}: {}", id.parameter_count(), id.description(), names.join(" "))

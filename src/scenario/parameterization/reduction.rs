@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ParameterizationId;
+use super::Parameterization;
 use super::options::{ParameterizationOptions, SvdLateral};
 use super::parameter::{MIN_DURATION_S, Variable};
 use super::series::{SeriesCase, TimeGrid, at};
@@ -69,7 +69,7 @@ impl Reduction {
     /// Fits on scenarios of one category. Needs more scenarios than the largest number of coefficients.
     pub fn fit(category: Category, scenarios: &[&Scenario], options: &ParameterizationOptions) -> Result<Reduction> {
         let rows = scenarios.iter().map(|s| vector(s, options)).collect::<Result<Vec<_>>>()?;
-        let needed = ParameterizationId::max_coefficients(category);
+        let needed = Parameterization::max_coefficients(category);
         let name = format!("{} scenarios", category.label());
         let series = layout(category).0.len();
         let basis = fit_svd(&rows, series, options.svd_instants, needed, options.series_scale, &name)?;

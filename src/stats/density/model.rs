@@ -10,7 +10,7 @@ use super::mixture::Mixture;
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
 use super::valid::{VALID_SHARE_DRAWS, ValidShare};
-use crate::scenario::parameterization::{ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdFit};
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
 use crate::{Error, Place, Result};
 
@@ -113,7 +113,7 @@ impl DensityModel {
     /// [`Error::Input`] where there is no kept scenario, fewer than parameters + 1, one parameter is the same in
     /// all, or no draw is valid; [`Error::Usage`] for options that make no parameter space.
     pub fn fit(
-        id: ParameterizationId,
+        id: Parameterization,
         scenarios: &[Scenario],
         facts: &DataFacts,
         options: &FitOptions,
@@ -204,7 +204,7 @@ impl DensityModel {
 
 /// The decomposition, where the parameterization needs one.
 fn reduction(
-    id: &ParameterizationId,
+    id: &Parameterization,
     scenarios: &[Scenario],
     kept: &[&Scenario],
     options: &FitOptions,

@@ -20,7 +20,7 @@ use super::representativeness::Representativeness;
 use super::valid::ValidShare;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{
-    Parameter, ParameterizationId, ParameterizationOptions, Reduction, Sizes, SvdBasis,
+    Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
 use crate::support::atomic_file::AtomicFile;
 use crate::support::hex::hex;
@@ -123,7 +123,7 @@ impl File {
 
     fn model(self, place: &Place) -> Result<DensityModel> {
         let wrong = |column: &str, problem: String| Err(Error::input(place.clone().column(column), problem, REFIT));
-        let Some(id) = ParameterizationId::find(self.category, &self.parameterization) else {
+        let Some(id) = Parameterization::find(self.category, &self.parameterization) else {
             let problem = format!("there is no `{}` of category {}", self.parameterization, self.category.label());
             return wrong("parameterization", problem);
         };

@@ -1,6 +1,6 @@
 //! The space a density lives in: ordered parameters of one parameterization, scenario → point, point → case.
 //!
-//! The numbers are those of [`ParameterizationId::parameters`]. A last dimension `thw_s` can hold the observed headway.
+//! The numbers are those of [`Parameterization::parameters`]. A last dimension `thw_s` can hold the observed headway.
 //! Sizes are no parameters.
 //!
 //! **Sides.** Lateral parameters of kinematic parameterizations are sizes. Under the reduction with
@@ -15,7 +15,7 @@
 //! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
 use crate::scenario::parameterization::{
-    Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, ParameterizationId, ParameterizationOptions,
+    Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
     ReducedScenario, Reduction, Sizes, Variable,
 };
 use crate::scenario::{Case, Category, Scenario};
@@ -25,7 +25,7 @@ use crate::{Error, Place, Result};
 /// Ordered parameters of one parameterization.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterSpace {
-    id: ParameterizationId,
+    id: Parameterization,
     options: ParameterizationOptions,
     reduction: Option<Reduction>,
     variables: Vec<Variable>,
@@ -80,7 +80,7 @@ impl ParameterSpace {
     /// [`Error::Usage`] for `lateral_start = recorded` with 1 or 2 (the start would be one more parameter), or
     /// without the decomposition that the parameterization needs.
     pub fn new(
-        id: ParameterizationId,
+        id: Parameterization,
         options: &ParameterizationOptions,
         reduction: Option<&Reduction>,
         with_thw: bool,
@@ -124,7 +124,7 @@ impl ParameterSpace {
     }
 
     /// Category and parameterization.
-    pub fn id(&self) -> &ParameterizationId {
+    pub fn id(&self) -> &Parameterization {
         &self.id
     }
 

@@ -9,7 +9,7 @@ use lanesweep::run::parts::{Journal, Part, seal, write_part};
 use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
-use lanesweep::scenario::parameterization::{ParameterizationId, ParameterizationOptions};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::stats::density::{DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use lanesweep::stats::estimate::{BlockSums, WeightSums};
@@ -132,7 +132,7 @@ impl Seeds {
                 driven: None,
             };
             let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
-            let id = ParameterizationId::find(category, key).unwrap();
+            let id = Parameterization::find(category, key).unwrap();
             DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
         };
         let density = fit(Category::CutIn, "2", 8);
