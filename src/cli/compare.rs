@@ -8,7 +8,7 @@ use clap::Args;
 use super::backend_flags::{BackendFlags, Opened};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun, Part};
+use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
@@ -23,7 +23,7 @@ use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
-use crate::support::run_dir::{COMPARE_RECORD, Results, RunFolder};
+use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
 use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
@@ -132,7 +132,7 @@ impl Compare {
         if self.dry_run {
             return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
         }
-        let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;
+        let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(self.seed);
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
@@ -190,7 +190,7 @@ impl Compare {
         for id in ids {
             let lanes = self.samples.saturating_mul(per_sample);
             let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
-            parts.push(Part { of, what, units: self.samples, lanes });
+            parts.push(ForecastPart { of, what, units: self.samples, lanes });
             whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
         }
         DryRun {

@@ -295,7 +295,7 @@ fn broken(error: clap::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::settings::Kind;
+    use crate::cli::settings::KeyKind;
 
     #[test]
     fn every_flag_that_sets_a_key_exists_with_the_keys_default_and_words() {
@@ -316,7 +316,7 @@ mod tests {
                     assert_eq!(layers.get(name).unwrap().value, key.default.as_ref(), "{name}");
                 }
                 let words: Vec<String> = arg.get_possible_values().iter().map(|v| v.get_name().to_owned()).collect();
-                if let (Kind::Choice(choices), false) = (&key.kind, words.is_empty()) {
+                if let (KeyKind::Choice(choices), false) = (&key.kind, words.is_empty()) {
                     let known: Vec<String> = choices.iter().map(|choice| choice.word.clone()).collect();
                     assert_eq!(words, known, "{name}");
                 }

@@ -111,7 +111,7 @@ fn with_flags(text: &str) -> String {
 /// Draws an error with its help on stderr.
 pub fn complain(error: &Error) {
     let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
-    let report = miette::Report::new(Drawn { text: shown(&with_flags(&error.to_string())).into_owned(), help });
+    let report = miette::Report::new(Diagnostic { text: shown(&with_flags(&error.to_string())).into_owned(), help });
     let mut stderr = io::stderr().lock();
     // Where stderr is gone there is nobody to tell.
     let _ = writeln!(stderr, "{report:?}");
@@ -128,12 +128,12 @@ pub fn refuse(error: &clap::Error) {
 /// A library error as miette draws it.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
-struct Drawn {
+struct Diagnostic {
     text: String,
     help: Option<String>,
 }
 
-impl miette::Diagnostic for Drawn {
+impl miette::Diagnostic for Diagnostic {
     fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
         self.help.as_ref().map(|help| Box::new(help) as Box<dyn std::fmt::Display>)
     }

@@ -12,7 +12,7 @@ use crate::support::readable::{count, value};
 pub(super) const BUDGET: Duration = Duration::from_millis(200);
 
 /// One line of the table of lanes.
-pub(super) struct Part {
+pub(super) struct ForecastPart {
     pub of: String,
     pub what: String,
     pub units: u64,
@@ -23,7 +23,7 @@ pub(super) struct Part {
 pub(super) struct DryRun {
     /// What it would run on.
     pub data: String,
-    pub parts: Vec<Part>,
+    pub parts: Vec<ForecastPart>,
     /// What a part's units are: `scenarios`, `samples`, `cells`.
     pub units: &'static str,
     /// All lanes, or the most that there can be.
@@ -42,11 +42,11 @@ pub(super) struct DryRun {
 }
 
 /// The lanes of a plan by category and variant.
-pub(super) fn parts(plan: &LanePlan) -> Vec<Part> {
+pub(super) fn parts(plan: &LanePlan) -> Vec<ForecastPart> {
     let of_block = |block: &'_ Block| {
         let lanes = block.units.len() * (plan.headways.len() * plan.models.len()) as u64;
         let (of, units) = (block.category.label().to_owned(), block.units.len());
-        let part = move |what: &String| Part { of: of.clone(), what: what.clone(), units, lanes };
+        let part = move |what: &String| ForecastPart { of: of.clone(), what: what.clone(), units, lanes };
         block.variants.iter().map(part).collect::<Vec<_>>()
     };
     plan.blocks.iter().flat_map(of_block).collect()
@@ -62,7 +62,7 @@ impl DryRun {
     }
 
     fn json(&self, now: Option<u64>) -> Result<String> {
-        let part = |Part { of, what, units, lanes }: &Part| serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes});
+        let part = |ForecastPart { of, what, units, lanes }: &ForecastPart| serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes});
         document(&serde_json::json!({
             "data": self.data,
             "lanes": self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add),
@@ -81,11 +81,11 @@ impl DryRun {
         let lanes: u64 = self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
         let most = if self.is_at_most { "at most " } else { "" };
         text += &format!("Lanes   {most}{}\n", count(lanes));
-        let wide = |of: &dyn Fn(&Part) -> usize| self.parts.iter().map(of).max().unwrap_or(0);
+        let wide = |of: &dyn Fn(&ForecastPart) -> usize| self.parts.iter().map(of).max().unwrap_or(0);
         let (a, b) = (wide(&|part| part.of.chars().count()), wide(&|part| part.what.chars().count()));
         let c = wide(&|part| count(part.units).len());
         let d = wide(&|part| count(part.lanes).len());
-        for Part { of, what, units, lanes } in &self.parts {
+        for ForecastPart { of, what, units, lanes } in &self.parts {
             let (count, lanes) = (count(*units), count(*lanes));
             text += &format!("        {of:a$}  {what:b$}  {count:>c$} {}  {lanes:>d$} lanes\n", self.units);
         }

@@ -21,7 +21,7 @@ use crate::scenario::write_scenarios_to;
 use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
 use crate::support::files::{check_folder_of, make_folder};
 use crate::support::input_file;
-use crate::support::run_dir::RunFolder;
+use crate::support::run_dir::OutputDir;
 use crate::traffic::mining::{Collection, counts_text};
 use crate::{Error, Place, Result};
 
@@ -115,7 +115,7 @@ impl Fit {
         }
 
         // One file needs no folder of its own.
-        let folder = (!self.is_single()).then(|| RunFolder::open_without_record(&self.out)).transpose()?;
+        let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;
         let bar = console::progress(verbosity, ids.len() as u64, "fitting");
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
@@ -184,7 +184,7 @@ impl Fit {
 }
 
 /// All densities at once. Each is a result by itself, with its checksum: those of other runs stay beside them.
-fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Result<()> {
+fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&OutputDir>) -> Result<()> {
     let Some(folder) = folder else {
         return fitted.iter().try_for_each(|(path, model)| {
             if let Some(dir) = path.parent().filter(|dir| *dir != Path::new("")) {

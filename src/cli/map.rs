@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::dry_run::{BUDGET, DryRun, Part};
+use super::dry_run::{BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
@@ -18,13 +18,13 @@ use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::{
-    self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapResult,
-    PARAMETERS, Parameter, presets,
+    self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapParameter,
+    MapResult, PARAMETERS, presets,
 };
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
-use crate::support::run_dir::{MAP_RECORD, RunFolder};
+use crate::support::run_dir::{MAP_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.
@@ -150,7 +150,7 @@ impl Map {
         if self.dry_run {
             return forecast_map(&map, backend, self.format);
         }
-        let folder = RunFolder::open(&self.out, MAP_RECORD)?;
+        let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
         let bar = console::progress(verbosity, map.cell_count(), "sweeping");
         let started = Instant::now();
@@ -240,8 +240,8 @@ impl Map {
         })
     }
 
-    fn fixed(&self, category: Category) -> Result<Vec<(&'static Parameter, f64)>> {
-        let fixed = |text: &String| -> Result<(&'static Parameter, f64)> {
+    fn fixed(&self, category: Category) -> Result<Vec<(&'static MapParameter, f64)>> {
+        let fixed = |text: &String| -> Result<(&'static MapParameter, f64)> {
             let axis = GridAxis::parse(category, text, "--set")?;
             match axis.values[..] {
                 [value] => Ok((axis.parameter, value)),
@@ -264,7 +264,7 @@ impl Map {
             match flag.as_deref().map(str::trim) {
                 Some(text) if text.contains('=') => GridAxis::parse(category, text, name),
                 Some(key) => {
-                    let parameter = Parameter::find(category, key, name)?;
+                    let parameter = MapParameter::find(category, key, name)?;
                     let at = left.iter().position(|axis| axis.parameter == parameter);
                     named(&mut left, at).ok_or_else(|| {
                         let problem = format!("the file has no separate distribution of `{key}`");
@@ -328,7 +328,7 @@ fn forecast_map(map: &grid::Map, backend: &dyn Backend, format: FormatFlag) -> R
         let budget = BUDGET.mul_f64(plan.lane_count() as f64 / all.max(1) as f64);
         whole.add(&forecast(plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
     }
-    let part = |(other, plan): (Option<&str>, &GridPlan)| Part {
+    let part = |(other, plan): (Option<&str>, &GridPlan)| ForecastPart {
         of: plan.grid.name().to_owned(),
         what: other.map_or(String::new(), |name| format!("under {name}")),
         units: plan.grid.cell_count() as u64,

@@ -14,7 +14,7 @@ use crate::run::parts::{PLAN_FILE, Shard, kind_of};
 use crate::run::sampling::Sample;
 use crate::run::study::Study;
 use crate::support::files::check_folder;
-use crate::support::run_dir::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
 /// Merge the parts of a run into its result
@@ -62,9 +62,9 @@ impl Merge {
             move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
         };
         match kind.as_str() {
-            Study::KIND => merge_study(&RunFolder::open(&self.dir, STUDY_RECORD)?, &again("study"), self.format),
+            Study::KIND => merge_study(&OutputDir::open(&self.dir, STUDY_RECORD)?, &again("study"), self.format),
             kind if Sample::is_kind(kind) => {
-                sample_run::merge(&RunFolder::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
+                sample_run::merge(&OutputDir::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
             }
             other => {
                 let help = "give the folder (--out) of a run in parts";
@@ -74,7 +74,7 @@ impl Merge {
     }
 }
 
-fn merge_study(folder: &RunFolder, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
+fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
     let (study, result) = Study::merge_or(folder.dir(), again)?;
     let host = Host {
         backend: format!("{} parts merged", result.parts),

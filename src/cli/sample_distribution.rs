@@ -17,7 +17,7 @@ use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_dis
 use crate::model::profile::Profile;
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
-use crate::run::grid::Parameter;
+use crate::run::grid::MapParameter;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
@@ -25,7 +25,7 @@ use crate::support::hex::sha256;
 use crate::support::input_file;
 use crate::support::plausibility::Doubts;
 use crate::support::readable;
-use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
 use crate::{Error, Place, Result};
 
 /// What a run leaves of its input, so that its lanes can be made again.
@@ -54,7 +54,7 @@ impl Kept {
         };
         let renames: Vec<Rename> = self.renames.iter().map(rename).collect();
         let fixed = |(name, value): &(String, f64)| {
-            let parameter = Parameter::find(self.category, name, "--set")?;
+            let parameter = MapParameter::find(self.category, name, "--set")?;
             Ok((parameter, parameter.check(*value, "--set")?))
         };
         let fixed = self.set.iter().map(fixed).collect::<Result<Vec<_>>>()?;
@@ -111,7 +111,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let seed = flags.given_seed().or(samples.seed).unwrap_or(flags.seed());
     let count = flags.samples.unwrap_or(samples.runs);
     let opened = flags.open()?;
-    let folder = RunFolder::open(&flags.out, ESTIMATE_RECORD)?;
+    let folder = OutputDir::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let executor = opened.executor().with_recheck(seed);
     let counting = TallyOptions { worst: flags.worst(), criterion, map: None };

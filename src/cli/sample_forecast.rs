@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::Exit;
 use super::backend_flags::Opened;
-use super::dry_run::{self, BUDGET, DryRun, Part};
+use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::sample_checks::MAX_HELD;
 use crate::Result;
@@ -13,7 +13,7 @@ use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
 use crate::run::sampling::crude_plan::CrudePlan;
 use crate::run::sampling::weighted_plan::WeightedPlan;
-use crate::run::sampling::{Estimator, Kind, Sample, SampleTally};
+use crate::run::sampling::{Estimator, Sample, SampleKind, SampleTally};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{CrossEntropy, StopRule, Subset};
 
@@ -26,10 +26,12 @@ const BYTES_PER_SAMPLE: u64 = 280;
 /// Prints what the run would be.
 pub(super) fn forecast_sample(sample: &Sample, opened: &Opened, format: FormatFlag) -> Result<Exit> {
     let (estimator, lanes, models) = match &sample.0 {
-        Kind::Crude(planned, stop) => return forecast_crude(planned, opened, stop, format),
-        Kind::Weighted(planned) => return forecast_weighted(planned, opened, format),
-        Kind::Pilot(planned, pilot) => ("is", planned.facts.samples.saturating_add(pilot.runs), &planned.facts.models),
-        Kind::Sequential(run) => {
+        SampleKind::Crude(planned, stop) => return forecast_crude(planned, opened, stop, format),
+        SampleKind::Weighted(planned) => return forecast_weighted(planned, opened, format),
+        SampleKind::Pilot(planned, pilot) => {
+            ("is", planned.facts.samples.saturating_add(pilot.runs), &planned.facts.models)
+        }
+        SampleKind::Sequential(run) => {
             let (samples, seed) = (run.options.stop.samples, run.options.seed);
             let lanes = match &run.options.estimator {
                 Estimator::Subset => {
@@ -56,7 +58,7 @@ fn forecast_adaptive(
     opened: &Opened,
     format: FormatFlag,
 ) -> Result<Exit> {
-    let part = |model: &ModelId| Part {
+    let part = |model: &ModelId| ForecastPart {
         of: model.name().to_owned(),
         what: format!("estimator {estimator}"),
         units: lanes,
@@ -120,7 +122,7 @@ fn forecast_weighted(planned: &WeightedPlan, opened: &Opened, format: FormatFlag
     let models = facts.models.len() as u64;
     let lanes = facts.samples.saturating_mul(models);
     let seconds = took / samples as f64 * facts.samples as f64;
-    let part = |model: &ModelId| Part {
+    let part = |model: &ModelId| ForecastPart {
         of: model.name().to_owned(),
         what: format!("headway {}", planned.headway_name()),
         units: facts.samples,

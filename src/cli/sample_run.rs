@@ -16,12 +16,12 @@ use crate::engine::Executor;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
 use crate::run::parts::{PLAN_FILE, Shard};
 use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::{self, BootstrapRecord, Kind, SampleResult, conditional, proposal_text};
+use crate::run::sampling::{self, BootstrapRecord, SampleKind, SampleResult, conditional, proposal_text};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
-use crate::support::run_dir::{ESTIMATE_RECORD, Results, RunFolder};
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
 use crate::{Error, Place, Result};
 
 /// A condition that so few scenarios are near is outside the data.
@@ -87,15 +87,15 @@ impl Sample {
             return Ok(Exit::Ok);
         }
         let executor = opened.executor().with_recheck(sample.seed());
-        if matches!(sample.0, Kind::Sequential(_)) {
-            let folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
+        if matches!(sample.0, SampleKind::Sequential(_)) {
+            let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
             return write(&sample, result, None, opened.host(0, started), results, self.format);
         }
-        let sample = if matches!(sample.0, Kind::Pilot(..)) {
+        let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
-            let _folder = RunFolder::open(&self.out, ESTIMATE_RECORD)?;
+            let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             sample.searched(&executor, Some(&self.out))?
         } else {
             sample
@@ -112,7 +112,7 @@ impl Sample {
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        if let Kind::Crude(planned, _) = &sample.0 {
+        if let SampleKind::Crude(planned, _) = &sample.0 {
             warn(planned)?;
         }
         // Rows are written on the way: a run that writes them begins anew.
@@ -185,7 +185,7 @@ fn warn(planned: &CrudePlan) -> Result<()> {
 }
 
 /// Makes the result of the parts in a folder; `again` gives the command that makes a shard.
-pub(super) fn merge(folder: &RunFolder, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
+pub(super) fn merge(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
     let (sample, result) = sampling::Sample::merge_or(folder.dir(), again)?;
     let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
     write(&sample, result, None, host, folder.results()?, format)
@@ -203,7 +203,7 @@ fn write(
     let (out, density) = (results.dir().to_path_buf(), sample.density());
     let mut file = EstimateFile::new(density, RunFacts::of(sample), result.rows, host)?;
     let mut figures = Vec::new();
-    if let (Some(crude), Kind::Crude(planned, _)) = (&result.crude, &sample.0) {
+    if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
         figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting())?;
         file.plan_sha256 = Some(planned.plan.hash().to_owned());
         file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));

@@ -8,7 +8,7 @@ use super::configured::command;
 use super::{Exit, console};
 use crate::interop::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
 use crate::support::atomic_file::refuse_link;
-use crate::support::run_dir::RunFolder;
+use crate::support::run_dir::OutputDir;
 use crate::{Error, Place, Result};
 
 /// Split a run over a Slurm job array
@@ -87,7 +87,7 @@ impl Slurm {
             refuse_link(folder)?;
         }
         // What is run comes last: with it, all of them are of one command.
-        let run_folder = RunFolder::open(folder, "submit.sh")?;
+        let run_folder = OutputDir::open(folder, "submit.sh")?;
         let mut results = run_folder.results()?;
         let mut told = String::new();
         for (name, text, what) in [

@@ -9,7 +9,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source::Source;
 use crate::support::files::check_folder;
-use crate::support::run_dir::{RunFolder, unfinished};
+use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
@@ -59,7 +59,7 @@ impl Synth {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let options = self.generator.options(configured)?;
         check_folder(&self.dir)?;
-        let folder = RunFolder::open(&self.dir, SYNTHETIC_MARKER)?;
+        let folder = OutputDir::open(&self.dir, SYNTHETIC_MARKER)?;
         // What a killed run was giving its names is written again.
         let unfinished = unfinished(&self.dir).unwrap_or_default();
         let is_unfinished = |tracks: &Path| unfinished.iter().any(|name| tracks.ends_with(name));

@@ -53,6 +53,6 @@ pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, RecheckOptions, same_words, words};
 pub use scene::Scene;
 pub use time_step::check_time_step;
-pub use trace::{Mark, Trace, TracedStep, TracedVehicle};
+pub use trace::{StepMark, Trace, TracedStep, TracedVehicle};
 pub use units::Units;
 pub use version::ENGINE_VERSION;

@@ -63,7 +63,7 @@ pub struct TracedStep {
 
 /// What a trace marks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
+pub enum StepMark {
     /// First step that the driver finds unsafe: the reaction time begins.
     Reaction,
     /// First step before which the ego braked.
@@ -72,16 +72,16 @@ pub enum Mark {
     Contact,
 }
 
-impl Mark {
+impl StepMark {
     /// All, in the order in which they happen.
-    pub const ALL: [Mark; 3] = [Mark::Reaction, Mark::Braking, Mark::Contact];
+    pub const ALL: [StepMark; 3] = [StepMark::Reaction, StepMark::Braking, StepMark::Contact];
 
     /// Name in tables and figures.
     pub fn label(self) -> &'static str {
         match self {
-            Mark::Reaction => "reaction",
-            Mark::Braking => "braking",
-            Mark::Contact => "contact",
+            StepMark::Reaction => "reaction",
+            StepMark::Braking => "braking",
+            StepMark::Contact => "contact",
         }
     }
 }
@@ -170,12 +170,12 @@ impl Trace {
     }
 
     /// The step of a mark; `None` where it did not happen.
-    pub fn step_of(&self, mark: Mark) -> Option<u32> {
+    pub fn step_of(&self, mark: StepMark) -> Option<u32> {
         let happened = |step: u32| (step != NO_STEP).then_some(step);
         match mark {
-            Mark::Reaction => happened(self.outcome.reaction_step),
-            Mark::Braking => self.steps.iter().find(|s| s.a_ego_mps2 < 0.0).map(|s| s.step),
-            Mark::Contact => happened(self.outcome.contact_step),
+            StepMark::Reaction => happened(self.outcome.reaction_step),
+            StepMark::Braking => self.steps.iter().find(|s| s.a_ego_mps2 < 0.0).map(|s| s.step),
+            StepMark::Contact => happened(self.outcome.contact_step),
         }
     }
 

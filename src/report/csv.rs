@@ -1,7 +1,7 @@
 //! The tables as CSV: numbers in full precision, an empty field where a value is undefined.
 
 use crate::model::criterion::Criterion;
-use crate::run::score::{Cell, ClaimResult, Interval, ScoreTable, f1, precision, recall};
+use crate::run::score::{BootstrapInterval, ClaimResult, ScoreCell, ScoreTable, f1, precision, recall};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::table::cell_text;
 use crate::{Error, Result};
@@ -77,7 +77,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
             let parameters = Parameterization::find(category.category, name)
                 .map_or(String::new(), |p| p.parameter_count().to_string());
             let c = &cell.counts;
-            let end = |pick: fn(Interval) -> f64| number(cell.f1_interval.map(pick));
+            let end = |pick: fn(BootstrapInterval) -> f64| number(cell.f1_interval.map(pick));
             rows.push(vec![
                 category.category.key().to_owned(),
                 name.clone(),
@@ -103,7 +103,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
 }
 
 /// Why F1 has no interval; empty where it has one.
-fn no_interval(cell: &Cell) -> String {
+fn no_interval(cell: &ScoreCell) -> String {
     match (f1(&cell.counts), cell.f1_interval) {
         (_, Some(_)) => String::new(),
         (None, None) => "undefined".to_owned(),
@@ -154,13 +154,13 @@ mod tests {
     use super::*;
     use crate::engine::{Confusion, Headway};
     use crate::model::driver::ModelId;
-    use crate::run::score::{CategoryScores, Cell, ScoreOptions};
+    use crate::run::score::{CategoryScores, ScoreCell, ScoreOptions};
     use crate::scenario::Category;
 
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {
             let counts = Confusion::default();
-            Cell { variant: 0, model, criterion, counts, f1_interval: None, undefined_draws: 0 }
+            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, undefined_draws: 0 }
         };
         let models = [ModelId::Rss, ModelId::Fsm];
         let scores = CategoryScores {

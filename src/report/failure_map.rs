@@ -8,7 +8,7 @@
 use std::fmt::Write;
 
 use super::convergence::sampled;
-use super::plot::{Cell, Cells, ColourBar, Figure, Fill, Hatch, Height, Plot, PlotAxis};
+use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Hatch, Height, Plot, PlotAxis};
 use super::plot::{number, plain_end};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -138,7 +138,7 @@ impl FailureMap {
         let largest = if largest > 0.0 { plain_end(largest).min(1.0) } else { 0.0 };
         let cell = |(at, share): (usize, &Share)| {
             let (i, j) = (at % self.x.cells(), at / self.x.cells());
-            Cell {
+            FilledCell {
                 corners: [(self.x.edges[i], self.y.edges[j]), (self.x.edges[i + 1], self.y.edges[j + 1])],
                 fill: share.fill(largest),
                 tip: if let Share::Known { share, .. } = share { self.tip(at, *share) } else { String::new() },

@@ -2,8 +2,8 @@
 
 use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{
-    Cell, Cells, Ends, Figure, Fill, Height, INK, Layer, Look, Mark, Name, Plot, PlotAxis, ROW, Rule, Series, Symbol,
-    Value,
+    Cells, Ends, Figure, Fill, FilledCell, Height, INK, Layer, Look, Mark, Name, Plot, PlotAxis, ROW, Rule, Series,
+    Symbol, Value,
 };
 
 /// One estimate.
@@ -138,7 +138,7 @@ impl ForestFigure {
             let Some(reference) = group.reference.as_ref().map(|row| row.drawn(self.scale)) else { continue };
             if let Some((lower, upper)) = reference.interval {
                 let fill = Fill { colour: REFERENCE_COLOUR.to_owned(), opacity: Some(0.28), ..Fill::default() };
-                bands.push(Cell { corners: [(lower, top), (upper, -y)], fill, tip: String::new() });
+                bands.push(FilledCell { corners: [(lower, top), (upper, -y)], fill, tip: String::new() });
             }
             rule.runs.extend(reference.estimate.map(|estimate| vec![(estimate, top), (estimate, -y)]));
         }

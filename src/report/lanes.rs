@@ -7,7 +7,7 @@ use crate::engine::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outco
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
 use crate::stats::density::DensityModel;
-use crate::support::table::{Cell, Column, Kind, TableWriter};
+use crate::support::table::{Cell, Column, ColumnKind, TableWriter};
 use crate::{Error, Result};
 
 /// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
@@ -23,27 +23,27 @@ pub enum Digits {
 #[rustfmt::skip] // a table: one line per column
 pub fn columns(digits: Digits) -> Vec<Column> {
     let value = match digits {
-        Digits::Binary32 => Kind::Binary32,
-        Digits::Binary64 => Kind::Binary64,
+        Digits::Binary32 => ColumnKind::Binary32,
+        Digits::Binary64 => ColumnKind::Binary64,
     };
     let c = Column::new;
     vec![
-        c("id", Kind::Text, "", "Scenario."),
-        c("category", Kind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
-        c("param", Kind::Name, "", "Variant: S (as recorded) or the key of a parameterization."),
-        c("thw", Kind::Binary64, "s", "Initial time headway; null where the start is a gap."),
-        c("model", Kind::Name, "", "Driver model."),
-        c("collision", Kind::Flag, "", "Failed the criterion collision."),
-        c("ttc", Kind::Flag, "", "Failed the criterion TTC."),
-        c("btn", Kind::Flag, "", "Failed the criterion BTN."),
+        c("id", ColumnKind::Text, "", "Scenario."),
+        c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+        c("param", ColumnKind::Name, "", "Variant: S (as recorded) or the key of a parameterization."),
+        c("thw", ColumnKind::Binary64, "s", "Initial time headway; null where the start is a gap."),
+        c("model", ColumnKind::Name, "", "Driver model."),
+        c("collision", ColumnKind::Flag, "", "Failed the criterion collision."),
+        c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
+        c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
         c("min_ttc", value, "s", "Smallest time to collision; infinite where the vehicles never approached."),
         c("max_btn", value, "1", "Largest Brake Threat Number."),
-        c("crash_type", Kind::Whole, "1", "Kind of contact; 0 without one."),
-        c("t_react", Kind::Binary64, "s", "When the driver first reacted; null if never."),
-        c("t_crash", Kind::Binary64, "s", "When vehicles touched; null if never."),
+        c("crash_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
+        c("t_react", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
+        c("t_crash", ColumnKind::Binary64, "s", "When vehicles touched; null if never."),
         c("impact_speed", value, "m/s", "Speed of the ego at contact; null without one."),
-        c("t_end", Kind::Binary64, "s", "When the run ended."),
-        c("robust", Kind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64."),
+        c("t_end", ColumnKind::Binary64, "s", "When the run ended."),
+        c("robust", ColumnKind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64."),
     ]
 }
 
@@ -120,27 +120,27 @@ fn time(step: u32, dt: f64) -> f64 {
 pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     let c = Column::new;
     let mut columns = vec![
-        c("sample", Kind::Whole, "1", "Index of the sample: with the seed it decides the point."),
-        c("category", Kind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
-        c("parameterization", Kind::Name, "", "Key of the parameterization whose parameters were drawn."),
-        c("headway", Kind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
-        c("model", Kind::Name, "", "Driver model."),
-        c("collision", Kind::Flag, "", "Failed the criterion collision."),
-        c("ttc", Kind::Flag, "", "Failed the criterion TTC."),
-        c("btn", Kind::Flag, "", "Failed the criterion BTN."),
-        c("capped", Kind::Flag, "", "Ended by the time cap."),
-        c("min_ttc_s", Kind::Binary32, "s", "Smallest time to collision; null where the vehicles never approached."),
-        c("max_btn", Kind::Binary32, "1", "Largest Brake Threat Number; null where it has no bound."),
-        c("min_gap_m", Kind::Binary32, "m", "Smallest gap, bumper to bumper; null where there was none."),
-        c("contact_type", Kind::Whole, "1", "Kind of contact; 0 without one."),
-        c("reaction_s", Kind::Binary64, "s", "When the driver first reacted; null if never."),
-        c("end_s", Kind::Binary64, "s", "When the run ended."),
-        c("impact_speed_mps", Kind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
-        c("impact_closing_speed_mps", Kind::Binary32, "m/s", "Closing speed at contact; null without one."),
+        c("sample", ColumnKind::Whole, "1", "Index of the sample: with the seed it decides the point."),
+        c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+        c("parameterization", ColumnKind::Name, "", "Key of the parameterization whose parameters were drawn."),
+        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
+        c("model", ColumnKind::Name, "", "Driver model."),
+        c("collision", ColumnKind::Flag, "", "Failed the criterion collision."),
+        c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
+        c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
+        c("capped", ColumnKind::Flag, "", "Ended by the time cap."),
+        c("min_ttc_s", ColumnKind::Binary32, "s", "Smallest time to collision; null where the vehicles never approached."),
+        c("max_btn", ColumnKind::Binary32, "1", "Largest Brake Threat Number; null where it has no bound."),
+        c("min_gap_m", ColumnKind::Binary32, "m", "Smallest gap, bumper to bumper; null where there was none."),
+        c("contact_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
+        c("reaction_s", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
+        c("end_s", ColumnKind::Binary64, "s", "When the run ended."),
+        c("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
+        c("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one."),
     ];
     columns.extend(density.space.parameters().iter().map(|parameter| Column {
         name: parameter.name.clone().into(),
-        kind: Kind::Binary32,
+        kind: ColumnKind::Binary32,
         unit: parameter.unit.clone().into(),
         description: "Parameter that was drawn.".into(),
     }));

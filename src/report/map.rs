@@ -12,7 +12,7 @@ use super::tables::{aligned, table};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MappedGrid, Parameter, count};
+use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MapParameter, MappedGrid, count};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::csv_field;
@@ -399,7 +399,7 @@ impl<'a> GridRecord<'a> {
 /// Columns of a cell's place; all grids of a run have the same parameters.
 fn write_header(out: &mut dyn Write, grids: &[MappedGrid], columns: &str) -> io::Result<()> {
     let keys: Vec<&str> = match grids.first() {
-        Some(mapped) => mapped.plan.grid.values(0).iter().map(|(p, _): &(&Parameter, f64)| p.key).collect(),
+        Some(mapped) => mapped.plan.grid.values(0).iter().map(|(p, _): &(&MapParameter, f64)| p.key).collect(),
         None => Vec::new(),
     };
     writeln!(out, "map,{},{columns}", keys.join(","))

@@ -4,7 +4,7 @@
 //! Kinds differ in lightness and, where two are equally light, in hatching: they can be told apart by colour-blind
 //! readers and in grey print. What a page of three plots in a row shows stays readable at the width of a column.
 
-use super::plot::{Cell, Cells, Figure, Fill, Hatch, Height, INK, Plot, PlotAxis, Rule};
+use super::plot::{Cells, Figure, Fill, FilledCell, Hatch, Height, INK, Plot, PlotAxis, Rule};
 use crate::run::grid::{Grid, boundary, runs};
 
 /// A sheet.
@@ -63,7 +63,7 @@ impl MapSheet<'_> {
             for j in 0..self.grid.y().len() {
                 for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == number) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
-                    cells.cells.push(Cell { corners, fill: fill.clone(), tip: String::new() });
+                    cells.cells.push(FilledCell { corners, fill: fill.clone(), tip: String::new() });
                 }
             }
         }

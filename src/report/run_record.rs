@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::sampling::{Kind, Sample, SampleHeadways};
+use crate::run::sampling::{Sample, SampleHeadways, SampleKind};
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::ParameterizationOptions;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
@@ -189,7 +189,7 @@ impl RunFacts {
             given: Vec::new(),
         };
         match &sample.0 {
-            Kind::Crude(plan, _) => {
+            SampleKind::Crude(plan, _) => {
                 let facts = &plan.facts;
                 let headways = facts.headways.clone().unwrap_or_default();
                 RunFacts {
@@ -198,11 +198,11 @@ impl RunFacts {
                     ..random("mc", &facts.profile, &facts.models, headways)
                 }
             }
-            Kind::Weighted(plan) | Kind::Pilot(plan, _) => {
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
                 let facts = &plan.facts;
                 random("is", &facts.profile, &facts.models, facts.headway.into_iter().collect())
             }
-            Kind::Sequential(run) => {
+            SampleKind::Sequential(run) => {
                 let headways = match &run.options.headways {
                     SampleHeadways::Each(list) => list.clone(),
                     SampleHeadways::Sampled => Vec::new(),

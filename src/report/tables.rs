@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
-    CategoryScores, ClaimResult, ClaimRow, Interval, ScoreTable, f1, published_failures, published_lvd_f1,
+    BootstrapInterval, CategoryScores, ClaimResult, ClaimRow, ScoreTable, f1, published_failures, published_lvd_f1,
 };
 use crate::support::readable;
 
@@ -105,7 +105,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
     rows
 }
 
-fn value(value: Option<f64>, interval: Option<Interval>) -> String {
+fn value(value: Option<f64>, interval: Option<BootstrapInterval>) -> String {
     match (value, interval) {
         (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
         (Some(value), None) => format!("{value:.3}\n[few]"),
@@ -157,7 +157,7 @@ pub fn claims(results: &[ClaimResult]) -> String {
 
 fn difference(row: &ClaimRow) -> String {
     let mut text = row.value.map_or("-".to_owned(), |v| format!("{v:+.3}"));
-    if let Some(Interval { low, high }) = row.interval {
+    if let Some(BootstrapInterval { low, high }) = row.interval {
         let _ = write!(text, "\n[{low:+.2} {high:+.2}]");
     }
     if row.undefined_draws > 0 {

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::Category;
 use super::schema::{Content, FIELDS, Field, Presence};
 use crate::support::error::{Error, Result};
-use crate::support::table::{Column, Kind, Named, Resolved, TableReader, nearest, resolve};
+use crate::support::table::{Column, ColumnKind, Named, Resolved, TableReader, nearest, resolve};
 
 /// A field that is no record.
 pub(super) struct Leaf {
@@ -64,13 +64,13 @@ impl Leaf {
     /// The column that is written.
     pub fn column(&self) -> Column {
         let kind = match self.field.content {
-            Content::Text if self.flat == "id" => Kind::Text,
-            Content::Text | Content::OneOf(_) => Kind::Name,
-            Content::Number => Kind::Binary64,
-            Content::VehicleId | Content::Frame => Kind::Whole,
-            Content::TwoFrames => Kind::Wholes,
-            Content::YesNo => Kind::Flag,
-            Content::Series | Content::Object(_) => Kind::Series,
+            Content::Text if self.flat == "id" => ColumnKind::Text,
+            Content::Text | Content::OneOf(_) => ColumnKind::Name,
+            Content::Number => ColumnKind::Binary64,
+            Content::VehicleId | Content::Frame => ColumnKind::Whole,
+            Content::TwoFrames => ColumnKind::Wholes,
+            Content::YesNo => ColumnKind::Flag,
+            Content::Series | Content::Object(_) => ColumnKind::Series,
         };
         let about = self.field.about;
         let description = match self.record {

@@ -10,7 +10,7 @@ use super::columns::{Leaf, leaves};
 use super::found::ScenarioFile;
 use super::{Scenario, jsonl, table_reader};
 use crate::support::plausibility::Implausible;
-use crate::support::table::{Cell, Column, Kind, TableFacts, TableFormat, TableWriter};
+use crate::support::table::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
 /// Formats that scenarios are written in, the one for names without an ending first.
@@ -90,15 +90,19 @@ fn write_table(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Res
 }
 
 /// `None` where the value is not of the column's kind.
-fn cell(value: &Value, kind: Kind) -> Option<Cell<'_>> {
+fn cell(value: &Value, kind: ColumnKind) -> Option<Cell<'_>> {
     let numbers = || value.as_array();
     Some(match (value, kind) {
         (Value::Null, _) => Cell::Null,
-        (_, Kind::Text | Kind::Name) => Cell::text(value.as_str()?),
-        (_, Kind::Flag) => Cell::Flag(value.as_bool()?),
-        (_, Kind::Whole) => Cell::Whole(value.as_i64()?),
-        (_, Kind::Binary32 | Kind::Binary64) => Cell::Number(value.as_f64()?),
-        (_, Kind::Series) => Cell::Series(Cow::Owned(numbers()?.iter().map(Value::as_f64).collect::<Option<_>>()?)),
-        (_, Kind::Wholes) => Cell::Wholes(Cow::Owned(numbers()?.iter().map(Value::as_i64).collect::<Option<_>>()?)),
+        (_, ColumnKind::Text | ColumnKind::Name) => Cell::text(value.as_str()?),
+        (_, ColumnKind::Flag) => Cell::Flag(value.as_bool()?),
+        (_, ColumnKind::Whole) => Cell::Whole(value.as_i64()?),
+        (_, ColumnKind::Binary32 | ColumnKind::Binary64) => Cell::Number(value.as_f64()?),
+        (_, ColumnKind::Series) => {
+            Cell::Series(Cow::Owned(numbers()?.iter().map(Value::as_f64).collect::<Option<_>>()?))
+        }
+        (_, ColumnKind::Wholes) => {
+            Cell::Wholes(Cow::Owned(numbers()?.iter().map(Value::as_i64).collect::<Option<_>>()?))
+        }
     })
 }

@@ -49,22 +49,22 @@ struct Unfinished {
 
 /// The right to write a run's folder, until it is dropped.
 #[derive(Debug)]
-pub struct RunFolder {
+pub struct OutputDir {
     dir: PathBuf,
     record: Option<&'static str>,
     is_new: bool,
     lock: Option<FolderLock>,
 }
 
-impl RunFolder {
+impl OutputDir {
     /// Takes a folder for a run that leaves this record; makes it where it is not there. What killed runs left under
     /// hidden names is removed.
     ///
     /// # Errors
     /// [`Error::Busy`] where another process writes it; [`Error::Usage`] where it holds another verb's run;
     /// [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
-    pub fn open(dir: &Path, record: &'static str) -> Result<RunFolder> {
-        let folder = RunFolder::take(dir, Some(record), FolderLock::acquire)?;
+    pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
+        let folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
         folder.refuse_another_verb(record)?;
         Ok(folder)
     }
@@ -72,24 +72,24 @@ impl RunFolder {
     /// The same for files that each are a result by themselves, without a record.
     ///
     /// # Errors
-    /// As [`RunFolder::open`].
-    pub fn open_without_record(dir: &Path) -> Result<RunFolder> {
-        RunFolder::take(dir, None, FolderLock::acquire)
+    /// As [`OutputDir::open`].
+    pub fn open_without_record(dir: &Path) -> Result<OutputDir> {
+        OutputDir::take(dir, None, FolderLock::acquire)
     }
 
     /// The same for a part of a run, together with other parts.
     ///
     /// # Errors
-    /// As [`RunFolder::open`]; [`Error::Busy`] only where a whole run or a merge is at work.
-    pub fn share(dir: &Path) -> Result<RunFolder> {
-        RunFolder::take(dir, None, FolderLock::share)
+    /// As [`OutputDir::open`]; [`Error::Busy`] only where a whole run or a merge is at work.
+    pub fn share(dir: &Path) -> Result<OutputDir> {
+        OutputDir::take(dir, None, FolderLock::share)
     }
 
-    fn take(dir: &Path, record: Option<&'static str>, lock: impl Fn(&Path) -> Result<FolderLock>) -> Result<RunFolder> {
+    fn take(dir: &Path, record: Option<&'static str>, lock: impl Fn(&Path) -> Result<FolderLock>) -> Result<OutputDir> {
         let is_new = !dir.exists();
         make_folder(dir)?;
         let lock = Some(lock(&dir.join(LOCK))?);
-        let folder = RunFolder { dir: dir.to_path_buf(), record, is_new, lock };
+        let folder = OutputDir { dir: dir.to_path_buf(), record, is_new, lock };
         record.into_iter().chain([UNFINISHED]).try_for_each(|name| refuse_link(&dir.join(name)))?;
         clear_stale(dir, None);
         Ok(folder)
@@ -131,7 +131,7 @@ impl RunFolder {
     }
 }
 
-impl Drop for RunFolder {
+impl Drop for OutputDir {
     fn drop(&mut self) {
         self.lock = None;
         if self.is_new {
@@ -143,7 +143,7 @@ impl Drop for RunFolder {
 
 /// Results of a run that wait under hidden names; dropped before [`Results::publish`], they leave nothing behind.
 pub struct Results<'a> {
-    folder: &'a RunFolder,
+    folder: &'a OutputDir,
     staged: Vec<(String, StagedFile)>,
     elsewhere: Vec<StagedFile>,
     kept: BTreeSet<String>,
@@ -313,11 +313,11 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn folder(dir: &Path) -> RunFolder {
-        RunFolder::open(dir, MAP_RECORD).unwrap()
+    fn folder(dir: &Path) -> OutputDir {
+        OutputDir::open(dir, MAP_RECORD).unwrap()
     }
 
-    fn publish(folder: &RunFolder, names: &[&str], text: &str) {
+    fn publish(folder: &OutputDir, names: &[&str], text: &str) {
         let mut results = folder.results().unwrap();
         names.iter().for_each(|name| results.add(name, text.as_bytes()).unwrap());
         let record = serde_json::json!({"program": "lanesweep 0", "files": results.names(), "text": text});
@@ -381,13 +381,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let held = folder(&out);
-        assert!(matches!(RunFolder::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
-        assert!(matches!(RunFolder::share(&out), Err(Error::Busy { .. })));
+        assert!(matches!(OutputDir::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
+        assert!(matches!(OutputDir::share(&out), Err(Error::Busy { .. })));
         publish(&held, &["report.html"], "map");
         drop(held);
-        let error = RunFolder::open(&out, STUDY_RECORD).unwrap_err();
+        let error = OutputDir::open(&out, STUDY_RECORD).unwrap_err();
         assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
-        assert!(RunFolder::open(&out, "index.csv").is_ok(), "its files have other names");
+        assert!(OutputDir::open(&out, "index.csv").is_ok(), "its files have other names");
     }
 
     #[test]
@@ -411,7 +411,7 @@ mod tests {
         fs::write(&precious, "mine").unwrap();
         for name in [LOCK, MAP_RECORD, UNFINISHED, "a.csv"] {
             std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
-            let refused = match RunFolder::open(&out, MAP_RECORD) {
+            let refused = match OutputDir::open(&out, MAP_RECORD) {
                 Ok(folder) => folder.results().unwrap().add("a.csv", b"text").unwrap_err(),
                 Err(error) => error,
             };

@@ -18,7 +18,7 @@ use lanesweep::support::plausibility::Implausible;
 use parquet::basic::Compression;
 
 use lanesweep::report::lanes::{Digits, columns};
-use lanesweep::support::table::{Cell, Kind, TableFacts, TableFormat, TableWriter};
+use lanesweep::support::table::{Cell, ColumnKind, TableFacts, TableFormat, TableWriter};
 use lanesweep::traffic::trajectory::highd;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
@@ -34,10 +34,10 @@ fn write(path: &Path, rows: u64) -> u64 {
             .map(|column| {
                 word = word.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 match column.kind {
-                    Kind::Text => Cell::text(format!("{:02}_cut_in_{}", word >> 59, row / 360)),
-                    Kind::Name => Cell::text(["S", "1", "2", "3"][(word >> 62) as usize]),
-                    Kind::Flag => Cell::Flag(word >> 63 == 1),
-                    Kind::Whole => Cell::Whole((word >> 62) as i64),
+                    ColumnKind::Text => Cell::text(format!("{:02}_cut_in_{}", word >> 59, row / 360)),
+                    ColumnKind::Name => Cell::text(["S", "1", "2", "3"][(word >> 62) as usize]),
+                    ColumnKind::Flag => Cell::Flag(word >> 63 == 1),
+                    ColumnKind::Whole => Cell::Whole((word >> 62) as i64),
                     _ => Cell::Number((word >> 40) as f64 / 1024.0),
                 }
             })

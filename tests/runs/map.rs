@@ -12,7 +12,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::presets;
 use lanesweep::run::grid::{
-    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, Parameter, Quantity, boundary, count,
+    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapParameter, MapQuantity, boundary, count,
 };
 use lanesweep::scenario::{Category, Tables};
 use proptest::prelude::*;
@@ -21,8 +21,8 @@ fn axis(category: Category, text: &str) -> GridAxis {
     GridAxis::parse(category, text, "--x").unwrap()
 }
 
-fn value(category: Category, key: &str, value: f64) -> (&'static Parameter, f64) {
-    (Parameter::find(category, key, "--set").unwrap(), value)
+fn value(category: Category, key: &str, value: f64) -> (&'static MapParameter, f64) {
+    (MapParameter::find(category, key, "--set").unwrap(), value)
 }
 
 fn parts(category: Category, x: &str, y: &str) -> GridParts {
@@ -102,10 +102,10 @@ proptest! {
             let (panel, i, j) = grid.places(cell);
             prop_assert_eq!(grid.cell(panel, i, j), cell);
             let point = grid.point(cell);
-            prop_assert_eq!(point.get(Quantity::Gap), Some(grid.x().values[i]));
-            prop_assert_eq!(point.get(Quantity::LateralSpeed), Some(grid.y().values[j]));
-            prop_assert_eq!(point.get(Quantity::EgoSpeed), Some(grid.panels()[panel][0]));
-            prop_assert_eq!(point.get(Quantity::OtherSpeed), Some(grid.panels()[panel][1]));
+            prop_assert_eq!(point.get(MapQuantity::Gap), Some(grid.x().values[i]));
+            prop_assert_eq!(point.get(MapQuantity::LateralSpeed), Some(grid.y().values[j]));
+            prop_assert_eq!(point.get(MapQuantity::EgoSpeed), Some(grid.panels()[panel][0]));
+            prop_assert_eq!(point.get(MapQuantity::OtherSpeed), Some(grid.panels()[panel][1]));
         }
     }
 
@@ -128,7 +128,7 @@ proptest! {
 fn alone(grid: &Grid, cell: usize, model: ModelId, profile: &Profile) -> Verdicts {
     let mut tables = Tables::default();
     let case = LaneCase::encode(&grid.case(cell, profile).unwrap(), profile, &mut tables);
-    let start: Start<f32> = match grid.point(cell).get(Quantity::Thw) {
+    let start: Start<f32> = match grid.point(cell).get(MapQuantity::Thw) {
         Some(thw_s) => Headway::ThwS(thw_s).start(),
         None => Headway::GapM(grid.gap_m(cell, model, profile)).start(),
     };
@@ -188,7 +188,7 @@ fn a_cell_is_what_simulate_says_of_the_same_numbers() {
     let mut failures = 0;
     for cell in 0..grid.cell_count() {
         let point = grid.point(cell);
-        let [gap, lateral] = [Quantity::Gap, Quantity::LateralSpeed].map(|q| point.get(q).unwrap().to_string());
+        let [gap, lateral] = [MapQuantity::Gap, MapQuantity::LateralSpeed].map(|q| point.get(q).unwrap().to_string());
         let simulated = lanesweep(&[
             "simulate",
             "--category",
@@ -234,8 +234,8 @@ fn the_presets_have_the_size_of_the_evidence() {
 fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
     let shifted = |axis: &GridAxis| {
         let by = match axis.parameter.quantity {
-            Quantity::Gap => gap_m,
-            Quantity::LateralSpeed => lateral_mps,
+            MapQuantity::Gap => gap_m,
+            MapQuantity::LateralSpeed => lateral_mps,
             _ => 0.0,
         };
         GridAxis { parameter: axis.parameter, values: axis.values.iter().map(|v| (v + by).max(0.0)).collect() }

@@ -34,7 +34,7 @@ fn names(text: &str) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, Layers, Settings, file};
+    use super::super::{KeyKind, Layers, Settings, file};
     use super::*;
     use crate::Place;
 
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn what_the_schema_lets_pass_at_its_bounds_the_types_take_too() {
         for key in Key::all() {
-            let Kind::Number { least, most, .. } = key.kind else { continue };
+            let KeyKind::Number { least, most, .. } = key.kind else { continue };
             let closed = [least, most].into_iter().flatten().filter(|(_, open)| !open);
             for (bound, _) in closed {
                 let mut layers = Layers::defaults();

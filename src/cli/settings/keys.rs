@@ -21,14 +21,14 @@ pub struct Key {
     /// What it means.
     pub description: String,
     /// What it takes.
-    pub kind: Kind,
+    pub kind: KeyKind,
     /// Its default; `None` where it is not set unless somebody sets it.
     pub default: Option<Value>,
 }
 
 /// What a key takes.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum KeyKind {
     /// A number.
     Number {
         /// A whole one.
@@ -72,13 +72,13 @@ impl Key {
     /// What it expects, in words: `a number above 0 and at most 1000000`.
     pub fn expected(&self) -> String {
         match &self.kind {
-            Kind::Boolean => "true or false".to_owned(),
-            Kind::Text => "a text in quotes".to_owned(),
-            Kind::Choice(choices) => {
+            KeyKind::Boolean => "true or false".to_owned(),
+            KeyKind::Text => "a text in quotes".to_owned(),
+            KeyKind::Choice(choices) => {
                 let words: Vec<String> = choices.iter().map(|choice| format!("\"{}\"", choice.word)).collect();
                 format!("one of {}", words.join(", "))
             }
-            Kind::Number { is_whole, least, most } => {
+            KeyKind::Number { is_whole, least, most } => {
                 let mut text = if *is_whole { "a whole number" } else { "a number" }.to_owned();
                 let low = least.map(|(x, open)| format!(" {} {x}", if open { "above" } else { "of at least" }));
                 let high = most.map(|(x, open)| format!(" {} {x}", if open { "below" } else { "at most" }));
@@ -117,13 +117,13 @@ fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {
     }
 }
 
-fn kind_of(property: &Value) -> Kind {
+fn kind_of(property: &Value) -> KeyKind {
     let word = |choice: &Value, word: &Value| Choice {
         word: word.as_str().unwrap_or_default().to_owned(),
         description: choice["description"].as_str().unwrap_or_default().to_owned(),
     };
     if let Some(words) = property["enum"].as_array() {
-        return Kind::Choice(words.iter().map(|w| word(&Value::Null, w)).collect());
+        return KeyKind::Choice(words.iter().map(|w| word(&Value::Null, w)).collect());
     }
     if let Some(choices) = property["oneOf"].as_array() {
         // Words without a description share one branch.
@@ -131,19 +131,19 @@ fn kind_of(property: &Value) -> Kind {
             Some(words) => words.iter().map(|w| word(&Value::Null, w)).collect(),
             None => vec![word(choice, &choice["const"])],
         };
-        return Kind::Choice(choices.iter().flat_map(of_branch).collect());
+        return KeyKind::Choice(choices.iter().flat_map(of_branch).collect());
     }
     let bound = |closed: &str, open: &str| {
         let closed = property[closed].as_f64().map(|x| (x, false));
         property[open].as_f64().map(|x| (x, true)).or(closed)
     };
     match property["type"].as_str() {
-        Some("boolean") => Kind::Boolean,
-        Some(number @ ("integer" | "number")) => Kind::Number {
+        Some("boolean") => KeyKind::Boolean,
+        Some(number @ ("integer" | "number")) => KeyKind::Number {
             is_whole: number == "integer",
             least: bound("minimum", "exclusiveMinimum"),
             most: bound("maximum", "exclusiveMaximum"),
         },
-        _ => Kind::Text,
+        _ => KeyKind::Text,
     }
 }

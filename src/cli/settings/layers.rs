@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value};
 
 use super::default_file::keys_in_order;
-use super::keys::{Key, Kind};
+use super::keys::{Key, KeyKind};
 use super::value::{Wrong, check, from_word};
 use super::{FILE_VARIABLE, Settings, environment, file};
 use crate::{Error, Place, Result};
@@ -178,7 +178,7 @@ impl Layers {
     /// What a flag of its own was given. A value that the key does not take is the flag's to complain of.
     pub fn flag(&mut self, name: &str, flag: &str, word: &str) {
         let Some(key) = Key::find(&self.keys, name) else { return };
-        let is_number = matches!(key.kind, Kind::Number { .. });
+        let is_number = matches!(key.kind, KeyKind::Number { .. });
         let read = |word: &str| from_word(key, word).ok().filter(|value| is_number || check(key, value).is_ok());
         if let Some(value) = read(word).or_else(|| read(&word.to_ascii_lowercase())) {
             self.set(name, value, Origin::Flag(flag.to_owned()));

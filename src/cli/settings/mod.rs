@@ -16,7 +16,7 @@ mod value;
 
 pub use default_file::{DEFAULT_FILE, DEFAULT_FILE_NAME, keys_in_order};
 pub use environment::{FILE_VARIABLE, TEST_VARIABLES, variable_of};
-pub use keys::{Choice, Key, Kind};
+pub use keys::{Choice, Key, KeyKind};
 pub use layers::{Assignment, Layers, Origin, Setting};
 pub use profile_schema::profile_schema;
 pub use schema::settings_schema;

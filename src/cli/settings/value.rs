@@ -3,7 +3,7 @@
 use serde_json::{Number, Value};
 use toml::de::DeValue;
 
-use super::keys::{Key, Kind, nearest};
+use super::keys::{Key, KeyKind, nearest};
 
 /// A problem of a value, and what to write instead.
 pub(super) struct Wrong {
@@ -14,7 +14,7 @@ pub(super) struct Wrong {
 impl Wrong {
     fn of(key: &Key, found: &str) -> Wrong {
         let near = match &key.kind {
-            Kind::Choice(choices) => nearest(found.trim_matches('"'), choices.iter().map(|c| c.word.as_str())),
+            KeyKind::Choice(choices) => nearest(found.trim_matches('"'), choices.iter().map(|c| c.word.as_str())),
             _ => None,
         };
         let near = near.map_or(String::new(), |word| format!("did you mean \"{word}\"? "));
@@ -41,9 +41,9 @@ pub(super) fn from_word(key: &Key, word: &str) -> Result<Value, Wrong> {
     let unquoted = ['"', '\''].iter().find_map(|q| word.strip_prefix(*q)?.strip_suffix(*q)).unwrap_or(word);
     let digits = unquoted.replace('_', "");
     let value = match key.kind {
-        Kind::Text | Kind::Choice(_) => (!unquoted.is_empty()).then(|| Value::String(unquoted.to_owned())),
-        Kind::Boolean => word.parse().ok().map(Value::Bool),
-        Kind::Number { .. } => match digits.parse::<i128>() {
+        KeyKind::Text | KeyKind::Choice(_) => (!unquoted.is_empty()).then(|| Value::String(unquoted.to_owned())),
+        KeyKind::Boolean => word.parse().ok().map(Value::Bool),
+        KeyKind::Number { .. } => match digits.parse::<i128>() {
             Ok(i) => whole(i),
             Err(_) => digits.parse().ok().and_then(Number::from_f64).map(Value::Number),
         },
@@ -54,12 +54,12 @@ pub(super) fn from_word(key: &Key, word: &str) -> Result<Value, Wrong> {
 /// Checks the range.
 pub(super) fn check(key: &Key, value: &Value) -> Result<(), Wrong> {
     let fits = match &key.kind {
-        Kind::Number { least, most, .. } => value.as_f64().is_some_and(|x| {
+        KeyKind::Number { least, most, .. } => value.as_f64().is_some_and(|x| {
             least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
                 && most.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
         }),
-        Kind::Choice(choices) => choices.iter().any(|choice| value == choice.word.as_str()),
-        Kind::Boolean | Kind::Text => true,
+        KeyKind::Choice(choices) => choices.iter().any(|choice| value == choice.word.as_str()),
+        KeyKind::Boolean | KeyKind::Text => true,
     };
     if fits { Ok(()) } else { Err(Wrong::of(key, &text_of(value))) }
 }
@@ -83,14 +83,14 @@ fn whole(i: i128) -> Option<Value> {
 /// A value of the key's type: whole numbers stand for others, and 1e6 for a whole one.
 fn fitted(key: &Key, value: Value) -> Option<Value> {
     match (&key.kind, value) {
-        (Kind::Number { is_whole: false, .. }, Value::Number(n)) => n.as_f64().map(Value::from),
-        (Kind::Number { is_whole: true, .. }, Value::Number(n)) => match n.as_f64().filter(|_| n.is_f64()) {
+        (KeyKind::Number { is_whole: false, .. }, Value::Number(n)) => n.as_f64().map(Value::from),
+        (KeyKind::Number { is_whole: true, .. }, Value::Number(n)) => match n.as_f64().filter(|_| n.is_f64()) {
             // Beyond 2^53 a floating-point number does not tell which whole one is meant.
             Some(x) => (x.fract() == 0.0 && x.abs() < 9e15).then(|| whole(x as i128)).flatten(),
             None => Some(Value::Number(n)),
         },
-        (Kind::Boolean, value @ Value::Bool(_)) => Some(value),
-        (Kind::Text | Kind::Choice(_), value @ Value::String(_)) => Some(value),
+        (KeyKind::Boolean, value @ Value::Bool(_)) => Some(value),
+        (KeyKind::Text | KeyKind::Choice(_), value @ Value::String(_)) => Some(value),
         _ => None,
     }
 }

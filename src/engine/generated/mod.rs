@@ -8,7 +8,7 @@ mod decode;
 mod points;
 mod recipe;
 
-pub use points::{ATTEMPTS, Drawn, MAX_PARAMETERS, PointSource, Points};
+pub use points::{ATTEMPTS, DrawnPoint, MAX_PARAMETERS, PointSource, Points};
 pub use recipe::{CasePath, LateralPath, NO_SLOT, Recipe, ReducedColumns};
 
 use crate::model::scalar::Real;
@@ -30,7 +30,7 @@ pub struct Generator {
 impl Generator {
     /// The point of a sample index.
     #[inline]
-    pub fn draw(&self, index: u64) -> Drawn {
+    pub fn draw(&self, index: u64) -> DrawnPoint {
         self.points.draw(index, |point| decode::is_valid(&self.recipe, &self.basis, point))
     }
 

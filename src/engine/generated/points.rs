@@ -26,14 +26,14 @@ pub enum PointSource {
 
 /// A sample's point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drawn {
+pub struct DrawnPoint {
     /// One value per parameter, then zeros. Means nothing where the sample is void.
     pub values: [f32; MAX_PARAMETERS],
     /// Draws that it took; [`ATTEMPTS`] + 1 where all were invalid.
     pub tries: u32,
 }
 
-impl Drawn {
+impl DrawnPoint {
     /// No draw was valid: the sample has no case.
     pub fn is_void(&self) -> bool {
         self.tries > ATTEMPTS
@@ -77,15 +77,15 @@ impl Points {
     /// # Panics
     /// For an index beyond [`Points::count`]: there is no such point, and none may stand in for it.
     #[inline]
-    pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> Drawn {
+    pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> DrawnPoint {
         let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
         for attempt in 0..attempts {
             let values = self.candidate(index, attempt);
             if is_valid(&values[..self.dimensions]) {
-                return Drawn { values, tries: attempt + 1 };
+                return DrawnPoint { values, tries: attempt + 1 };
             }
         }
-        Drawn { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
+        DrawnPoint { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
     /// The component that a draw comes from: that of draw `tries` (from 1) of an index. `None` for given points.

@@ -7,7 +7,7 @@ use super::road::{Road, road_file};
 use super::scenario_file::scenario_file;
 use crate::Result;
 use crate::report::csv;
-use crate::support::run_dir::RunFolder;
+use crate::support::run_dir::OutputDir;
 
 /// Name of the index.
 pub const INDEX: &str = "index.csv";
@@ -35,7 +35,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
         let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
         made.push((scenario_file(scenario, &row.road)?, road_file(&Road::around(scenario))?, row));
     }
-    let folder = RunFolder::open(dir, INDEX)?;
+    let folder = OutputDir::open(dir, INDEX)?;
     let mut results = folder.results()?;
     // The lane has a column of its own already.
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::run::grid::Parameter;
+use crate::run::grid::MapParameter;
 use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
@@ -53,11 +53,11 @@ impl Names<'_> {
     /// # Errors
     /// [`Error::Input`] for a name that is none of ours and has no `--rename`; [`Error::Usage`] for a `--rename` to what
     /// is none.
-    pub fn find(&self, name: &str, line: u64) -> Result<(&'static Parameter, f64)> {
+    pub fn find(&self, name: &str, line: u64) -> Result<(&'static MapParameter, f64)> {
         if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
-            return Ok((Parameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
+            return Ok((MapParameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
         }
-        Parameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
+        MapParameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
             let help = error.help().unwrap_or_default();
             let problem = format!("a {} has no parameter `{name}`", self.category.label());
             let help = format!("name it by option `rename` {name}=OURS or option `rename` {name}=OURS*FACTOR; {help}");
@@ -69,7 +69,7 @@ impl Names<'_> {
     ///
     /// # Errors
     /// [`Error::Input`] with the range.
-    pub fn value(&self, (parameter, factor): (&Parameter, f64), value: f64, line: u64) -> Result<f64> {
+    pub fn value(&self, (parameter, factor): (&MapParameter, f64), value: f64, line: u64) -> Result<f64> {
         let ours = if factor == 1.0 { value } else { (value * factor * 1e9).round() / 1e9 };
         parameter.check(ours, "").map_err(|error| {
             let place = Place::file(self.path).row(line).of(format!("parameter `{}`", parameter.key));

@@ -10,7 +10,7 @@ use super::parameters::Names;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Parameter, Point, Quantity, check_complete};
+use crate::run::grid::{MapParameter, MapQuantity, Point, check_complete};
 use crate::scenario::{Case, Category, Tables};
 use crate::stats::density::Draws;
 use crate::stats::random::Stream;
@@ -32,7 +32,7 @@ const VARIANT: &str = "distribution";
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledParameter {
     /// The parameter.
-    pub parameter: &'static Parameter,
+    pub parameter: &'static MapParameter,
     /// Its distribution, in the file's unit.
     pub draw: Draw,
     /// To the parameter's unit.
@@ -49,7 +49,7 @@ pub struct DistributionSamples {
     /// The random parameters, in the file's order.
     pub parameters: Vec<SampledParameter>,
     /// The others.
-    pub fixed: Vec<(&'static Parameter, f64)>,
+    pub fixed: Vec<(&'static MapParameter, f64)>,
     /// `numberOfTestRuns` of the file.
     pub runs: u64,
     /// `randomSeed` of the file.
@@ -89,7 +89,7 @@ impl DistributionSamples {
     pub fn of(
         file: &DistributionFile,
         names: &Names,
-        fixed: Vec<(&'static Parameter, f64)>,
+        fixed: Vec<(&'static MapParameter, f64)>,
     ) -> Result<DistributionSamples> {
         names.check_renames(&file.names())?;
         let Distributions::Stochastic(Stochastic { runs, seed, parameters: of_file }) = &file.distributions else {
@@ -109,7 +109,7 @@ impl DistributionSamples {
             })?;
             parameters.push(SampledParameter { parameter, draw, factor, kept_share });
         }
-        let given: Vec<&Parameter> =
+        let given: Vec<&MapParameter> =
             parameters.iter().map(|p| p.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
         for (at, parameter) in given.iter().enumerate() {
             if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
@@ -120,7 +120,7 @@ impl DistributionSamples {
         // The headway is a flag's where it is no parameter.
         let has = |quantity| {
             let is_given = given.iter().any(|p| p.quantity == quantity);
-            is_given || (quantity == Quantity::Thw && !given.iter().any(|p| p.quantity == Quantity::Gap))
+            is_given || (quantity == MapQuantity::Thw && !given.iter().any(|p| p.quantity == MapQuantity::Gap))
         };
         check_complete(
             names.category,
@@ -134,7 +134,7 @@ impl DistributionSamples {
     /// Is the initial distance one of the parameters?
     pub fn has_distance(&self) -> bool {
         let given = self.parameters.iter().map(|p| p.parameter).chain(self.fixed.iter().map(|(p, _)| *p));
-        given.into_iter().any(|p| matches!(p.quantity, Quantity::Gap | Quantity::Thw))
+        given.into_iter().any(|p| matches!(p.quantity, MapQuantity::Gap | MapQuantity::Thw))
     }
 
     /// The point of a sample: the first of its draws that is a case.
@@ -193,8 +193,8 @@ impl DistributionSamples {
         for index in 0..samples {
             let (sampled, point, case) = self.drawn(seed, index, profile)?;
             tries += u64::from(sampled.tries);
-            let of_headway = point.get(Quantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
-            let gap_m = point.get(Quantity::Gap).or(of_headway).unwrap_or(0.0);
+            let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
+            let gap_m = point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0);
             let mut encoded = LaneCase::encode(&case, profile, &mut source.tables);
             encoded.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
             source.cases.push(encoded);

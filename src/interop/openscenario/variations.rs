@@ -2,7 +2,7 @@
 
 use super::distribution_file::{Deterministic, DistributionFile, Distributions};
 use super::parameters::Names;
-use crate::run::grid::{GridAxis, MAX_PANELS, Parameter};
+use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter};
 use crate::{Error, Place, Result};
 
 /// What a deterministic file varies.
@@ -42,7 +42,7 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
                 all.axes.push(GridAxis { parameter: found.0, values: sorted });
             }
             Deterministic::Sets { names: of_set, line, rows } => {
-                let found: Vec<(&'static Parameter, f64)> =
+                let found: Vec<(&'static MapParameter, f64)> =
                     of_set.iter().map(|name| names.find(name, *line)).collect::<Result<_>>()?;
                 let row = |row: &Vec<f64>| {
                     found.iter().zip(row).map(|(f, v)| names.value(*f, *v, *line)).collect::<Result<Vec<f64>>>()

@@ -1,6 +1,6 @@
 //! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
 
-use super::svg::Place;
+use super::svg::Position;
 use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
@@ -226,11 +226,11 @@ pub(in crate::report) fn plain_end(value: f64) -> f64 {
 pub(super) struct Axes {
     pub x: Axis,
     pub y: Axis,
-    pub centre: Option<Place>,
+    pub centre: Option<Position>,
 }
 
 impl Axes {
-    pub fn at(&self, (x, y): (f64, f64)) -> Place {
+    pub fn at(&self, (x, y): (f64, f64)) -> Position {
         let place = (self.x.at(x), self.y.at(y));
         self.centre.map_or(place, |centre| on_circle(centre, place.1, place.0))
     }
@@ -241,7 +241,7 @@ impl Axes {
 }
 
 /// The point at `turn` (radians, clockwise from the top) on a circle.
-pub(super) fn on_circle((x, y): Place, radius: f64, turn: f64) -> Place {
+pub(super) fn on_circle((x, y): Position, radius: f64, turn: f64) -> Position {
     (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
 }
 

@@ -1,7 +1,7 @@
 //! Cells: rectangles whose colour or hatching says what is in them.
 
 use super::axis::Axes;
-use super::svg::{Canvas, GRID, Paint, Place, WHITE};
+use super::svg::{Canvas, GRID, Paint, Position, WHITE};
 
 const HATCH_GREY: &str = "#9a9a9a";
 /// Overlap of neighbouring rows of cells, so that no white seam parts them.
@@ -38,7 +38,7 @@ pub struct Fill {
 
 /// A rectangle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cell {
+pub struct FilledCell {
     /// Two opposite corners.
     pub corners: [(f64, f64); 2],
     /// Its look.
@@ -62,7 +62,7 @@ pub struct ColourBar {
 #[derive(Debug, Clone, Default)]
 pub struct Cells {
     /// The rectangles.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<FilledCell>,
     /// Legend: names and the looks they explain.
     pub key: Vec<(String, Fill)>,
     /// Legend of colours that stand for numbers.
@@ -71,7 +71,7 @@ pub struct Cells {
 
 impl Fill {
     /// The whole rectangle or its middle, and the lines over it.
-    pub(super) fn draw(&self, canvas: &mut Canvas, (x1, y1): Place, (x2, y2): Place) {
+    pub(super) fn draw(&self, canvas: &mut Canvas, (x1, y1): Position, (x2, y2): Position) {
         if !self.colour.is_empty() {
             let paint = Paint { opacity: self.opacity, ..Paint::fill(&self.colour) };
             if self.is_inset {
@@ -87,7 +87,7 @@ impl Fill {
     }
 
     /// On one pattern for the whole page.
-    fn strokes(&self, (x1, y1): Place, (x2, y2): Place) -> Vec<Vec<Place>> {
+    fn strokes(&self, (x1, y1): Position, (x2, y2): Position) -> Vec<Vec<Position>> {
         let ((x1, x2), (y1, y2)) = ((x1.min(x2), x1.max(x2)), (y1.min(y2), y1.max(y2)));
         let pitch_px = if self.hatch == Hatch::Grey { 12.0 } else { 7.0 };
         // Rising lines have x + y = c, falling ones x − y = c.
@@ -112,7 +112,7 @@ impl Fill {
     }
 
     /// A sample for the legend.
-    pub(super) fn sample(&self, canvas: &mut Canvas, from: Place, to: Place) {
+    pub(super) fn sample(&self, canvas: &mut Canvas, from: Position, to: Position) {
         self.draw(canvas, from, to);
         hatch(canvas, std::iter::once((self, from, to)));
         canvas.rect(from, to, Paint::line(GRID, 0.8));
@@ -120,10 +120,10 @@ impl Fill {
 }
 
 /// The lines over cells, one path per colour.
-fn hatch<'a>(canvas: &mut Canvas, cells: impl Iterator<Item = (&'a Fill, Place, Place)> + Clone) {
+fn hatch<'a>(canvas: &mut Canvas, cells: impl Iterator<Item = (&'a Fill, Position, Position)> + Clone) {
     for (is_grey, paint) in [(false, Paint::line(WHITE, 1.4)), (true, Paint::line(HATCH_GREY, 0.8))] {
         let own = cells.clone().filter(|cell| matches!(cell.0.hatch, Hatch::Grey | Hatch::Crossed) == is_grey);
-        let strokes: Vec<Vec<Place>> = own.flat_map(|(fill, from, to)| fill.strokes(from, to)).collect();
+        let strokes: Vec<Vec<Position>> = own.flat_map(|(fill, from, to)| fill.strokes(from, to)).collect();
         if !strokes.is_empty() {
             canvas.group("class=\"hatch\"", "", |canvas| canvas.path(&strokes, false, paint));
         }
@@ -132,7 +132,7 @@ fn hatch<'a>(canvas: &mut Canvas, cells: impl Iterator<Item = (&'a Fill, Place, 
 
 impl Cells {
     pub(super) fn draw(&self, canvas: &mut Canvas, axes: &Axes) {
-        let places = |cell: &Cell| (axes.at(cell.corners[0]), axes.at(cell.corners[1]));
+        let places = |cell: &FilledCell| (axes.at(cell.corners[0]), axes.at(cell.corners[1]));
         // Whole cells without smoothing, so that no white seams part neighbours; the rims of small squares need it.
         for is_inset in [false, true] {
             let attributes = if is_inset { "class=\"inset\"" } else { "shape-rendering=\"crispEdges\"" };

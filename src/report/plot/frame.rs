@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::axis::on_circle;
-use super::svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, set};
+use super::svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, set};
 use super::{
     ColourBar, HEADING, INDENT_PX, NAME_GAP_PX, NAME_PX, NOTE_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK,
 };
@@ -82,7 +82,7 @@ pub(super) fn numbers_left(canvas: &mut Canvas, axis: &Axis, (left, right): (f64
 }
 
 /// A spoke's name outside the outer ring: upward at the top, downward at the bottom, centred beside it.
-pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Place, turn: f64) {
+pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Position, turn: f64) {
     let (x, y) = on_circle(centre, RADIUS_PX + NAME_GAP_PX, turn);
     let anchor = match libm::sin(turn) {
         across if across > 0.2 => Anchor::Start,

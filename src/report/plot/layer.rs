@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::axis::{Axes, number, on_circle};
 use super::cells::Cells;
-use super::svg::{Anchor, Canvas, GREY, Paint, Place, Type, WHITE, set};
+use super::svg::{Anchor, Canvas, GREY, Paint, Position, Type, WHITE, set};
 
 pub(in crate::report) const TICK: Type = set(13, false, GREY);
 
@@ -73,7 +73,7 @@ impl Look {
     }
 
     /// The marker around a point, with a white rim that parts it from the markers below.
-    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Place) {
+    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
         let (r, colour) = (self.marker_px, self.colour);
         let rimmed = Paint { stroke: Some((WHITE, 1.0)), ..Paint::fill(colour) };
         match self.symbol {
@@ -201,7 +201,7 @@ impl From<Cells> for Layer {
 
 impl Rule {
     pub(super) fn draw(&self, canvas: &mut Canvas, axes: &Axes) {
-        let runs: Vec<Vec<Place>> =
+        let runs: Vec<Vec<Position>> =
             self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
         canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
@@ -233,7 +233,7 @@ impl Series {
     }
 
     /// The ends of a value's interval.
-    fn ends(&self, value: &Value, axes: &Axes) -> Option<(Place, Place)> {
+    fn ends(&self, value: &Value, axes: &Axes) -> Option<(Position, Position)> {
         let (lower, upper) = value.interval?;
         let end = |v: f64| axes.at(if self.is_sideways { (v, value.y) } else { (value.x, v) });
         Some((end(lower), end(upper)))
@@ -244,7 +244,7 @@ impl Series {
             return;
         }
         for (run, _) in self.runs(axes) {
-            let ends: Vec<(Place, Place)> = run.iter().filter_map(|value| self.ends(value, axes)).collect();
+            let ends: Vec<(Position, Position)> = run.iter().filter_map(|value| self.ends(value, axes)).collect();
             let outline = ends.iter().map(|ends| ends.1).chain(ends.iter().rev().map(|ends| ends.0)).collect();
             let paint = match ends.len() {
                 1 => Paint::line(look.colour, 1.2),
@@ -270,7 +270,7 @@ impl Series {
         // Round joins: a mitred corner of a thin spike would reach beyond its value.
         canvas.group("class=\"series\" stroke-linejoin=\"round\"", "", |canvas| {
             for (run, is_closed) in runs {
-                let places: Vec<Place> = run.iter().map(|value| axes.at((value.x, value.y))).collect();
+                let places: Vec<Position> = run.iter().map(|value| axes.at((value.x, value.y))).collect();
                 match places[..] {
                     [_] if self.has(Mark::Points) => {}
                     [place] => canvas.circle(place, 1.0 + look.line_px / 2.0, Paint::fill(look.colour)),
@@ -332,8 +332,8 @@ impl Series {
     }
 
     /// Without a bar at a lower end that is beyond the axis.
-    fn interval(&self, canvas: &mut Canvas, (lower, upper): (Place, Place), has_lower: bool, look: &Look) {
-        let bar = |(x, y): Place| match self.is_sideways {
+    fn interval(&self, canvas: &mut Canvas, (lower, upper): (Position, Position), has_lower: bool, look: &Look) {
+        let bar = |(x, y): Position| match self.is_sideways {
             true => vec![(x, y - 4.0), (x, y + 4.0)],
             false => vec![(x - 4.0, y), (x + 4.0, y)],
         };
@@ -342,7 +342,7 @@ impl Series {
     }
 
     /// A short bar with an arrow towards lower values: the value is somewhere there.
-    fn limit(&self, canvas: &mut Canvas, (x, y): Place, look: &Look) {
+    fn limit(&self, canvas: &mut Canvas, (x, y): Position, look: &Look) {
         // From the bar's middle so far towards lower values and so far beside it.
         let at = |on: f64, beside: f64| if self.is_sideways { (x - on, y + beside) } else { (x + beside, y + on) };
         // The lines drawn first are the wider ones: where limits coincide, as they do early on, each can be seen.
@@ -353,7 +353,7 @@ impl Series {
     }
 
     /// A sample for the legend, of what the series draws.
-    pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Place, width_px: f64, look: &Look) {
+    pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64, look: &Look) {
         if self.marks.iter().any(|mark| matches!(mark, Mark::Band | Mark::Bars(_))) {
             let opacity = if self.has(Mark::Band) { Some(0.16) } else { None };
             canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), Paint { opacity, ..Paint::fill(look.colour) });
@@ -368,19 +368,19 @@ impl Series {
 }
 
 /// A word beside a place, where no other stands.
-fn label(canvas: &mut Canvas, place: Place, words: &str, taken: &mut Vec<(f64, f64, f64)>) {
+fn label(canvas: &mut Canvas, place: Position, words: &str, taken: &mut Vec<(f64, f64, f64)>) {
     let width = TICK.text_px(words);
     let places = [(9.0, -7.0), (-9.0 - width, -7.0), (9.0, 14.0), (-9.0 - width, 14.0), (9.0, -21.0)];
     let places = places.map(|(dx, dy)| (place.0 + dx, place.1 + dy));
-    let is_free = |(x, y): &Place| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
+    let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
     let (x, y) = places.into_iter().find(is_free).unwrap_or(places[0]);
     taken.push((x, width, y));
     canvas.text((x, y), words, TICK, Anchor::Start);
 }
 
 /// Without points between neighbours on whose line they lie: a lane has thousands of steps.
-fn without_inner_points(places: &[Place]) -> Vec<Place> {
-    let mut kept: Vec<Place> = Vec::new();
+fn without_inner_points(places: &[Position]) -> Vec<Position> {
+    let mut kept: Vec<Position> = Vec::new();
     for (k, &(x, y)) in places.iter().enumerate() {
         let is_inner = match (kept.last(), places.get(k + 1)) {
             (Some(&(x0, y0)), Some(&(x1, y1))) if x1 > x0 => (y0 + (y1 - y0) * (x - x0) / (x1 - x0) - y).abs() < 0.004,

@@ -13,7 +13,7 @@ mod svg;
 use std::f64::consts::TAU;
 
 pub use axis::AxisScale;
-pub use cells::{Cell, Cells, ColourBar, Fill, Hatch};
+pub use cells::{Cells, ColourBar, Fill, FilledCell, Hatch};
 pub use layer::{Layer, Look, Mark, Rule, Series, Symbol, Value};
 
 pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
@@ -21,7 +21,7 @@ pub(super) use frame::ROW;
 pub(super) use layer::TICK;
 #[cfg(test)]
 pub(super) use svg::tests::words;
-pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Place, Type, WHITE, set};
+pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, WHITE, set};
 
 use super::csv;
 use crate::Result;
@@ -321,7 +321,7 @@ impl Plot {
     }
 
     /// The axes within these ends; `None` where there is nothing to show.
-    fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Place>) -> Option<Axes> {
+    fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
         let width =
             |series: &Series| series.marks.iter().find_map(|m| if let Mark::Bars(w) = m { Some(*w) } else { None });
         let half = self.series().filter_map(width).fold(0.0, f64::max) / 2.0;

@@ -13,7 +13,7 @@ pub(in crate::report) const WHITE: &str = "#ffffff";
 const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
 
 /// A place on the page, px.
-pub(in crate::report) type Place = (f64, f64);
+pub(in crate::report) type Position = (f64, f64);
 
 /// How a shape is painted. Colours are `#rrggbb`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -148,19 +148,19 @@ impl Canvas {
     }
 
     /// A rectangle from corner to corner, in either order.
-    pub fn rect(&mut self, (x1, y1): Place, (x2, y2): Place, paint: Paint) {
+    pub fn rect(&mut self, (x1, y1): Position, (x2, y2): Position, paint: Paint) {
         let (x, y, width, height) =
             (Number(x1.min(x2)), Number(y1.min(y2)), Number((x2 - x1).abs()), Number((y2 - y1).abs()));
         self.shape(format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), paint);
     }
 
-    pub fn circle(&mut self, (x, y): Place, radius_px: f64, paint: Paint) {
+    pub fn circle(&mut self, (x, y): Position, radius_px: f64, paint: Paint) {
         self.shape(format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", Number(x), Number(y), Number(radius_px)), paint);
     }
 
     /// Runs of straight lines, as one path.
-    pub fn path(&mut self, runs: &[Vec<Place>], is_closed: bool, paint: Paint) {
-        let run = |points: &Vec<Place>| {
+    pub fn path(&mut self, runs: &[Vec<Position>], is_closed: bool, paint: Paint) {
+        let run = |points: &Vec<Position>| {
             let corners: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
             format!("M{}{}", corners.join(" L"), if is_closed { " Z" } else { "" })
         };
@@ -170,12 +170,12 @@ impl Canvas {
         }
     }
 
-    pub fn line(&mut self, from: Place, to: Place, colour: &str, width_px: f64) {
+    pub fn line(&mut self, from: Position, to: Position, colour: &str, width_px: f64) {
         self.path(&[vec![from, to]], false, Paint::line(colour, width_px));
     }
 
     /// One line of text on its base line.
-    pub fn text(&mut self, (x, y): Place, line: &str, set: Type, anchor: Anchor) {
+    pub fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
@@ -193,7 +193,7 @@ impl Canvas {
     }
 
     /// A wrapped text with its top at `y`; returns the y below it.
-    pub fn block(&mut self, (x, y): Place, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
+    pub fn block(&mut self, (x, y): Position, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
         let lines = set.wrap(words, width_px);
         for (k, line) in lines.iter().enumerate() {
             self.text((x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, anchor);
@@ -201,7 +201,7 @@ impl Canvas {
         y + lines.len() as f64 * set.line_px()
     }
 
-    pub fn paragraph(&mut self, at: Place, words: &str, set: Type, width_px: f64) -> f64 {
+    pub fn paragraph(&mut self, at: Position, words: &str, set: Type, width_px: f64) -> f64 {
         self.block(at, words, set, width_px, Anchor::Start)
     }
 

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
 use super::plot::{Axis, number};
 use crate::Result;
-use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
+use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
 use crate::support::table::csv_field;
 pub use panels::TraceSeries;
 use panels::{Column, Panel, Shown, mark_dash, mark_look};
@@ -78,7 +78,8 @@ impl TraceFigure<'_> {
 
     /// Names, marks and worst values of the series; returns the y below.
     fn table(&self, canvas: &mut Canvas, looks: &[Look], width_px: f64, top: f64) -> f64 {
-        let columns = [Mark::Reaction.label(), Mark::Braking.label(), Mark::Contact.label(), "min TTC", "max BTN"];
+        let columns =
+            [StepMark::Reaction.label(), StepMark::Braking.label(), StepMark::Contact.label(), "min TTC", "max BTN"];
         let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
         let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
         let most = width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
@@ -92,7 +93,7 @@ impl TraceFigure<'_> {
             let sample = vec![(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)];
             canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[sample], false, look.paint()));
             let below = canvas.paragraph((name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
-            for (column, mark) in Mark::ALL.into_iter().enumerate() {
+            for (column, mark) in StepMark::ALL.into_iter().enumerate() {
                 let Some(step) = series.trace.step_of(mark) else {
                     canvas.text((at(column), baseline), "never", HINT, Anchor::Start);
                     continue;
@@ -132,7 +133,7 @@ impl TraceFigure<'_> {
 }
 
 /// One column of panels over one time axis; returns the y below.
-fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, lines: &[(Mark, f64)]) -> f64 {
+fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, lines: &[(StepMark, f64)]) -> f64 {
     let look = |series: &Series| series.look.unwrap_or_else(|| Look::of(0, 1));
     let mut y = top;
     for (k, Panel { hint, plot }) in panels.iter().enumerate() {
@@ -160,7 +161,7 @@ fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, l
 
 /// The label of a line, and the line from there down to the first plot; on the side that has room. Later lines pass
 /// behind: the label is on white.
-fn mark_label(canvas: &mut Canvas, (mark, at_s): (Mark, f64), x: f64, (top, bottom): (f64, f64), right: f64) {
+fn mark_label(canvas: &mut Canvas, (mark, at_s): (StepMark, f64), x: f64, (top, bottom): (f64, f64), right: f64) {
     let words = format!("{} {} s", mark.label(), thousandths(at_s));
     let width = CELL.text_px(&words);
     let stub = vec![(x, top + 2.0), (x, bottom)];
@@ -201,7 +202,7 @@ pub fn csv(traces: &[(String, &Trace)]) -> String {
     text.push_str(",mark\n");
     for (name, trace) in traces {
         let lane = if is_named { format!("{},", csv_field(name)) } else { String::new() };
-        let marks = Mark::ALL.map(|mark| (mark, trace.step_of(mark)));
+        let marks = StepMark::ALL.map(|mark| (mark, trace.step_of(mark)));
         for step in &trace.steps {
             text.push_str(&lane);
             write_step(&mut text, trace, step, vehicles);

@@ -1,8 +1,8 @@
 //! What the figure of a case shows: its panels as plots. Where they stand on the sheet is the figure's business.
 
 use super::super::plot::plain_end;
-use super::super::plot::{GREY, Height, INK, Layer, Look, Mark as Drawn, Plot, PlotAxis, Rule, Series, Symbol, Value};
-use crate::engine::{Mark, Trace, TracedStep, TracedVehicle};
+use super::super::plot::{GREY, Height, INK, Layer, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
+use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
 
 /// One lane on the sheet.
 #[derive(Debug, Clone)]
@@ -34,7 +34,7 @@ impl From<Curve> for Layer {
     fn from(curve: Curve) -> Self {
         let line_px = if curve.is_thin && curve.look.colour != GREY { 1.0 } else { curve.look.line_px };
         let look = Some(Look { line_px, ..curve.look });
-        Series { look, ..Series::new("", &[Drawn::Line], curve.points) }.into()
+        Series { look, ..Series::new("", &[Mark::Line], curve.points) }.into()
     }
 }
 
@@ -51,21 +51,21 @@ pub(super) struct Panel {
 pub(super) type Column = Vec<Panel>;
 
 /// A mark in the colour of its series; told apart by shape.
-pub(super) fn mark_look(mark: Mark, look: &Look) -> Look {
+pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
     let symbol = match mark {
-        Mark::Reaction => Symbol::Ring,
-        Mark::Braking => Symbol::Polygon(3, 0.5),
-        Mark::Contact => Symbol::Cross,
+        StepMark::Reaction => Symbol::Ring,
+        StepMark::Braking => Symbol::Polygon(3, 0.5),
+        StepMark::Contact => Symbol::Cross,
     };
     Look { symbol, marker_px: 5.0, ..*look }
 }
 
 /// Dashes of the line through all panels at a mark.
-pub(super) fn mark_dash(mark: Mark) -> &'static str {
+pub(super) fn mark_dash(mark: StepMark) -> &'static str {
     match mark {
-        Mark::Reaction => "2,3",
-        Mark::Braking => "7,3",
-        Mark::Contact => "",
+        StepMark::Reaction => "2,3",
+        StepMark::Braking => "7,3",
+        StepMark::Contact => "",
     }
 }
 
@@ -159,10 +159,10 @@ impl<'a> Shown<'a> {
     }
 
     /// Where lines run through all panels: for a single lane only, more would be a thicket.
-    pub fn mark_lines(&self) -> Vec<(Mark, f64)> {
+    pub fn mark_lines(&self) -> Vec<(StepMark, f64)> {
         let [series] = self.series else { return Vec::new() };
-        let time = |mark: Mark| Some((mark, series.trace.time_s(series.trace.step_of(mark)?)));
-        Mark::ALL.into_iter().filter_map(time).filter(|mark| mark.1 <= self.until_s).collect()
+        let time = |mark: StepMark| Some((mark, series.trace.time_s(series.trace.step_of(mark)?)));
+        StepMark::ALL.into_iter().filter_map(time).filter(|mark| mark.1 <= self.until_s).collect()
     }
 
     fn speed(&self, vehicles: usize) -> Panel {
@@ -183,14 +183,14 @@ impl<'a> Shown<'a> {
             _ => "thin: the other vehicles",
         };
         let ends = around(values(&curves));
-        let marks = self.marks(&Mark::ALL, None, &|step| Some(step.v_ego_mps));
+        let marks = self.marks(&StepMark::ALL, None, &|step| Some(step.v_ego_mps));
         self.panel("Speed (m/s)", hint, 92.0, ends, layers(curves, marks))
     }
 
     fn acceleration(&self) -> Panel {
         let curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
         let ends = around(values(&curves).chain([0.0, -1.0]));
-        let mut layers = layers(curves, self.marks(&Mark::ALL, None, &|step| Some(step.a_ego_mps2)));
+        let mut layers = layers(curves, self.marks(&StepMark::ALL, None, &|step| Some(step.a_ego_mps2)));
         layers.push(self.level(0.0, GREY, 1.1, ""));
         self.panel("Acceleration (m/s²)", "of the ego", 92.0, ends, layers)
     }
@@ -199,8 +199,8 @@ impl<'a> Shown<'a> {
         let gap = |step: &TracedStep| Some(step.others[vehicle]).filter(|o| o.is_present).map(|o| o.gap_m);
         let curves = self.judged_curves(vehicle, &|other| other.gap_m);
         let ends = around(values(&curves).chain([0.0]));
-        let mut marks = self.marks(&[Mark::Reaction, Mark::Braking], None, &gap);
-        marks.extend(self.marks(&[Mark::Contact], Some(vehicle), &gap));
+        let mut marks = self.marks(&[StepMark::Reaction, StepMark::Braking], None, &gap);
+        marks.extend(self.marks(&[StepMark::Contact], Some(vehicle), &gap));
         let mut layers = layers(curves, marks);
         layers.push(self.level(0.0, GREY, 1.1, ""));
         self.panel("Gap (m)", name, 92.0, ends, layers)
@@ -251,11 +251,11 @@ impl<'a> Shown<'a> {
                 let side = |&(x, y): &(f64, f64)| Value { interval: Some((y - half_m, y + half_m)), ..(x, y).into() };
                 let values: Vec<Value> = run.points.iter().map(side).collect();
                 edges.extend(run.points.iter().flat_map(|point| [point.1 - half_m, point.1 + half_m]));
-                bands.push(Series { values, look: Some(look), ..Series::new("", &[Drawn::Band], []) }.into());
+                bands.push(Series { values, look: Some(look), ..Series::new("", &[Mark::Band], []) }.into());
                 curves.push(run);
             }
         }
-        let contacts = self.marks(&[Mark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
+        let contacts = self.marks(&[StepMark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
         let lane = [-HALF_LANE_M, HALF_LANE_M].map(|y| self.level(y, GREY, 1.1, "14,6"));
         let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, ""));
         let layers = lane.into_iter().chain(sides).chain(bands).chain(layers(curves, contacts));
@@ -304,7 +304,12 @@ impl<'a> Shown<'a> {
     }
 
     /// Marks of the lanes, as layers; contacts with one vehicle only where it is given.
-    fn marks(&self, which: &[Mark], vehicle: Option<usize>, value: &dyn Fn(&TracedStep) -> Option<f64>) -> Vec<Layer> {
+    fn marks(
+        &self,
+        which: &[StepMark],
+        vehicle: Option<usize>,
+        value: &dyn Fn(&TracedStep) -> Option<f64>,
+    ) -> Vec<Layer> {
         let mut marks = Vec::new();
         for (of, look) in self.series.iter().zip(&self.looks) {
             if vehicle.is_some_and(|vehicle| usize::from(of.trace.outcome.contact_with) != vehicle) {
@@ -314,7 +319,7 @@ impl<'a> Shown<'a> {
                 let step = of.trace.step_of(mark).and_then(|step| self.steps(of.trace).get(step as usize));
                 let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) else { continue };
                 let attributes = format!("class=\"mark {}\" data-t=\"{}\"", mark.label(), step.time_s);
-                let series = Series::new("", &[Drawn::Points], [(step.time_s, value)]);
+                let series = Series::new("", &[Mark::Points], [(step.time_s, value)]);
                 marks.push(Series { look: Some(mark_look(mark, look)), attributes, ..series }.into());
             }
         }
@@ -339,7 +344,7 @@ fn last_change_s(trace: &Trace) -> f64 {
         of(worst).is_finite().then_some(worst.time_s)
     };
     let worst = [worst(&|other| other.ttc_s), worst(&|other| -other.btn)];
-    let marks = Mark::ALL.map(|mark| trace.step_of(mark).map(|step| trace.time_s(step)));
+    let marks = StepMark::ALL.map(|mark| trace.step_of(mark).map(|step| trace.time_s(step)));
     changes.next_back().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::plot::words;
 use super::{TraceFigure, TraceSeries, csv};
-use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, Mark, Trace};
+use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, StepMark, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::{StudyOptions, plan_study};
@@ -105,7 +105,7 @@ fn check(traces: &[Trace]) -> Panels {
     assert!(!points.is_empty());
     let mut expected = Vec::new();
     for trace in traces {
-        for mark in Mark::ALL {
+        for mark in StepMark::ALL {
             if let Some(step) = trace.step_of(mark) {
                 let share = if until_s > 0.0 { trace.time_s(step) / until_s } else { 0.0 };
                 expected.push((mark.label(), left + share * (right - left)));
@@ -134,7 +134,7 @@ fn every_series_of_a_studys_lanes_is_inside_its_frame_and_every_mark_at_its_step
         let key = plan.key(lane).unwrap();
         let models = (0..plan.models.len()).map(|model| runner.trace(&crate::engine::LaneKey { model, ..key }));
         let traces: Vec<Trace> = models.collect();
-        contacts += traces.iter().filter(|t| t.step_of(Mark::Contact).is_some()).count();
+        contacts += traces.iter().filter(|t| t.step_of(StepMark::Contact).is_some()).count();
         check(&traces);
         check(&traces[..1]);
         drawn += 2;
@@ -154,10 +154,10 @@ fn a_lane_of_one_step_is_a_picture_of_dots() {
 fn a_contact_at_once_a_gap_of_nothing_and_a_ttc_that_is_never_finite_are_drawn() {
     let closing = case(Category::Lvd, 30.0, vehicle(10.0, Lateral::Centred));
     let at_once = trace("jrc-2021", &closing, 0.0, ModelId::Fsm);
-    assert_eq!(at_once.step_of(Mark::Contact), Some(0));
+    assert_eq!(at_once.step_of(StepMark::Contact), Some(0));
     check(&[at_once]);
     let gap_0 = trace("paper", &closing, 0.0, ModelId::Fsm);
-    assert_eq!(gap_0.step_of(Mark::Contact), Some(1));
+    assert_eq!(gap_0.step_of(StepMark::Contact), Some(1));
     let panels = check(&[gap_0]);
     assert!(panels[2].2.iter().any(|(mark, _)| mark == "contact"), "also in the gap's panel");
     let opening = case(Category::Lvd, 10.0, vehicle(30.0, Lateral::Centred));
@@ -248,7 +248,7 @@ fn the_table_has_every_number_of_the_figure() {
                 let flags = [value("present"), value("judged")];
                 assert_eq!(flags, [other.is_present, other.is_judged].map(|is| f64::from(u8::from(is))));
             }
-            let marks: Vec<_> = Mark::ALL.into_iter().filter(|m| trace.step_of(*m) == Some(step.step)).collect();
+            let marks: Vec<_> = StepMark::ALL.into_iter().filter(|m| trace.step_of(*m) == Some(step.step)).collect();
             assert_eq!(of(row, "mark"), marks.iter().map(|m| m.label()).collect::<Vec<_>>().join("+"));
         }
         let judged = |value: &dyn Fn(&crate::engine::TracedVehicle) -> f64| {

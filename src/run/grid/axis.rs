@@ -3,7 +3,7 @@
 use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
-use super::parameter::Parameter;
+use super::parameter::MapParameter;
 
 /// Values of one axis at most.
 pub const MAX_VALUES: usize = 100_000;
@@ -12,7 +12,7 @@ pub const MAX_VALUES: usize = 100_000;
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridAxis {
     /// The parameter.
-    pub parameter: &'static Parameter,
+    pub parameter: &'static MapParameter,
     /// Values in its unit, in order; at least one.
     pub values: Vec<f64>,
 }
@@ -28,7 +28,7 @@ impl GridAxis {
         const FORM: &str = "write NAME=FROM..TO/STEP or NAME=A,B,C, for instance gap_m=1..60/1";
         let wrong = |problem: String, help: &str| Error::usage(Place::item(flag), problem, help);
         let (key, values) = text.split_once('=').ok_or_else(|| wrong(format!("`{text}` has no values"), FORM))?;
-        let parameter = Parameter::find(category, key.trim(), flag)?;
+        let parameter = MapParameter::find(category, key.trim(), flag)?;
         let number = |part: &str| {
             let value = part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
             value.ok_or_else(|| wrong(format!("`{}` in `{text}` is no number", part.trim()), FORM))
@@ -53,7 +53,7 @@ impl GridAxis {
     /// # Errors
     /// As [`GridAxis::parse`].
     pub fn range(category: Category, key: &str, ends: (f64, f64), step: f64) -> Result<GridAxis> {
-        let parameter = Parameter::find(category, key, "preset")?;
+        let parameter = MapParameter::find(category, key, "preset")?;
         Ok(GridAxis { parameter, values: range(ends, step, key, "preset")? })
     }
 

@@ -7,7 +7,7 @@ use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
 use super::jrc_case::{self, Front};
-use super::parameter::{Parameter, Point, Quantity};
+use super::parameter::{MapParameter, MapQuantity, Point};
 
 /// Cells of a grid at most.
 pub const MAX_CELLS: usize = 1_000_000;
@@ -37,7 +37,7 @@ pub struct Grid {
     y: GridAxis,
     panel_axes: Vec<GridAxis>,
     panels: Vec<Vec<f64>>,
-    fixed: Vec<(&'static Parameter, f64)>,
+    fixed: Vec<(&'static MapParameter, f64)>,
     style: CaseStyle,
     native_gap: bool,
 }
@@ -56,7 +56,7 @@ pub struct GridParts {
     /// Every combination of their values is a panel.
     pub panel_axes: Vec<GridAxis>,
     /// Values that are the same in every cell.
-    pub fixed: Vec<(&'static Parameter, f64)>,
+    pub fixed: Vec<(&'static MapParameter, f64)>,
     /// How a point becomes a case.
     pub style: CaseStyle,
     /// Each model starts at its own distance ([`jrc_case::native_distance`]) and not at a gap or headway.
@@ -75,7 +75,7 @@ impl Grid {
     pub fn new(parts: GridParts) -> Result<Grid> {
         let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only, panel_rows } = parts;
         let axes = || [&x, &y].into_iter().chain(&panel_axes);
-        let given: Vec<&Parameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
+        let given: Vec<&MapParameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
         for (at, parameter) in given.iter().enumerate() {
             if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
@@ -102,7 +102,7 @@ impl Grid {
     }
 
     fn leave_out_receding(&mut self) -> Result<()> {
-        let speeds = |point: &Point| point.get(Quantity::EgoSpeed).zip(point.get(Quantity::OtherSpeed));
+        let speeds = |point: &Point| point.get(MapQuantity::EgoSpeed).zip(point.get(MapQuantity::OtherSpeed));
         let mut kept = Vec::new();
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
@@ -157,7 +157,7 @@ impl Grid {
     }
 
     /// Values that are the same in every cell.
-    pub fn fixed(&self) -> &[(&'static Parameter, f64)] {
+    pub fn fixed(&self) -> &[(&'static MapParameter, f64)] {
         &self.fixed
     }
 
@@ -188,7 +188,7 @@ impl Grid {
     }
 
     /// The values of a cell in the units of their parameters: panel's, `y`, `x`.
-    pub fn values(&self, cell: usize) -> Vec<(&'static Parameter, f64)> {
+    pub fn values(&self, cell: usize) -> Vec<(&'static MapParameter, f64)> {
         let (panel, i, j) = self.places(cell);
         let of_panel = self.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
         of_panel.chain([(self.y.parameter, self.y.values[j]), (self.x.parameter, self.x.values[i])]).collect()
@@ -233,9 +233,9 @@ impl Grid {
     pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
         let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
         let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
-        let ego_mps = value(Quantity::EgoSpeed, 0.0);
-        let other_mps = value(Quantity::OtherSpeed, ego_mps);
-        let lateral_mps = value(Quantity::LateralSpeed, 0.0);
+        let ego_mps = value(MapQuantity::EgoSpeed, 0.0);
+        let other_mps = value(MapQuantity::OtherSpeed, ego_mps);
+        let lateral_mps = value(MapQuantity::LateralSpeed, 0.0);
         if self.style == CaseStyle::Plain {
             return point.plain_case(self.category, profile).case(profile.frame.time_cap_s);
         }
@@ -244,13 +244,13 @@ impl Grid {
                 jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point, dt_s), dt_s)
             }
             Category::Lvd => {
-                let (end, deceleration) = (value(Quantity::EndSpeed, 0.0), value(Quantity::Deceleration, 0.0));
+                let (end, deceleration) = (value(MapQuantity::EndSpeed, 0.0), value(MapQuantity::Deceleration, 0.0));
                 jrc_case::lvd(ego_mps, end, deceleration)
             }
             Category::CutOut => {
-                let speed_mps = value(Quantity::AheadSpeed, 0.0);
+                let speed_mps = value(MapQuantity::AheadSpeed, 0.0);
                 let length_m = if speed_mps > 0.0 { jrc_case::LENGTH_M } else { jrc_case::STANDING_LENGTH_M };
-                let front = Front { speed_mps, length_m, distance_m: value(Quantity::AheadGap, 0.0) };
+                let front = Front { speed_mps, length_m, distance_m: value(MapQuantity::AheadGap, 0.0) };
                 jrc_case::cut_out(ego_mps, lateral_mps, front, dt_s)
             }
         })
@@ -259,26 +259,26 @@ impl Grid {
     /// The initial gap of a cell's lane of a model, m, bumper to bumper at the nominal start.
     pub fn gap_m(&self, cell: usize, model: ModelId, profile: &Profile) -> f64 {
         let point = self.point(cell);
-        let ego_mps = point.get(Quantity::EgoSpeed).unwrap_or(0.0);
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         if self.native_gap {
             return jrc_case::native_distance(profile, model, ego_mps);
         }
-        let of_headway = point.get(Quantity::Thw).map(|thw_s| thw_s * ego_mps);
-        point.get(Quantity::Gap).or(of_headway).unwrap_or(0.0)
+        let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * ego_mps);
+        point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0)
     }
 
     /// What a cell's run-up adds to its gap, m.
     pub(super) fn run_up_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
         let point = self.point(cell);
-        let ego_mps = point.get(Quantity::EgoSpeed).unwrap_or(0.0);
-        let other_mps = point.get(Quantity::OtherSpeed).unwrap_or(ego_mps);
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
         jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s)
     }
 }
 
 /// Steps of a case's lateral run-up.
 fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
-    match (style, point.get(Quantity::LateralSpeed)) {
+    match (style, point.get(MapQuantity::LateralSpeed)) {
         (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps, dt_s),
         _ => 0,
     }
@@ -308,27 +308,27 @@ fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
 pub(crate) fn check_complete(
     category: Category,
     native_gap: bool,
-    has: &dyn Fn(Quantity) -> bool,
+    has: &dyn Fn(MapQuantity) -> bool,
     (needing, how): Needing,
 ) -> Result<()> {
     let missing = |what: &str, example: &str| {
         let problem = format!("{needing} of {}s needs {what}", category.label());
         Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
     };
-    let has_gap = has(Quantity::Gap) || has(Quantity::Thw);
-    if !has(Quantity::EgoSpeed) {
+    let has_gap = has(MapQuantity::Gap) || has(MapQuantity::Thw);
+    if !has(MapQuantity::EgoSpeed) {
         return missing("the ego's speed", "ego_speed_kmh=60");
     }
-    if category != Category::Lvd && !has(Quantity::LateralSpeed) {
+    if category != Category::Lvd && !has(MapQuantity::LateralSpeed) {
         return missing("the lateral speed", "lateral_speed_mps=1");
     }
-    if category == Category::Lvd && !has(Quantity::Deceleration) {
+    if category == Category::Lvd && !has(MapQuantity::Deceleration) {
         return missing("the leader's deceleration", "deceleration_mps2=6");
     }
-    if category == Category::CutOut && !has(Quantity::AheadGap) {
+    if category == Category::CutOut && !has(MapQuantity::AheadGap) {
         return missing("the gap to the vehicle ahead", "ahead_gap_m=50");
     }
-    if has(Quantity::Gap) && has(Quantity::Thw) || native_gap && has_gap {
+    if has(MapQuantity::Gap) && has(MapQuantity::Thw) || native_gap && has_gap {
         let problem = "the initial distance is given twice".to_owned();
         let help = "keep one of gap_m, thw_s and option `native_gap`";
         return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));

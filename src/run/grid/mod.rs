@@ -18,7 +18,7 @@ pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
 pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, boundary, count, runs};
-pub use parameter::{PARAMETERS, Parameter, Point, Quantity};
+pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 

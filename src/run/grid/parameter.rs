@@ -8,7 +8,7 @@ use crate::{Error, Place, Result};
 
 /// What a parameter sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum MapQuantity {
     /// Initial speed of the ego.
     EgoSpeed,
     /// Initial speed of the vehicle that cuts in, cuts out or leads.
@@ -35,14 +35,14 @@ pub enum Quantity {
     Width,
 }
 
-impl Quantity {
+impl MapQuantity {
     /// How many there are.
     pub const COUNT: usize = 12;
 }
 
 /// A parameter by the name that flags, tables and files give it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameter {
+pub struct MapParameter {
     /// Name with its unit.
     pub key: &'static str,
     /// Name on an axis.
@@ -50,7 +50,7 @@ pub struct Parameter {
     /// Unit on an axis.
     pub unit: &'static str,
     /// What it sets.
-    pub quantity: Quantity,
+    pub quantity: MapQuantity,
     /// So many of its units are one SI unit.
     pub per_si: f64,
     /// Smallest value, in its unit.
@@ -70,28 +70,44 @@ const fn parameter(
     key: &'static str,
     label: &'static str,
     unit: &'static str,
-    quantity: Quantity,
+    quantity: MapQuantity,
     per_si: f64,
     (least, most): (f64, f64),
     categories: &'static [Category],
-) -> Parameter {
-    Parameter { key, label, unit, quantity, per_si, least, most, categories }
+) -> MapParameter {
+    MapParameter { key, label, unit, quantity, per_si, least, most, categories }
 }
 
 /// All, in the order of help texts.
-pub const PARAMETERS: [Parameter; 16] = [
-    parameter("ego_speed_mps", "Speed of the ego", "m/s", Quantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("ego_speed_kmh", "Speed of the ego", "km/h", Quantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("other_speed_mps", "Speed of the other vehicle", "m/s", Quantity::OtherSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("other_speed_kmh", "Speed of the other vehicle", "km/h", Quantity::OtherSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("gap_m", "Initial gap", "m", Quantity::Gap, 1.0, (0.0, 1e4), EVERY),
-    parameter("thw_s", "Initial time headway", "s", Quantity::Thw, 1.0, (0.0, 100.0), EVERY),
-    parameter("lateral_speed_mps", "Lateral speed", "m/s", Quantity::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
+pub const PARAMETERS: [MapParameter; 16] = [
+    parameter("ego_speed_mps", "Speed of the ego", "m/s", MapQuantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
+    parameter("ego_speed_kmh", "Speed of the ego", "km/h", MapQuantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
+    parameter(
+        "other_speed_mps",
+        "Speed of the other vehicle",
+        "m/s",
+        MapQuantity::OtherSpeed,
+        1.0,
+        (0.0, 150.0),
+        EVERY,
+    ),
+    parameter(
+        "other_speed_kmh",
+        "Speed of the other vehicle",
+        "km/h",
+        MapQuantity::OtherSpeed,
+        KMH,
+        (0.0, 540.0),
+        EVERY,
+    ),
+    parameter("gap_m", "Initial gap", "m", MapQuantity::Gap, 1.0, (0.0, 1e4), EVERY),
+    parameter("thw_s", "Initial time headway", "s", MapQuantity::Thw, 1.0, (0.0, 100.0), EVERY),
+    parameter("lateral_speed_mps", "Lateral speed", "m/s", MapQuantity::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
     parameter(
         "lateral_distance_m",
         "Lateral distance",
         "m",
-        Quantity::LateralDistance,
+        MapQuantity::LateralDistance,
         1.0,
         (0.01, 20.0),
         LANE_CHANGES,
@@ -100,34 +116,58 @@ pub const PARAMETERS: [Parameter; 16] = [
         "deceleration_mps2",
         "Deceleration of the other vehicle",
         "m/s²",
-        Quantity::Deceleration,
+        MapQuantity::Deceleration,
         1.0,
         (0.0, 50.0),
         EVERY,
     ),
-    parameter("end_speed_mps", "End speed of the other vehicle", "m/s", Quantity::EndSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("end_speed_kmh", "End speed of the other vehicle", "km/h", Quantity::EndSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("ahead_speed_mps", "Speed of the vehicle ahead", "m/s", Quantity::AheadSpeed, 1.0, (0.0, 150.0), CUT_OUT),
+    parameter(
+        "end_speed_mps",
+        "End speed of the other vehicle",
+        "m/s",
+        MapQuantity::EndSpeed,
+        1.0,
+        (0.0, 150.0),
+        EVERY,
+    ),
+    parameter(
+        "end_speed_kmh",
+        "End speed of the other vehicle",
+        "km/h",
+        MapQuantity::EndSpeed,
+        KMH,
+        (0.0, 540.0),
+        EVERY,
+    ),
+    parameter(
+        "ahead_speed_mps",
+        "Speed of the vehicle ahead",
+        "m/s",
+        MapQuantity::AheadSpeed,
+        1.0,
+        (0.0, 150.0),
+        CUT_OUT,
+    ),
     parameter(
         "ahead_speed_kmh",
         "Speed of the vehicle ahead",
         "km/h",
-        Quantity::AheadSpeed,
+        MapQuantity::AheadSpeed,
         KMH,
         (0.0, 540.0),
         CUT_OUT,
     ),
-    parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", Quantity::AheadGap, 1.0, (0.0, 1e4), CUT_OUT),
-    parameter("length_m", "Length of every vehicle", "m", Quantity::Length, 1.0, (0.1, 50.0), EVERY),
-    parameter("width_m", "Width of every vehicle", "m", Quantity::Width, 1.0, (0.1, 10.0), EVERY),
+    parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", MapQuantity::AheadGap, 1.0, (0.0, 1e4), CUT_OUT),
+    parameter("length_m", "Length of every vehicle", "m", MapQuantity::Length, 1.0, (0.1, 50.0), EVERY),
+    parameter("width_m", "Width of every vehicle", "m", MapQuantity::Width, 1.0, (0.1, 10.0), EVERY),
 ];
 
-impl Parameter {
+impl MapParameter {
     /// By name, among those of a category; `flag` names the place of an error.
     ///
     /// # Errors
     /// [`Error::Usage`] with the nearest name.
-    pub fn find(category: Category, key: &str, flag: &str) -> Result<&'static Parameter> {
+    pub fn find(category: Category, key: &str, flag: &str) -> Result<&'static MapParameter> {
         let of_category = || PARAMETERS.iter().filter(|p| p.categories.contains(&category));
         if let Some(found) = of_category().find(|p| p.key == key) {
             return Ok(found);
@@ -155,14 +195,16 @@ impl Parameter {
     fn plausible(&self) -> (plausibility::Quantity, f64) {
         use plausibility::Quantity as Of;
         match self.quantity {
-            Quantity::EgoSpeed | Quantity::OtherSpeed | Quantity::EndSpeed | Quantity::AheadSpeed => (Of::Speed, 1.0),
-            Quantity::Gap | Quantity::AheadGap => (Of::Gap, 1.0),
-            Quantity::Thw => (Of::Headway, 1.0),
-            Quantity::LateralSpeed => (Of::LateralSpeed, 1.0),
-            Quantity::LateralDistance => (Of::LateralPosition, 1.0),
-            Quantity::Deceleration => (Of::Acceleration, -1.0),
-            Quantity::Length => (Of::Length, 1.0),
-            Quantity::Width => (Of::Width, 1.0),
+            MapQuantity::EgoSpeed | MapQuantity::OtherSpeed | MapQuantity::EndSpeed | MapQuantity::AheadSpeed => {
+                (Of::Speed, 1.0)
+            }
+            MapQuantity::Gap | MapQuantity::AheadGap => (Of::Gap, 1.0),
+            MapQuantity::Thw => (Of::Headway, 1.0),
+            MapQuantity::LateralSpeed => (Of::LateralSpeed, 1.0),
+            MapQuantity::LateralDistance => (Of::LateralPosition, 1.0),
+            MapQuantity::Deceleration => (Of::Acceleration, -1.0),
+            MapQuantity::Length => (Of::Length, 1.0),
+            MapQuantity::Width => (Of::Width, 1.0),
         }
     }
 
@@ -197,37 +239,37 @@ impl Parameter {
 
 /// Values of some quantities, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point([Option<f64>; Quantity::COUNT]);
+pub struct Point([Option<f64>; MapQuantity::COUNT]);
 
 impl Point {
     /// Sets what a parameter stands for, from its own unit.
-    pub fn set(&mut self, parameter: &Parameter, value: f64) {
+    pub fn set(&mut self, parameter: &MapParameter, value: f64) {
         self.0[parameter.quantity as usize] = Some(parameter.si(value));
     }
 
     /// The value of a quantity, where it has one.
-    pub fn get(&self, quantity: Quantity) -> Option<f64> {
+    pub fn get(&self, quantity: MapQuantity) -> Option<f64> {
         self.0[quantity as usize]
     }
 
     /// The plain case of these values; what they do not set has the value that `simulate` gives it.
     pub fn plain_case(&self, category: Category, profile: &Profile) -> PlainCase {
         let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
-        let ego_speed_mps = value(Quantity::EgoSpeed, 0.0);
-        let deceleration = value(Quantity::Deceleration, 0.0);
+        let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
+        let deceleration = value(MapQuantity::Deceleration, 0.0);
         PlainCase {
             category,
             ego_speed_mps,
-            speed_mps: value(Quantity::OtherSpeed, ego_speed_mps),
+            speed_mps: value(MapQuantity::OtherSpeed, ego_speed_mps),
             // No negative zero.
             acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
-            end_speed_mps: self.get(Quantity::EndSpeed),
-            lateral_speed_mps: value(Quantity::LateralSpeed, 0.0),
-            lateral_distance_m: value(Quantity::LateralDistance, LATERAL_DISTANCE_M),
-            ahead_speed_mps: value(Quantity::AheadSpeed, 0.0),
-            ahead_gap_m: value(Quantity::AheadGap, 0.0),
-            length_m: value(Quantity::Length, profile.frame.default_length_m),
-            width_m: value(Quantity::Width, profile.frame.default_width_m),
+            end_speed_mps: self.get(MapQuantity::EndSpeed),
+            lateral_speed_mps: value(MapQuantity::LateralSpeed, 0.0),
+            lateral_distance_m: value(MapQuantity::LateralDistance, LATERAL_DISTANCE_M),
+            ahead_speed_mps: value(MapQuantity::AheadSpeed, 0.0),
+            ahead_gap_m: value(MapQuantity::AheadGap, 0.0),
+            length_m: value(MapQuantity::Length, profile.frame.default_length_m),
+            width_m: value(MapQuantity::Width, profile.frame.default_width_m),
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::scenario::Tables;
 use super::axis::GridAxis;
 use super::grid::Grid;
 use super::jrc_case;
-use super::parameter::{Parameter, Quantity};
+use super::parameter::{MapParameter, MapQuantity};
 
 /// Name of the only variant.
 const VARIANT: &str = "cell";
@@ -118,7 +118,7 @@ impl GridPart {
                 other.gap_offset += gap_m + grid.run_up_gap_m(cell, dt_s);
             }
             source.cases.push(case);
-            let varies = |parameter: &Parameter| layout == Layout::Cells || !is_distance(parameter);
+            let varies = |parameter: &MapParameter| layout == Layout::Cells || !is_distance(parameter);
             let values = grid.values(cell).into_iter().filter(|(parameter, _)| varies(parameter));
             names.push(
                 values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
@@ -152,13 +152,13 @@ impl Layout {
     }
 }
 
-fn is_distance(parameter: &Parameter) -> bool {
-    matches!(parameter.quantity, Quantity::Gap | Quantity::Thw)
+fn is_distance(parameter: &MapParameter) -> bool {
+    matches!(parameter.quantity, MapQuantity::Gap | MapQuantity::Thw)
 }
 
-fn headway(parameter: &Parameter, value: f64) -> Headway {
+fn headway(parameter: &MapParameter, value: f64) -> Headway {
     match parameter.quantity {
-        Quantity::Thw => Headway::ThwS(parameter.si(value)),
+        MapQuantity::Thw => Headway::ThwS(parameter.si(value)),
         _ => Headway::GapM(parameter.si(value)),
     }
 }

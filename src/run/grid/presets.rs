@@ -12,7 +12,7 @@ use crate::scenario::Category;
 
 use super::axis::GridAxis;
 use super::grid::{CaseStyle, Grid, GridParts};
-use super::parameter::Parameter;
+use super::parameter::MapParameter;
 
 /// A grid with its models and what is known of it.
 pub struct Preset {
@@ -100,7 +100,7 @@ pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
         Category::CutOut => {
             let x = range("ahead_gap_m", (10.0, 100.0), 2.0)?;
             let y = range("lateral_speed_mps", (0.5, 2.5), 0.1)?;
-            let fixed = vec![(Parameter::find(category, "ahead_speed_kmh", "preset")?, 0.0)];
+            let fixed = vec![(MapParameter::find(category, "ahead_speed_kmh", "preset")?, 0.0)];
             let panel_axes = vec![range("ego_speed_kmh", (60.0, 120.0), 10.0)?];
             let grid = Grid::new(GridParts { panel_axes, fixed, ..parts("cut_out", x, y) })?;
             Ok(vec![Preset { grid, models: following, known_percent: Vec::new(), is_chosen_to_match: false }])

@@ -12,7 +12,7 @@ use crate::support::files::{make_folder, write_atomically_with};
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::count;
-use crate::support::run_dir::RunFolder;
+use crate::support::run_dir::OutputDir;
 use crate::{Error, Place, Result};
 
 /// Name of the plan in a run's folder.
@@ -29,7 +29,7 @@ pub struct RunState<T> {
     /// What is counted.
     pub ledger: Ledger<T>,
     /// Where it is done; of a part, together with other parts.
-    pub folder: RunFolder,
+    pub folder: OutputDir,
     part: Option<FolderLock>,
 }
 
@@ -78,9 +78,9 @@ impl RunDir {
     pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
-            None => (RunFolder::open(&self.out, self.record)?, None),
+            None => (OutputDir::open(&self.out, self.record)?, None),
             Some(stem) => {
-                let folder = RunFolder::share(&self.out)?;
+                let folder = OutputDir::share(&self.out)?;
                 let part = FolderLock::acquire(&self.out.join(format!("{stem}.lock")))?;
                 self.warn_of_another_split(stem);
                 (folder, Some(part))
@@ -158,7 +158,7 @@ impl<T: Countable> RunState<T> {
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
 pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
-    let _folder = RunFolder::share(out)?;
+    let _folder = OutputDir::share(out)?;
     let path = out.join(PLAN_FILE);
     let mut there = vec![0; line.len()];
     match input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {

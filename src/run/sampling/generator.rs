@@ -7,7 +7,7 @@ use crate::engine::generated::{
 use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::model::scalar::Real;
 use crate::scenario::Category;
-use crate::scenario::parameterization::{AfterDuration, Series, Sizes, Variable};
+use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
 use crate::stats::density::{Mixture, ParameterSpace};
 use crate::stats::random::{AliasTable, Sobol, Stream};
 use crate::{Error, Place, Result};
@@ -195,9 +195,9 @@ fn columns(space: &ParameterSpace) -> ReducedColumns {
         width: reduction.basis.mean.len() as u32,
         instants: space.options().svd_instants as u32,
         coefficients: d as u32,
-        lateral: series(Series::Lateral),
-        speed: series(Series::TargetSpeed),
-        lead_speed: series(Series::LeadSpeed),
+        lateral: series(ReducedSeries::Lateral),
+        speed: series(ReducedSeries::TargetSpeed),
+        lead_speed: series(ReducedSeries::LeadSpeed),
         ego_speed: number(Variable::EgoSpeed),
         lead_gap: number(Variable::LeadGap),
         duration: number(Variable::Duration),

@@ -55,10 +55,10 @@ use crate::{Error, Place, Result};
 /// # Ok(())
 /// # }
 /// ```
-pub struct Sample(pub(crate) Kind);
+pub struct Sample(pub(crate) SampleKind);
 
 /// By how it is run.
-pub(crate) enum Kind {
+pub(crate) enum SampleKind {
     /// Crude Monte Carlo.
     Crude(Box<CrudePlan>, StopRule),
     /// Importance sampling of a fixed number of samples.
@@ -110,15 +110,15 @@ impl Sample {
                     level: options.level,
                     ..CrudeFacts::new(&plan_options, profile, &options.given)
                 };
-                Kind::Crude(Box::new(CrudePlan::new(density, facts)?), options.stop)
+                SampleKind::Crude(Box::new(CrudePlan::new(density, facts)?), options.stop)
             }
             Estimator::Pilot(pilot) if is_fixed => {
-                Kind::Pilot(weighted(density, Vec::new(), pilot.defence, Some(*pilot))?, *pilot)
+                SampleKind::Pilot(weighted(density, Vec::new(), pilot.defence, Some(*pilot))?, *pilot)
             }
             Estimator::Given { proposals, defence } if is_fixed && proposals.len() == 1 => {
-                Kind::Weighted(weighted(density, proposals.clone(), *defence, None)?)
+                SampleKind::Weighted(weighted(density, proposals.clone(), *defence, None)?)
             }
-            _ => Kind::Sequential(Box::new(Sequential::new(density, profile, options)?)),
+            _ => SampleKind::Sequential(Box::new(Sequential::new(density, profile, options)?)),
         }))
     }
 
@@ -128,11 +128,11 @@ impl Sample {
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
     pub fn read(path: &Path) -> Result<Sample> {
         if kind_of(path)? == weighted_plan::KIND {
-            return Ok(Sample(Kind::Weighted(Box::new(WeightedPlan::read(path)?.0))));
+            return Ok(Sample(SampleKind::Weighted(Box::new(WeightedPlan::read(path)?.0))));
         }
         let plan = CrudePlan::read(path)?.0;
         let stop = StopRule::samples(plan.facts.samples);
-        Ok(Sample(Kind::Crude(Box::new(plan), stop)))
+        Ok(Sample(SampleKind::Crude(Box::new(plan), stop)))
     }
 
     /// Whether a sealed file of this kind is the plan of a sampling run.
@@ -147,9 +147,9 @@ impl Sample {
     /// Of the lanes; [`Error::Io`].
     pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
         Ok(Sample(match self.0 {
-            Kind::Pilot(plan, pilot) => {
+            SampleKind::Pilot(plan, pilot) => {
                 let found = plan.after_pilot(out, |plan| plan.pilots(&pilot, executor))?;
-                Kind::Weighted(Box::new(found))
+                SampleKind::Weighted(Box::new(found))
             }
             other => other,
         }))
@@ -167,9 +167,9 @@ impl Sample {
     /// The plan file's text and the hash of the run.
     pub(super) fn seal(&self) -> Result<(Vec<u8>, String)> {
         match &self.0 {
-            Kind::Crude(plan, _) => plan.seal(),
-            Kind::Weighted(plan) => plan.seal(),
-            Kind::Pilot(..) | Kind::Sequential(_) => {
+            SampleKind::Crude(plan, _) => plan.seal(),
+            SampleKind::Weighted(plan) => plan.seal(),
+            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
                 let problem = "the adaptive estimators are sequential: they make no shards";
                 let help = "use crude Monte Carlo, or importance sampling with one given proposal";
                 Err(Error::usage(Place::item("estimator"), problem, help))
@@ -180,16 +180,16 @@ impl Sample {
     /// The density.
     pub fn density(&self) -> &DensityModel {
         match &self.0 {
-            Kind::Crude(plan, _) => &plan.density,
-            Kind::Weighted(plan) | Kind::Pilot(plan, _) => &plan.density,
-            Kind::Sequential(run) => &run.density,
+            SampleKind::Crude(plan, _) => &plan.density,
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => &plan.density,
+            SampleKind::Sequential(run) => &run.density,
         }
     }
 
     /// The plan of crude Monte Carlo, whose lanes are numbered.
     pub fn lane_plan(&self) -> Option<&LanePlan> {
         match &self.0 {
-            Kind::Crude(plan, _) => Some(&plan.plan),
+            SampleKind::Crude(plan, _) => Some(&plan.plan),
             _ => None,
         }
     }
@@ -197,38 +197,38 @@ impl Sample {
     /// Samples, at most; of subset simulation per level.
     pub fn samples(&self) -> u64 {
         match &self.0 {
-            Kind::Crude(plan, _) => plan.facts.samples,
-            Kind::Weighted(plan) | Kind::Pilot(plan, _) => plan.facts.samples,
-            Kind::Sequential(run) => run.options.stop.samples,
+            SampleKind::Crude(plan, _) => plan.facts.samples,
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => plan.facts.samples,
+            SampleKind::Sequential(run) => run.options.stop.samples,
         }
     }
 
     /// Lanes of a run of a fixed number of samples.
     pub fn lane_count(&self) -> u64 {
         match &self.0 {
-            Kind::Crude(plan, _) => plan.plan.lane_count(),
-            Kind::Weighted(plan) | Kind::Pilot(plan, _) => {
+            SampleKind::Crude(plan, _) => plan.plan.lane_count(),
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
                 plan.facts.samples.saturating_mul(plan.facts.models.len() as u64)
             }
-            Kind::Sequential(run) => self.samples().saturating_mul(run.options.models.len() as u64),
+            SampleKind::Sequential(run) => self.samples().saturating_mul(run.options.models.len() as u64),
         }
     }
 
     /// Seed of the draws.
     pub fn seed(&self) -> u64 {
         match &self.0 {
-            Kind::Crude(plan, _) => plan.facts.seed,
-            Kind::Weighted(plan) | Kind::Pilot(plan, _) => plan.facts.seed,
-            Kind::Sequential(run) => run.options.seed,
+            SampleKind::Crude(plan, _) => plan.facts.seed,
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => plan.facts.seed,
+            SampleKind::Sequential(run) => run.options.seed,
         }
     }
 
     /// Whether the proposals were given, not found.
     pub fn has_given_proposals(&self) -> bool {
         match &self.0 {
-            Kind::Crude(..) | Kind::Pilot(..) => false,
-            Kind::Weighted(plan) => plan.facts.pilot.is_none(),
-            Kind::Sequential(run) => matches!(run.options.estimator, Estimator::Given { .. }),
+            SampleKind::Crude(..) | SampleKind::Pilot(..) => false,
+            SampleKind::Weighted(plan) => plan.facts.pilot.is_none(),
+            SampleKind::Sequential(run) => matches!(run.options.estimator, Estimator::Given { .. }),
         }
     }
 }

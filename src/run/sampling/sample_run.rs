@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::bootstrap::{BootstrapRecord, bootstrap};
 use super::crude::{CrudeRun, checkpoints, crude_of_segments, sample_into};
-use super::sample::{Kind, Sample};
+use super::sample::{Sample, SampleKind};
 use super::sample_result::SampleResult;
 use super::tally::{SampleTally, TallyOptions};
 use super::weighted_plan::PILOT_FILE;
@@ -41,23 +41,23 @@ impl Sample {
     /// Of the lanes.
     pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
         match &self.0 {
-            Kind::Crude(plan, stop) => {
+            SampleKind::Crude(plan, stop) => {
                 let units = plan.plan.unit_count();
                 let (mut ledger, counting) = (Ledger::new(0..units, &checkpoints(units)), plan.counting());
                 let options = plan.options(*stop);
                 let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
             }
-            Kind::Weighted(plan) => {
+            SampleKind::Weighted(plan) => {
                 let mut ledger = Ledger::new(0..plan.facts.samples, &[]);
                 plan.sample(&mut ledger, executor, |_| ())?;
                 SampleResult::of_weighted(plan, ledger.take()?, Place::item("samples"))
             }
-            Kind::Pilot(plan, pilot) => {
+            SampleKind::Pilot(plan, pilot) => {
                 let found = plan.as_ref().clone().after_pilot(None, |plan| plan.pilots(pilot, executor))?;
-                Sample(Kind::Weighted(Box::new(found))).run(executor)
+                Sample(SampleKind::Weighted(Box::new(found))).run(executor)
             }
-            Kind::Sequential(run) => run.run(executor),
+            SampleKind::Sequential(run) => run.run(executor),
         }
     }
 
@@ -70,7 +70,7 @@ impl Sample {
     pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
         let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
-        let state = if matches!(self.0, Kind::Crude(..)) {
+        let state = if matches!(self.0, SampleKind::Crude(..)) {
             if run_dir.is_done::<SampleTally>()? {
                 return Ok(None);
             }
@@ -108,7 +108,7 @@ impl Sample {
         let sample = Sample::read(&out.join(PLAN_FILE))?;
         let run_sha256 = sample.seal()?.1;
         let result = match &sample.0 {
-            Kind::Crude(planned, _) => {
+            SampleKind::Crude(planned, _) => {
                 let (plan, counting) = (&planned.plan, planned.counting());
                 let parts = read_parts::<SampleTally>(out, &run_sha256, plan.unit_count(), again)?;
                 let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
@@ -122,7 +122,7 @@ impl Sample {
                 }
                 SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
             }
-            Kind::Weighted(planned) => {
+            SampleKind::Weighted(planned) => {
                 let parts = read_parts::<WeightedTally>(out, &run_sha256, planned.facts.samples, again)?;
                 let count = parts.len();
                 let mut segments = parts.into_iter().flat_map(|part| part.segments);
@@ -130,7 +130,7 @@ impl Sample {
                 let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
                 SampleResult { parts: count, ..SampleResult::of_weighted(planned, tally, Place::file(out))? }
             }
-            Kind::Pilot(..) | Kind::Sequential(_) => {
+            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
                 return Err(Error::Internal("a plan file of a run that cannot be split".to_owned()));
             }
         };
@@ -148,7 +148,7 @@ impl Sample {
         samples: u64,
         progress: impl FnMut(),
     ) -> Result<BootstrapRecord> {
-        let Kind::Crude(plan, _) = &self.0 else {
+        let SampleKind::Crude(plan, _) = &self.0 else {
             let help = "use crude Monte Carlo, or leave it out";
             return Err(Error::usage(Place::item("bootstrap"), "this belongs to crude Monte Carlo", help));
         };
@@ -192,7 +192,7 @@ impl SampleRun<'_> {
     ) -> Result<()> {
         let _resumable = self.is_journalled.then(interrupt::resumable);
         match (&mut self.state, &self.sample.0) {
-            (State::Crude(state), Kind::Crude(planned, stop)) => {
+            (State::Crude(state), SampleKind::Crude(planned, stop)) => {
                 if state.units.is_empty() {
                     return Ok(());
                 }
@@ -208,7 +208,9 @@ impl SampleRun<'_> {
                 self.crude = Some(sample_into(&planned.plan, &mut state.ledger, executor, &counting, &options, each)?);
                 Ok(())
             }
-            (State::Weighted(state), Kind::Weighted(planned)) => planned.sample(&mut state.ledger, executor, progress),
+            (State::Weighted(state), SampleKind::Weighted(planned)) => {
+                planned.sample(&mut state.ledger, executor, progress)
+            }
             _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
         }
     }
@@ -232,7 +234,7 @@ impl SampleRun<'_> {
     /// [`Error::Internal`] before anything was sampled.
     pub fn take_result(&mut self) -> Result<SampleResult> {
         match (&mut self.state, &self.sample.0) {
-            (State::Weighted(state), Kind::Weighted(planned)) => {
+            (State::Weighted(state), SampleKind::Weighted(planned)) => {
                 let tally = state.ledger.counts(0..planned.facts.samples)?;
                 SampleResult::of_weighted(planned, tally, Place::file(&self.run_dir.out))
             }
@@ -259,7 +261,7 @@ impl SampleRun<'_> {
     /// # Errors
     /// [`Error::Io`].
     pub fn close(self) -> Result<()> {
-        if let Kind::Weighted(planned) = &self.sample.0
+        if let SampleKind::Weighted(planned) = &self.sample.0
             && planned.facts.pilot.is_some()
         {
             // The journal that needs it goes next; without it the next run's pilot has the same bits.

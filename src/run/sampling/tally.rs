@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
 use super::map::{MAP_CELLS, MapAxes, MapCounts};
-use crate::engine::generated::{ATTEMPTS, Drawn, Generator};
+use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::engine::{Chunk, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::run::parts::Countable;
@@ -130,7 +130,7 @@ impl SampleTally {
         unit: u64,
     ) -> u32 {
         let drawn = generator.map(|generator| generator.draw(unit));
-        if drawn.as_ref().is_some_and(Drawn::is_void) {
+        if drawn.as_ref().is_some_and(DrawnPoint::is_void) {
             self.voids += 1;
             self.tries += u64::from(ATTEMPTS);
             return NO_KERNEL;

@@ -51,7 +51,7 @@ impl ScoreOptions {
 
 /// An interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub struct BootstrapInterval {
     /// Lower end.
     pub low: f64,
     /// Upper end.
@@ -98,7 +98,7 @@ pub(super) fn bootstrap_draws(
 }
 
 /// Percentile interval, linear between order statistics; `None` without values.
-pub(super) fn interval(mut values: Vec<f64>, confidence: f64) -> Option<Interval> {
+pub(super) fn interval(mut values: Vec<f64>, confidence: f64) -> Option<BootstrapInterval> {
     if values.is_empty() {
         return None;
     }
@@ -110,7 +110,7 @@ pub(super) fn interval(mut values: Vec<f64>, confidence: f64) -> Option<Interval
         values[below] + (values[above] - values[below]) * (position - below as f64)
     };
     let tail = (1.0 - confidence) / 2.0;
-    Some(Interval { low: quantile(tail), high: quantile(1.0 - tail) })
+    Some(BootstrapInterval { low: quantile(tail), high: quantile(1.0 - tail) })
 }
 
 #[cfg(test)]

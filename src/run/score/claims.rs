@@ -9,7 +9,7 @@
 //! The mean over cells is taken over the same cells in every draw: a draw in which one of them is undefined is
 //! undefined, and where more than 5 % of the draws are, the claim is undecided.
 
-use super::bootstrap::{Interval, interval};
+use super::bootstrap::{BootstrapInterval, interval};
 use super::published::PAPER_MODELS;
 use super::statistic::Statistic;
 use super::table::{CategoryScores, ScoreTable};
@@ -77,7 +77,7 @@ pub struct ClaimRow {
     /// Value on the whole sample.
     pub value: Option<f64>,
     /// Paired bootstrap interval.
-    pub interval: Option<Interval>,
+    pub interval: Option<BootstrapInterval>,
     /// Draws in which the statistic is undefined.
     pub undefined_draws: u32,
     /// Verdict.
@@ -266,8 +266,8 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
     ClaimResult { left_out: claim.cells.len() - usable.len(), claim, overall, rows }
 }
 
-fn verdict(statistic: &Statistic, interval: Option<Interval>) -> ClaimVerdict {
-    let Some(Interval { low, high }) = interval else { return ClaimVerdict::Undecided };
+fn verdict(statistic: &Statistic, interval: Option<BootstrapInterval>) -> ClaimVerdict {
+    let Some(BootstrapInterval { low, high }) = interval else { return ClaimVerdict::Undecided };
     let (holds, contradicted) = match statistic {
         Statistic::F1Near(..) => (low >= -NEAR && high <= NEAR, low > NEAR || high < -NEAR),
         _ => (low > 0.0, high < 0.0),
@@ -286,7 +286,7 @@ mod tests {
     use super::*;
     use crate::engine::{Confusion, Headway};
     use crate::run::score::ScoreOptions;
-    use crate::run::score::table::Cell;
+    use crate::run::score::table::ScoreCell;
 
     /// Cut-out scores in which S fails as given per model (same for every criterion) and b and d differ from it
     /// as given; every draw equals the sample.
@@ -301,7 +301,7 @@ mod tests {
                         "d" => d,
                         _ => Confusion { tp, tn: 1000 - tp, ..Confusion::default() },
                     };
-                    cells.push(Cell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
+                    cells.push(ScoreCell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
                 }
             }
         }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::bootstrap::{Interval, ScoreOptions, bootstrap_draws};
+use super::bootstrap::{BootstrapInterval, ScoreOptions, bootstrap_draws};
 use super::contradiction::contradiction;
 use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
@@ -50,7 +50,7 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
 pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
-) -> Option<Interval> {
+) -> Option<BootstrapInterval> {
     let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.tp) + u64::from(c.fn_)).sum();
     if failures_of_s < u64::from(options.least_failures.max(1)) {
         return None;
@@ -60,12 +60,12 @@ pub fn f1_interval<'a>(
         scenarios.map(|c| (any(c), u64::from(c.tp))).filter(|(any, _)| *any > 0).unzip();
     let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
     let f1 = |j: f64| 2.0 * j / (1.0 + j);
-    Some(Interval { low: f1(share.low), high: f1(share.high) })
+    Some(BootstrapInterval { low: f1(share.low), high: f1(share.high) })
 }
 
 /// One cell of the table.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cell {
+pub struct ScoreCell {
     /// Index into [`CategoryScores::variants`]; 0 is S itself.
     pub variant: usize,
     /// Driver model.
@@ -75,7 +75,7 @@ pub struct Cell {
     /// Counts over (scenario, THW) pairs.
     pub counts: Confusion,
     /// Interval of F1 over scenarios; `None` below [`ScoreOptions::least_failures`] failures of S.
-    pub f1_interval: Option<Interval>,
+    pub f1_interval: Option<BootstrapInterval>,
     /// Bootstrap draws in which F1 is 0/0: claims about it leave them out. Its interval needs no draws.
     pub undefined_draws: u32,
 }
@@ -94,7 +94,7 @@ pub struct CategoryScores {
     /// Models, in order.
     pub models: Vec<ModelId>,
     /// One per variant × model × criterion, in that order.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<ScoreCell>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u64>,
     /// Bootstrap draws: the cells' counts in each.
@@ -161,7 +161,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
             .into_par_iter()
             .map(|at| {
                 let undefined = draws.iter().filter(|draw| f1(&draw[at]).is_none()).count();
-                Cell {
+                ScoreCell {
                     variant: at / (plan.models.len() * criteria),
                     model: plan.models[at / criteria % plan.models.len()],
                     criterion: Criterion::ALL[at % criteria],

@@ -22,7 +22,7 @@ pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };
 pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
-pub use reduction::{ModeShape, ReducedScenario, Reduction, Series};
+pub use reduction::{ModeShape, ReducedScenario, ReducedSeries, Reduction};
 pub(crate) use series::steps_of;
 pub use series::{TimeGrid, recorded_case};
 pub(crate) use sizes::vehicle_ahead;

@@ -17,7 +17,7 @@ const SHOWN: usize = 3;
 
 /// A series in the vector of a decomposition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Series {
+pub enum ReducedSeries {
     /// Lateral position of the target, m.
     Lateral,
     /// Speed of the target, m/s.
@@ -27,14 +27,15 @@ pub enum Series {
 }
 
 /// The vector of a category: its series one behind the other, then single numbers, T last.
-fn layout(category: Category) -> (&'static [Series], &'static [Variable]) {
+fn layout(category: Category) -> (&'static [ReducedSeries], &'static [Variable]) {
     use Variable::{Duration, EgoSpeed, LeadGap};
     match category {
-        Category::CutIn => (&[Series::Lateral, Series::TargetSpeed], &[EgoSpeed, Duration]),
-        Category::CutOut => {
-            (&[Series::Lateral, Series::TargetSpeed, Series::LeadSpeed], &[EgoSpeed, LeadGap, Duration])
-        }
-        Category::Lvd => (&[Series::TargetSpeed], &[Duration]),
+        Category::CutIn => (&[ReducedSeries::Lateral, ReducedSeries::TargetSpeed], &[EgoSpeed, Duration]),
+        Category::CutOut => (
+            &[ReducedSeries::Lateral, ReducedSeries::TargetSpeed, ReducedSeries::LeadSpeed],
+            &[EgoSpeed, LeadGap, Duration],
+        ),
+        Category::Lvd => (&[ReducedSeries::TargetSpeed], &[Duration]),
     }
 }
 
@@ -128,7 +129,7 @@ impl Reduction {
     }
 
     /// First column of a series, where the category has it.
-    pub fn series_column(&self, series: Series) -> Option<usize> {
+    pub fn series_column(&self, series: ReducedSeries) -> Option<usize> {
         let at = layout(self.category).0.iter().position(|s| *s == series)?;
         Some(at * self.options.svd_instants)
     }
@@ -138,7 +139,7 @@ impl Reduction {
         let (series, extras) = layout(self.category);
         match extras.iter().position(|v| *v == variable) {
             Some(at) => Some(series.len() * self.options.svd_instants + at),
-            None if variable == Variable::EgoSpeed => self.series_column(Series::TargetSpeed),
+            None if variable == Variable::EgoSpeed => self.series_column(ReducedSeries::TargetSpeed),
             None => None,
         }
     }
@@ -154,9 +155,9 @@ impl Reduction {
         let speeds = |of| series(of).iter().map(|v| v.max(0.0)).collect::<Vec<f64>>();
         let number = |variable| self.column(variable).map_or(0.0, |column| z[column]);
         ReducedScenario {
-            y: series(Series::Lateral).iter().map(|y| y * mirror).collect(),
-            v: speeds(Series::TargetSpeed),
-            v_lead: speeds(Series::LeadSpeed),
+            y: series(ReducedSeries::Lateral).iter().map(|y| y * mirror).collect(),
+            v: speeds(ReducedSeries::TargetSpeed),
+            v_lead: speeds(ReducedSeries::LeadSpeed),
             v_ego: number(Variable::EgoSpeed).max(0.0),
             lead_gap_m: number(Variable::LeadGap).max(0.0),
             duration_s: number(Variable::Duration).max(MIN_DURATION_S),
@@ -204,11 +205,11 @@ impl Reduction {
         let (mean, along) = (vector(None), (0..shown).map(|j| vector(Some(j))).collect::<Vec<_>>());
         let instants = self.options.svd_instants;
         let part = |z: &[f64], at: usize| z[at * instants..(at + 1) * instants].to_vec();
-        let shape = |(at, series): (usize, &Series)| {
+        let shape = |(at, series): (usize, &ReducedSeries)| {
             let (quantity, unit) = match series {
-                Series::Lateral => (format!("lateral position of the {target}{side}"), "m"),
-                Series::TargetSpeed => (format!("speed of the {target}"), "m/s"),
-                Series::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
+                ReducedSeries::Lateral => (format!("lateral position of the {target}{side}"), "m"),
+                ReducedSeries::TargetSpeed => (format!("speed of the {target}"), "m/s"),
+                ReducedSeries::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
             };
             let along = along.iter().map(|z| part(z, at)).collect();
             ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean, at), along }
@@ -254,9 +255,9 @@ fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<
     let mut z = Vec::with_capacity(series.len() * n + extras.len());
     for series in series {
         z.extend(match series {
-            Series::Lateral => sample(&target.y, sign),
-            Series::TargetSpeed => sample(&target.v, 1.0),
-            Series::LeadSpeed => sample(&vehicle_ahead(scenario)?.0.v, 1.0),
+            ReducedSeries::Lateral => sample(&target.y, sign),
+            ReducedSeries::TargetSpeed => sample(&target.v, 1.0),
+            ReducedSeries::LeadSpeed => sample(&vehicle_ahead(scenario)?.0.v, 1.0),
         });
     }
     for extra in extras {

@@ -2,10 +2,14 @@
 //! the values of some of them. Each kernel conditions as a Gaussian does; its weight is how well it fits b
 //! (arXiv 2107.05278).
 
+use super::covariance::{cholesky, whiten};
 use super::kde::Kde;
 use super::normal::Draws;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
+
+/// A pivot below this fraction of its diagonal element is rounding: the equations depend on each other.
+const MIN_PIVOT_FRACTION: f64 = 1e-12;
 
 /// f̂(x | A x = b) as a mixture over the kernels of f̂.
 #[derive(Debug, Clone)]
@@ -15,7 +19,7 @@ pub struct ConstrainedKde<'a> {
     rows: Vec<Vec<f64>>,
     right: Vec<f64>,
     /// Lower Cholesky factor of A S Aᵀ with S = diag((h s)²), row by row.
-    factor: Vec<Vec<f64>>,
+    factor: Vec<f64>,
     /// Weights of the kernels, sum 1.
     probabilities: Vec<f64>,
     /// Parameters that are given: index and value. Set exactly in every draw.
@@ -41,9 +45,12 @@ impl Kde {
         }
         let spread = self.spread();
         let covariance = |a: &[f64], b: &[f64]| -> f64 { (0..d).map(|j| a[j] * spread[j] * spread[j] * b[j]).sum() };
-        let gram: Vec<Vec<f64>> =
-            rows.iter().map(|a| rows.iter().map(|b| covariance(a, b)).collect::<Vec<_>>()).collect();
-        let Some(factor) = cholesky(&gram) else {
+        let m = rows.len();
+        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| covariance(a, b))).collect();
+        let is_regular = |factor: &Vec<f64>| {
+            (0..m).map(|i| i * m + i).all(|at| factor[at] * factor[at] > MIN_PIVOT_FRACTION * gram[at])
+        };
+        let Some(factor) = cholesky(&gram, m).filter(is_regular) else {
             return wrong("the equations depend on each other".to_owned(), "leave out those that follow from others");
         };
         let mut this = ConstrainedKde {
@@ -57,7 +64,7 @@ impl Kde {
         let exponents: Vec<f64> = self
             .points()
             .iter()
-            .map(|point| 0.5 * forward(&this.factor, &this.misfit(point)).iter().map(|z| z * z).sum::<f64>())
+            .map(|point| 0.5 * this.whitened_misfit(point).iter().map(|z| z * z).sum::<f64>())
             .collect();
         let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
         let weights: Vec<f64> = exponents.iter().map(|e| libm::exp(least - e)).collect();
@@ -111,7 +118,7 @@ impl ConstrainedKde<'_> {
         let point = &self.kde.points()[chosen];
         let free: Vec<f64> = point.iter().zip(&spread).map(|(p, s)| p + s * draws.normal()).collect();
         // x + S Aᵀ (A S Aᵀ)⁻¹ (b − A x) has the distribution of x given A x = b.
-        let multipliers = backward(&self.factor, &forward(&self.factor, &self.misfit(&free)));
+        let multipliers = backward(&self.factor, &self.whitened_misfit(&free));
         let mut x: Vec<f64> = (0..free.len())
             .map(|j| {
                 let pull: f64 = self.rows.iter().zip(&multipliers).map(|(a, m)| a[j] * m).sum();
@@ -124,50 +131,23 @@ impl ConstrainedKde<'_> {
         x
     }
 
-    fn misfit(&self, x: &[f64]) -> Vec<f64> {
+    /// L⁻¹ (b − A x).
+    fn whitened_misfit(&self, x: &[f64]) -> Vec<f64> {
         let product = |a: &Vec<f64>| a.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        self.rows.iter().zip(&self.right).map(|(a, b)| b - product(a)).collect()
+        let misfit: Vec<f64> = self.rows.iter().zip(&self.right).map(|(a, b)| b - product(a)).collect();
+        let mut z = vec![0.0; misfit.len()];
+        whiten(&self.factor, &misfit, &mut z);
+        z
     }
-}
-
-/// Lower factor of a symmetric matrix; `None` where it is not positive definite up to rounding.
-fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-    let m = matrix.len();
-    let mut l = vec![vec![0.0; m]; m];
-    for i in 0..m {
-        for j in 0..=i {
-            let inner: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let rest = matrix[i][j] - inner;
-            if i == j {
-                if rest.is_nan() || rest <= 1e-12 * matrix[i][i] {
-                    return None;
-                }
-                l[i][i] = rest.sqrt();
-            } else {
-                l[i][j] = rest / l[j][j];
-            }
-        }
-    }
-    Some(l)
-}
-
-/// L⁻¹ b.
-fn forward(l: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
-    let mut x: Vec<f64> = Vec::with_capacity(b.len());
-    for (row, right) in l.iter().zip(b) {
-        let inner: f64 = x.iter().zip(row).map(|(x, l)| x * l).sum();
-        x.push((right - inner) / row[x.len()]);
-    }
-    x
 }
 
 /// L⁻ᵀ b.
-fn backward(l: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
+fn backward(l: &[f64], b: &[f64]) -> Vec<f64> {
     let m = b.len();
     let mut x = b.to_vec();
     for i in (0..m).rev() {
-        let inner: f64 = (i + 1..m).map(|k| l[k][i] * x[k]).sum();
-        x[i] = (x[i] - inner) / l[i][i];
+        let inner: f64 = (i + 1..m).map(|k| l[k * m + i] * x[k]).sum();
+        x[i] = (x[i] - inner) / l[i * m + i];
     }
     x
 }

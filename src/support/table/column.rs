@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// How the values of a column are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ColumnKind {
     /// Text that mostly differs between rows.
     Text,
     /// One of few texts: Parquet keeps each once.
@@ -25,18 +25,18 @@ pub enum Kind {
     Wholes,
 }
 
-impl Kind {
+impl ColumnKind {
     /// The type as the chapter on tables names it.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Text => "string",
-            Kind::Name => "dictionary",
-            Kind::Flag => "bool",
-            Kind::Whole => "int64",
-            Kind::Binary32 => "float",
-            Kind::Binary64 => "double",
-            Kind::Series => "list<double>",
-            Kind::Wholes => "list<int64>",
+            ColumnKind::Text => "string",
+            ColumnKind::Name => "dictionary",
+            ColumnKind::Flag => "bool",
+            ColumnKind::Whole => "int64",
+            ColumnKind::Binary32 => "float",
+            ColumnKind::Binary64 => "double",
+            ColumnKind::Series => "list<double>",
+            ColumnKind::Wholes => "list<int64>",
         }
     }
 }
@@ -47,7 +47,7 @@ pub struct Column {
     /// Name.
     pub name: Cow<'static, str>,
     /// Type.
-    pub kind: Kind,
+    pub kind: ColumnKind,
     /// Unit: `m`, `m/s`, `s`, …; `1` for numbers without one; empty for what is no number.
     pub unit: Cow<'static, str>,
     /// One sentence, with when a field is empty.
@@ -56,7 +56,7 @@ pub struct Column {
 
 impl Column {
     /// A column whose words are constants.
-    pub fn new(name: &'static str, kind: Kind, unit: &'static str, description: &'static str) -> Column {
+    pub fn new(name: &'static str, kind: ColumnKind, unit: &'static str, description: &'static str) -> Column {
         Column { name: name.into(), kind, unit: unit.into(), description: description.into() }
     }
 }
@@ -66,19 +66,19 @@ impl Column {
 pub enum Cell<'a> {
     /// Did not happen, or does not exist: null in Parquet and JSON Lines, empty in CSV.
     Null,
-    /// Of [`Kind::Text`] and [`Kind::Name`].
+    /// Of [`ColumnKind::Text`] and [`ColumnKind::Name`].
     Text(Cow<'a, str>),
-    /// Of [`Kind::Flag`].
+    /// Of [`ColumnKind::Flag`].
     Flag(bool),
-    /// Of [`Kind::Whole`].
+    /// Of [`ColumnKind::Whole`].
     Whole(i64),
-    /// Of [`Kind::Binary32`] (which it has to fit) and [`Kind::Binary64`].
+    /// Of [`ColumnKind::Binary32`] (which it has to fit) and [`ColumnKind::Binary64`].
     Number(f64),
     /// As `Number`, but 2 is `2.0` in CSV.
     Decimal(f64),
-    /// Of [`Kind::Series`].
+    /// Of [`ColumnKind::Series`].
     Series(Cow<'a, [f64]>),
-    /// Of [`Kind::Wholes`].
+    /// Of [`ColumnKind::Wholes`].
     Wholes(Cow<'a, [i64]>),
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Cell, Column, Kind};
+use super::{Cell, Column, ColumnKind};
 
 /// Appends a row to a text; fields are in the order of the columns.
 pub(super) fn append(line: &mut String, columns: &[Column], row: &[Cell]) {
@@ -16,14 +16,14 @@ pub(super) fn append(line: &mut String, columns: &[Column], row: &[Cell]) {
     line.push_str("}\n");
 }
 
-fn value(kind: Kind, cell: &Cell) -> Value {
+fn value(kind: ColumnKind, cell: &Cell) -> Value {
     match cell {
         Cell::Null => Value::Null,
         Cell::Text(text) => Value::from(text.as_ref()),
         Cell::Flag(flag) => Value::from(*flag),
         Cell::Whole(number) => Value::from(*number),
         // The shortest text that reads back to the same binary32.
-        Cell::Number(number) | Cell::Decimal(number) if kind == Kind::Binary32 => {
+        Cell::Number(number) | Cell::Decimal(number) if kind == ColumnKind::Binary32 => {
             (*number as f32).to_string().parse::<f64>().map_or(Value::Null, Value::from)
         }
         Cell::Number(number) | Cell::Decimal(number) => Value::from(*number),

@@ -21,7 +21,7 @@ mod spreadsheet;
 mod writer;
 
 pub(crate) use column::Row;
-pub use column::{Cell, Column, Kind, TableFacts};
+pub use column::{Cell, Column, ColumnKind, TableFacts};
 pub use format::TableFormat;
 pub(crate) use names::{Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]

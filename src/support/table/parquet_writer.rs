@@ -19,7 +19,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 
-use super::{Cell, Column, Kind, TableFacts};
+use super::{Cell, Column, ColumnKind, TableFacts};
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
@@ -43,7 +43,7 @@ pub(super) struct ParquetFile {
 
 impl ParquetFile {
     pub(super) fn create(path: &Path, columns: &[Column], facts: &TableFacts) -> Result<ParquetFile> {
-        let has_series = columns.iter().any(|column| column.kind == Kind::Series);
+        let has_series = columns.iter().any(|column| column.kind == ColumnKind::Series);
         let (batch_rows, group_rows) =
             if has_series { (SERIES_BATCH_ROWS, SERIES_GROUP_ROWS) } else { (BATCH_ROWS, GROUP_ROWS) };
         // Arrow's readers show what stands with its schema, the others what stands in the footer.
@@ -105,14 +105,14 @@ fn failed(path: &Path, error: ParquetError) -> Error {
 
 fn field(column: &Column) -> Field {
     let data_type = match column.kind {
-        Kind::Text => DataType::Utf8,
-        Kind::Name => DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)),
-        Kind::Flag => DataType::Boolean,
-        Kind::Whole => DataType::Int64,
-        Kind::Binary32 => DataType::Float32,
-        Kind::Binary64 => DataType::Float64,
-        Kind::Series => DataType::List(Arc::new(Field::new_list_field(DataType::Float64, true))),
-        Kind::Wholes => DataType::List(Arc::new(Field::new_list_field(DataType::Int64, true))),
+        ColumnKind::Text => DataType::Utf8,
+        ColumnKind::Name => DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)),
+        ColumnKind::Flag => DataType::Boolean,
+        ColumnKind::Whole => DataType::Int64,
+        ColumnKind::Binary32 => DataType::Float32,
+        ColumnKind::Binary64 => DataType::Float64,
+        ColumnKind::Series => DataType::List(Arc::new(Field::new_list_field(DataType::Float64, true))),
+        ColumnKind::Wholes => DataType::List(Arc::new(Field::new_list_field(DataType::Int64, true))),
     };
     let words = [("unit", &column.unit), ("description", &column.description)];
     let words: HashMap<String, String> =
@@ -154,16 +154,16 @@ enum Builder {
 }
 
 impl Builder {
-    fn new(kind: Kind) -> Builder {
+    fn new(kind: ColumnKind) -> Builder {
         match kind {
-            Kind::Text => Builder::Text(StringBuilder::new()),
-            Kind::Name => Builder::Name(StringDictionaryBuilder::new()),
-            Kind::Flag => Builder::Flag(BooleanBuilder::new()),
-            Kind::Whole => Builder::Whole(Int64Builder::new()),
-            Kind::Binary32 => Builder::Binary32(Float32Builder::new()),
-            Kind::Binary64 => Builder::Binary64(Float64Builder::new()),
-            Kind::Series => Builder::Series(ListBuilder::new(Float64Builder::new())),
-            Kind::Wholes => Builder::Wholes(ListBuilder::new(Int64Builder::new())),
+            ColumnKind::Text => Builder::Text(StringBuilder::new()),
+            ColumnKind::Name => Builder::Name(StringDictionaryBuilder::new()),
+            ColumnKind::Flag => Builder::Flag(BooleanBuilder::new()),
+            ColumnKind::Whole => Builder::Whole(Int64Builder::new()),
+            ColumnKind::Binary32 => Builder::Binary32(Float32Builder::new()),
+            ColumnKind::Binary64 => Builder::Binary64(Float64Builder::new()),
+            ColumnKind::Series => Builder::Series(ListBuilder::new(Float64Builder::new())),
+            ColumnKind::Wholes => Builder::Wholes(ListBuilder::new(Int64Builder::new())),
         }
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
 use super::spreadsheet::csv_field;
-use super::{Cell, Column, Kind, TableFacts, TableFormat, jsonl};
+use super::{Cell, Column, ColumnKind, TableFacts, TableFormat, jsonl};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
@@ -98,15 +98,15 @@ impl TableWriter {
     }
 }
 
-fn fits(kind: Kind, cell: &Cell) -> bool {
+fn fits(kind: ColumnKind, cell: &Cell) -> bool {
     match cell {
         Cell::Null => true,
-        Cell::Text(_) => matches!(kind, Kind::Text | Kind::Name),
-        Cell::Flag(_) => kind == Kind::Flag,
-        Cell::Whole(_) => kind == Kind::Whole,
-        Cell::Number(_) | Cell::Decimal(_) => matches!(kind, Kind::Binary32 | Kind::Binary64),
-        Cell::Series(_) => kind == Kind::Series,
-        Cell::Wholes(_) => kind == Kind::Wholes,
+        Cell::Text(_) => matches!(kind, ColumnKind::Text | ColumnKind::Name),
+        Cell::Flag(_) => kind == ColumnKind::Flag,
+        Cell::Whole(_) => kind == ColumnKind::Whole,
+        Cell::Number(_) | Cell::Decimal(_) => matches!(kind, ColumnKind::Binary32 | ColumnKind::Binary64),
+        Cell::Series(_) => kind == ColumnKind::Series,
+        Cell::Wholes(_) => kind == ColumnKind::Wholes,
     }
 }
 
@@ -122,7 +122,7 @@ fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
             Cell::Text(field) => write!(text, "{}", csv_field(field)),
             Cell::Flag(flag) => write!(text, "{}", u8::from(*flag)),
             Cell::Whole(number) => write!(text, "{number}"),
-            Cell::Number(number) if column.kind == Kind::Binary32 => write!(text, "{}", *number as f32),
+            Cell::Number(number) if column.kind == ColumnKind::Binary32 => write!(text, "{}", *number as f32),
             Cell::Number(number) => write!(text, "{number}"),
             Cell::Decimal(number) => write!(text, "{number:?}"),
             Cell::Series(series) => write!(text, "{}", joined(series)),

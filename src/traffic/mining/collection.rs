@@ -53,7 +53,7 @@ pub struct Collection {
 }
 
 impl Collection {
-    fn add(&mut self, part: Part) {
+    fn add(&mut self, part: MinedPart) {
         self.notes.extend(part.notes);
         self.synthetic |= part.synthetic;
         self.scenarios.extend(part.mined.scenarios);
@@ -79,7 +79,7 @@ pub fn counts_text(scenarios: &[Scenario]) -> String {
     Category::ALL.map(part).join("; ")
 }
 
-struct Part {
+struct MinedPart {
     mined: Mined,
     summary: RecordingSummary,
     notes: Vec<String>,
@@ -98,7 +98,7 @@ pub fn mine_folder(
 ) -> Result<Collection> {
     options.validate()?;
     let inventory = highd::inventory(dir)?;
-    let parts: Vec<Result<Part>> = inventory
+    let parts: Vec<Result<MinedPart>> = inventory
         .recordings
         .par_iter()
         .with_max_len(1)
@@ -106,7 +106,7 @@ pub fn mine_folder(
             let part = highd::read_judged(files, implausible).map(|loaded| {
                 let mined = mine(&loaded.recording, options);
                 let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
-                Part { mined, summary, notes: loaded.notes, synthetic: loaded.recording.synthetic }
+                MinedPart { mined, summary, notes: loaded.notes, synthetic: loaded.recording.synthetic }
             });
             done();
             part
@@ -132,7 +132,7 @@ pub fn mine_generated(
     done: impl Fn() + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let parts: Vec<Part> = (0..generator.recordings)
+    let parts: Vec<MinedPart> = (0..generator.recordings)
         .into_par_iter()
         .with_max_len(1)
         .map(|index| {
@@ -140,7 +140,7 @@ pub fn mine_generated(
             let mined = mine(&recording, options);
             let summary = summary(&recording, &mined, options, Vec::new());
             done();
-            Ok(Part { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
+            Ok(MinedPart { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
         })
         .collect::<Result<_>>()?;
     let mut collection = Collection::default();

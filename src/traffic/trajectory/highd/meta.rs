@@ -1,7 +1,7 @@
 //! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
 //! (size, class and direction of each vehicle).
 
-use super::columns::{CsvColumn, CsvTable, FileChecksum, quoted};
+use super::columns::{CsvColumn, CsvTable, FileChecksum, excerpt};
 use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TRACKS_META_COLUMNS};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
@@ -147,7 +147,7 @@ fn markings(table: &CsvTable, column: CsvColumn) -> Result<Vec<f64>> {
     for part in text.trim_end_matches(';').split(';') {
         let line = number::real(part.as_bytes())
             .filter(|line| line.abs() <= number::REAL_LIMIT)
-            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", quoted(part))))?;
+            .ok_or_else(|| bad(format!("the lane line {} is not a finite number", excerpt(part))))?;
         if let Some(&above) = lines.last()
             && line <= above
         {
