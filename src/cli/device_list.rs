@@ -286,7 +286,7 @@ mod tests {
         assert!(one.contains("allows pci:0000:65:00.0; hidden: 1 of 2 GPUs"), "{one}");
         assert_eq!(one.matches("hidden ").count(), 1, "one row is marked: {one}");
         let none = text(&node(), allowed(&[]));
-        assert!(none.contains("takes the processor: the environment hides every GPU"), "{none}");
+        assert!(none.contains("selects the CPU: the environment hides every GPU"), "{none}");
         assert!(none.contains("allows no GPU; hidden: 2 of 2 GPUs"), "{none}");
     }
 
@@ -297,9 +297,9 @@ mod tests {
     }
 
     #[test]
-    fn software_alone_leaves_the_work_to_the_processor() {
+    fn software_alone_leaves_the_work_to_the_cpu() {
         let text = text(&node()[2..], Ok(None));
-        assert!(text.contains("takes the processor: no GPU; other devices are used only when --device"), "{text}");
+        assert!(text.contains("selects the CPU: no GPU; other devices are used only when --device"), "{text}");
     }
 
     #[test]

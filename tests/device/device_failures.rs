@@ -120,7 +120,7 @@ fn without_a_stand_in_the_failure_is_the_users_to_know() {
     let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
     let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
     assert!(matches!(&error, Error::Device { .. }), "{error}");
-    assert!(error.help().unwrap().contains("--backend cpu"));
+    assert!(error.help().unwrap().contains("option `backend = cpu`"));
 }
 
 #[test]

@@ -328,7 +328,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
         (&[d, "--estimator", "subset"], 2, "one headway at a time"),
         (&[d, "--estimator", "ce", "--thw", "1", "--shard", "0/5"], 2, "with one given --proposal"),
         (&[d, "--shard", "5/5"], 2, "no shard 5 of 5"),
-        (&[d, "--shard", "0/2", "--half-width", "0.1"], 2, "when the whole is good enough"),
+        (&[d, "--shard", "0/2", "--half-width", "0.1"], 2, "cannot evaluate a stop rule"),
         (&[d, "--shard", "0/2", "--estimator", "subset", "--thw", "1"], 2, "the adaptive estimators are sequential"),
         (&[d, "--shard", "0/2", "--bootstrap", "20"], 2, "no replicates"),
         (&[d, "--plan", "plan.json"], 2, "cannot be used with"),

@@ -75,7 +75,7 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
     }
     let rows: Vec<&str> = INSTANTS.lines().collect();
     let again = of("s.csv", &format!("{INSTANTS}{}\n{}\n", rows[1], rows[2])).unwrap_err().to_string();
-    assert!(again.contains("line 7, column `id`, scenario a: this id is that of line 2 too"), "{again}");
+    assert!(again.contains("line 7, column `id`, scenario a: this id belongs to line 2 too"), "{again}");
     let near = of("s.csv", &INSTANTS.replace("side,", "sied,")).unwrap_err().help().unwrap();
     assert!(near.contains("did you mean `side`?"), "{near}");
     let kmh = of("s.csv", &INSTANTS.replace("ego_speed_kmh", "ego_speed_mph")).unwrap_err().help().unwrap();

@@ -9,6 +9,7 @@ pub(in crate::engine) mod instructions;
 pub(in crate::engine) mod lane_result;
 mod lead_only;
 pub(in crate::engine) mod pending;
+mod rows;
 pub(in crate::engine) mod rules;
 pub(in crate::engine) mod runner;
 pub(in crate::engine) mod series;
