@@ -7,7 +7,7 @@ use crate::common::tables::run;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int32Array, StringArray, StructArray};
+use arrow_array::{ArrayRef, BooleanArray, Date32Array, Float64Array, Int32Array, StringArray, StructArray};
 use arrow_schema::{DataType, Field};
 use lanesweep::scenario::{Category, Scenario, Side, read_scenarios};
 use parquet::basic::Compression;
@@ -237,8 +237,7 @@ fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
     assert!(text.contains("column `fps`, row 2, scenario b: is \"fast\"; expected a number"), "{text}");
     let near = with("lane_widht", numbers(&[3.5, 3.5]));
     assert!(near.contains("column `lane_widht`"), "{near}");
-    let days: ArrayRef = Arc::new(Int32Array::from(vec![1, 2]));
-    let date = with("gap0", arrow_cast::cast(&days, &DataType::Date32).unwrap());
+    let date = with("gap0", Arc::new(Date32Array::from(vec![1, 2])));
     assert!(date.contains("column `gap0`: holds values of the type Date32"), "{date}");
 }
 

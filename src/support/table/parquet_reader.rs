@@ -9,9 +9,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, Int64Type};
+use arrow_array::types::{
+    Decimal128Type, Decimal256Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
+    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
 use arrow_array::{Array, ArrayRef, RecordBatch, StructArray};
-use arrow_cast::cast;
 use arrow_schema::{DataType, Field};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
@@ -126,7 +128,7 @@ impl ParquetRows {
     pub(super) fn want(&mut self, columns: &[usize]) -> Result<()> {
         for &column in columns {
             let data_type = self.data_type(column);
-            if canonical(&data_type).is_none() {
+            if !is_readable(&data_type) {
                 let place = Place::file(&self.path).column(&self.names[column]);
                 let problem = format!("holds values of the type {data_type}");
                 return Err(Error::input(place, problem, "expected numbers, texts, truth values or lists of numbers"));
@@ -183,7 +185,7 @@ impl ParquetRows {
         Ok(Some(Row { number: self.number, values }))
     }
 
-    /// The wanted columns of a batch, each in one of a few types.
+    /// The wanted columns of a batch.
     fn leaves_of(&self, batch: &RecordBatch) -> std::result::Result<Vec<Leaf>, String> {
         let leaf = |&column: &usize| {
             let (root, inner) = self.leaves[column];
@@ -200,35 +202,26 @@ impl ParquetRows {
                     (Some(array.clone()), record.column(at).clone())
                 }
             };
-            let to = canonical(values.data_type()).ok_or("a column changes its type")?;
-            let values = cast(&values, &to).map_err(|e| e.to_string())?;
+            if !is_readable(values.data_type()) {
+                return Err("a column changes its type".to_owned());
+            }
             Ok(Leaf { record, values })
         };
         self.wanted.iter().map(leaf).collect()
     }
 }
 
-/// The type that values are read as; `None` for what no table here has.
-fn canonical(of: &DataType) -> Option<DataType> {
-    let number = |of: &DataType| match of {
-        of if of.is_integer() => Some(DataType::Int64),
-        of if of.is_floating() || matches!(of, DataType::Decimal128(..) | DataType::Decimal256(..)) => {
-            Some(DataType::Float64)
-        }
-        _ => None,
-    };
+fn is_number(of: &DataType) -> bool {
+    of.is_integer() || of.is_floating() || matches!(of, DataType::Decimal128(..) | DataType::Decimal256(..))
+}
+
+/// Whether a table here can have values of this type. Arrow's own types (dictionaries, large lists) do not occur: its
+/// metadata is skipped.
+fn is_readable(of: &DataType) -> bool {
     match of {
-        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => Some(DataType::Utf8),
-        DataType::Dictionary(_, inner) => canonical(inner),
-        DataType::Boolean | DataType::Null => Some(of.clone()),
-        DataType::List(item) | DataType::LargeList(item) | DataType::FixedSizeList(item, _) => {
-            let item = match item.data_type() {
-                DataType::Null => DataType::Float64,
-                other => number(other)?,
-            };
-            Some(DataType::List(std::sync::Arc::new(Field::new_list_field(item, true))))
-        }
-        other => number(other),
+        DataType::Utf8 | DataType::Boolean | DataType::Null => true,
+        DataType::List(item) => item.data_type() == &DataType::Null || is_number(item.data_type()),
+        other => is_number(other),
     }
 }
 
@@ -238,6 +231,11 @@ fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
     if leaf.record.as_ref().is_some_and(|record| record.is_null(at)) || array.is_null(at) {
         return Ok(Value::Null);
     }
+    macro_rules! number {
+        ($of:ident as $to:ty) => {
+            Value::from(<$to>::from(array.as_primitive::<$of>().value(at)))
+        };
+    }
     Ok(match array.data_type() {
         DataType::Utf8 => match array.as_string::<i32>().value(at) {
             text if text.len() > MAX_TEXT => {
@@ -246,8 +244,27 @@ fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
             text => Value::from(text),
         },
         DataType::Boolean => Value::from(array.as_boolean().value(at)),
-        DataType::Int64 => Value::from(array.as_primitive::<Int64Type>().value(at)),
-        DataType::Float64 => Value::from(array.as_primitive::<Float64Type>().value(at)),
+        DataType::Int8 => number!(Int8Type as i64),
+        DataType::Int16 => number!(Int16Type as i64),
+        DataType::Int32 => number!(Int32Type as i64),
+        DataType::Int64 => number!(Int64Type as i64),
+        DataType::UInt8 => number!(UInt8Type as i64),
+        DataType::UInt16 => number!(UInt16Type as i64),
+        DataType::UInt32 => number!(UInt32Type as i64),
+        DataType::UInt64 => {
+            i64::try_from(array.as_primitive::<UInt64Type>().value(at)).map_or(Value::Null, Value::from)
+        }
+        DataType::Float16 => number!(Float16Type as f64),
+        DataType::Float32 => number!(Float32Type as f64),
+        DataType::Float64 => number!(Float64Type as f64),
+        DataType::Decimal128(_, scale) => {
+            Value::from(array.as_primitive::<Decimal128Type>().value(at) as f64 / 10f64.powi(i32::from(*scale)))
+        }
+        DataType::Decimal256(_, scale) => {
+            let digits = array.as_primitive::<Decimal256Type>().value(at).to_string();
+            let value = digits.parse::<f64>().map_err(|e| e.to_string())?;
+            Value::from(value / 10f64.powi(i32::from(*scale)))
+        }
         DataType::List(_) => {
             let items = array.as_list::<i32>().value(at);
             if items.len() > MAX_SERIES {

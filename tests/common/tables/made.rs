@@ -9,9 +9,8 @@ use std::sync::Arc;
 
 use arrow_array::builder::{Float64Builder, ListBuilder};
 use arrow_array::cast::AsArray;
-use arrow_array::types::{Float32Type, Float64Type};
+use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
 use arrow_array::{Array, ArrayRef, RecordBatch};
-use arrow_cast::cast;
 use arrow_schema::{DataType, Field};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -56,13 +55,13 @@ fn texts(array: &ArrayRef) -> Vec<String> {
         DataType::Float64 => array.as_primitive::<Float64Type>().value(at).to_string(),
         DataType::Boolean => u8::from(array.as_boolean().value(at)).to_string(),
         DataType::List(_) => "[…]".to_owned(),
-        _ => cast(array, &DataType::Utf8).unwrap().as_string::<i32>().value(at).to_owned(),
+        DataType::Int64 => array.as_primitive::<Int64Type>().value(at).to_string(),
+        DataType::Dictionary(..) => {
+            let texts = array.as_dictionary::<Int32Type>();
+            texts.values().as_string::<i32>().value(texts.keys().value(at) as usize).to_owned()
+        }
+        _ => array.as_string::<i32>().value(at).to_owned(),
     };
-    if let DataType::Dictionary(..) | DataType::Int64 = array.data_type() {
-        let plain = cast(array, &DataType::Utf8).unwrap();
-        let plain = plain.as_string::<i32>();
-        return plain.iter().map(|text| text.unwrap_or_default().to_owned()).collect();
-    }
     (0..array.len()).map(text).collect()
 }
 
