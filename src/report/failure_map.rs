@@ -105,7 +105,7 @@ impl FailureMap {
     }
 
     /// Why the map cannot be drawn, if so: an axis without cells, edges that do not increase, or counts that do not
-    /// match the cells. Then [`FailureMap::svg`] says so in words and [`FailureMap::csv`] has no rows.
+    /// match the cells. Then [`FailureMap::figure`] says so in words and [`FailureMap::csv`] has no rows.
     pub fn problem(&self) -> Option<String> {
         let cells = self.x.cells() * self.y.cells();
         let counts = [("samples", self.samples.len()), ("failures", self.failures.len())];
