@@ -37,8 +37,22 @@ fn passes(motion: &Motion<f64>, tables: &Tables<f64>, half_widths: f64) -> Optio
         if motion.lateral_per_step.abs() < 2.0 * half_widths {
             return None;
         }
+        // The position is monotone, so one step at most changes the side: a search, because there may be 2³² steps.
         let position = |step| motion.lateral(tables, step).position;
-        return (0..=motion.lateral_until).find_map(|step| of_step(position(step), position(step + 1)));
+        let side = position(0) < 0.0;
+        let (mut before, mut after) = (0, motion.lateral_until.saturating_add(1));
+        if (position(after) < 0.0) == side {
+            return None;
+        }
+        while after - before > 1 {
+            let middle = before + (after - before) / 2;
+            if (position(middle) < 0.0) == side {
+                before = middle;
+            } else {
+                after = middle;
+            }
+        }
+        return of_step(position(before), position(after));
     }
     let from = motion.lateral_offset as usize;
     let series = &tables.lateral[from..from + motion.lateral_len as usize];
@@ -78,6 +92,9 @@ mod tests {
         let help = error.help().unwrap();
         assert!(error.to_string().contains("7.0 m") && help.contains("below 5.43e-2 s"), "{error} {help}");
         assert!(check(change(-3.5, 70.0), 0.05).is_ok());
+        // Billions of steps on the way: checked at once.
+        assert!(check(change(-1e10, 30.0), 0.1).is_ok());
+        assert!(check(Lateral::Kinematic { start_m: 1e10 + 5.0, rate_mps: -100.0, end_m: -1e10 }, 0.1).is_err());
         let recorded = |position_m: Vec<f64>| Lateral::Sampled { towards_mps: vec![0.0; position_m.len()], position_m };
         assert!(check(recorded(vec![3.5, 2.0, 0.5, -2.0]), 0.1).is_ok());
         assert!(check(recorded(vec![3.5, 2.0, -2.0]), 0.1).is_err());
