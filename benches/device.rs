@@ -1,8 +1,8 @@
 //! A device beside the CPU, in one run: lanes and lane-steps per second of every category and model, end to
 //! end and by the device's own clock, with the operations of a lane-step.
 //!
-//! `cargo bench --bench device -- --device NAME [--headways N] [--repetitions N]` prints one CSV row per part
-//! and repetition to stdout (kept under `benches/runs` with the machine's facts) and a summary to stderr.
+//! `cargo bench --bench device -- --device NAME [--headways N] [--repetitions N] [--lanes-per-invocation N]...` prints one
+//! CSV row per part and repetition to stdout (kept under `benches/runs` with the machine's facts) and a summary to stderr.
 //! Synthetic data of the paper's size, at N time headways from 0.2 s to 2.0 s (10 unless told otherwise; a
 //! real GPU needs 1,000 and more to be busy). Both compute the same lanes. The CPU runs ten headways.
 
@@ -33,9 +33,21 @@ fn main() {
     let name = value("--device").map(|n| n.parse::<DeviceName>().expect("--device NAME"));
     let adapters = Adapters::enumerate();
     let index = choose(adapters.cards(), BackendChoice::Gpu, name.as_ref(), None).expect("a device").expect("a device");
-    let gpu = GpuBackend::open(&adapters, index, GpuOptions::default()).expect("an open device");
+    let mut per_invocation: Vec<Option<u32>> = args
+        .windows(2)
+        .filter(|pair| pair[0] == "--lanes-per-invocation")
+        .map(|pair| Some(pair[1].parse().expect("--lanes-per-invocation N")))
+        .collect();
+    // What the program chooses comes first.
+    per_invocation.insert(0, None);
+    let open = |lanes_per_invocation| {
+        let options = GpuOptions { lanes_per_invocation, ..GpuOptions::default() };
+        let name = lanes_per_invocation.map_or("device".to_owned(), |lanes| format!("device:{lanes}"));
+        (name, GpuBackend::open(&adapters, index, options).expect("an open device"))
+    };
+    let gpus: Vec<(String, GpuBackend)> = per_invocation.into_iter().map(open).collect();
     let cpu = CpuBackend::lane_arithmetic();
-    eprintln!("{}\n{}", gpu.describe(), cpu.describe());
+    eprintln!("{}\n{}", gpus[0].1.describe(), cpu.describe());
     println!("backend,category,model,wanted,repetition,lanes,lane_steps,seconds,device_seconds");
     let scenarios = paper_size_scenarios();
     for category in Category::ALL {
@@ -43,10 +55,12 @@ fn main() {
             let many = plan(&scenarios, category, model, headways);
             let ten = plan(&scenarios, category, model, 10);
             operations(&ten, category, model);
-            let (many_steps, ten_steps) = (lane_steps(&many, &gpu), lane_steps(&ten, &cpu));
+            let (many_steps, ten_steps) = (lane_steps(&many, &gpus[0].1), lane_steps(&ten, &cpu));
             for repetition in 0..repetitions {
-                for wanted in [Wanted::Verdicts, Wanted::Counts] {
-                    time(&gpu, "device", &many, category, model, many_steps, wanted, repetition);
+                for (name, gpu) in &gpus {
+                    for wanted in [Wanted::Verdicts, Wanted::Counts] {
+                        time(gpu, name, &many, category, model, many_steps, wanted, repetition);
+                    }
                 }
                 time(&cpu, "cpu", &ten, category, model, ten_steps, Wanted::Verdicts, repetition);
             }

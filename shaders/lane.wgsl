@@ -1,6 +1,8 @@
-// Entry point: bindings, and the lane of an invocation. All other functions are pure.
+// Entry point: bindings, and the lanes of an invocation. All other functions are pure.
 //
-// Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion.
+// Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion. Their numbers of
+// steps differ by far: an invocation whose lane has ended takes the next one of its workgroup, so that a warp does not
+// wait for its longest lane.
 
 @group(0) @binding(0) var<uniform> launch: Launch;
 @group(0) @binding(1) var<storage, read> cases: array<LaneCase>;
@@ -12,6 +14,11 @@
 @group(0) @binding(7) var<storage, read_write> counts: array<atomic<u32>>;
 
 const WORKGROUP: u32 = 64u;
+// More than any dispatch has.
+const MAX_TURNS: u32 = 0x7fffffffu;
+
+// First lane of the workgroup that no invocation has taken.
+var<workgroup> next_lane: atomic<u32>;
 
 @compute @workgroup_size(WORKGROUP)
 fn lanes(
@@ -20,22 +27,57 @@ fn lanes(
     @builtin(local_invocation_index) inside: u32,
 ) {
     // Two dimensions, because one dimension is limited to 65,535 workgroups.
-    let lane = (group.y * groups.x + group.x) * WORKGROUP + inside;
-    if lane >= launch.lanes {
+    let begin = (group.y * groups.x + group.x) * launch.lanes_per_group;
+    let end = select(launch.lanes, begin + launch.lanes_per_group, begin + launch.lanes_per_group < launch.lanes);
+    if frame_queue {
+        if inside == 0u {
+            atomicStore(&next_lane, begin + WORKGROUP);
+        }
+        workgroupBarrier();
+    }
+    var lane = begin + inside;
+    if lane >= end {
         return;
     }
-    let at = lane / launch.headways;
-    let record = run_lane(cases[launch.first_case + at], starts[lane - at * launch.headways]);
-    // The host checks this counter: the device must compute every lane to its end.
-    if (record.word >> 8u) != END_NOT_YET {
-        atomicAdd(&counts[launch.done_word], 1u);
+    var at = lane / launch.headways;
+    var lane_case = cases[launch.first_case + at];
+    var state = start_lane(lane_case, starts[lane - at * launch.headways]);
+    var done = 0u;
+    // Each turn is one step of the lane that the invocation has.
+    for (var turn = 0u; turn < MAX_TURNS; turn++) {
+        state = advance(state, lane_case);
+        if state.end != END_NOT_YET {
+            if !frame_queue {
+                break;
+            }
+            write_outcome(lane, at % launch.variants, outcome(state, lane_case));
+            done = done + 1u;
+            lane = atomicAdd(&next_lane, 1u);
+            if lane >= end {
+                break;
+            }
+            at = lane / launch.headways;
+            lane_case = cases[launch.first_case + at];
+            state = start_lane(lane_case, starts[lane - at * launch.headways]);
+        }
     }
-    if launch.wanted == WANTED_COUNTS {
-        count_lane(launch, at % launch.variants, record);
-    } else {
+    if !frame_queue & (state.end != END_NOT_YET) {
+        write_outcome(lane, at % launch.variants, outcome(state, lane_case));
+        done = 1u;
+    }
+    // The host checks this counter: the device must compute every lane to its end.
+    atomicAdd(&counts[launch.done_word], done);
+}
+
+fn write_outcome(lane: u32, variant: u32, record: OutcomeRecord) {
+    if !frame_values | (launch.wanted != WANTED_COUNTS) {
         pack_verdicts(launch, lane, record.word);
     }
-    if launch.wanted == WANTED_OUTCOMES {
-        outcomes[launch.first_outcome + lane] = record;
+    if frame_values {
+        if launch.wanted == WANTED_COUNTS {
+            count_lane(launch, variant, record);
+        } else {
+            outcomes[launch.first_outcome + lane] = record;
+        }
     }
 }

@@ -55,6 +55,10 @@ fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion
         if rule.kind == ATTENTION_WANDERING && early == NEVER && abs(position - start) > rule.travel {
             early = step;
         }
+        // No later step can change which of the two comes first.
+        if early != NEVER || (event != NEVER && (rule.kind != ATTENTION_WANDERING || step >= event)) {
+            break;
+        }
         lateral_before = position;
         speed_before = v;
     }

@@ -51,7 +51,7 @@ fn btn_raise(
     denominator: f32,
     fails: bool,
 ) -> BrakeThreatMaximum {
-    let higher = counts & (numerator * maximum.denominator > maximum.numerator * denominator);
+    let higher = frame_values & counts & (numerator * maximum.denominator > maximum.numerator * denominator);
     return BrakeThreatMaximum(
         select(maximum.numerator, numerator, higher),
         select(maximum.denominator, denominator, higher),
@@ -88,7 +88,7 @@ fn btn_update(maximum: BrakeThreatMaximum, seen: bool, gap: f32, closing: f32) -
         let fails = touches | btn_needs_more(btn_a_limit, gap, closing);
         let hopeless = touches | (gap * gap < btn_short_ramp * closing * closing * closing);
         var required = 0.0;
-        if counts & !known & !hopeless {
+        if frame_values & counts & !known & !hopeless {
             required = btn_solve(gap, closing);
         }
         let numerator = select(required, 1.0, hopeless);

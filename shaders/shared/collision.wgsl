@@ -16,8 +16,11 @@ fn held_in_contact(before: f32, after: f32, half_lengths: f32) -> f32 {
 }
 
 // Contact at one step, strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
-fn contact(gap: f32, half_lengths: f32, lateral_gap: f32) -> u32 {
-    let overlap_along = (gap < 0.0) & (gap + half_lengths + half_lengths > 0.0);
-    let kind = select(CONTACT_FRONTAL, CONTACT_BY_SIDE, gap + half_lengths < 0.0);
-    return select(CONTACT_NONE, kind, (lateral_gap < 0.0) & overlap_along);
+fn overlaps(gap: f32, half_lengths: f32, lateral_gap: f32) -> bool {
+    return (lateral_gap < 0.0) & (gap < 0.0) & (gap + half_lengths + half_lengths > 0.0);
+}
+
+// What touches what, if the vehicles overlap.
+fn contact(gap: f32, half_lengths: f32) -> u32 {
+    return select(CONTACT_FRONTAL, CONTACT_BY_SIDE, gap + half_lengths < 0.0);
 }

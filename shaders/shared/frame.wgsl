@@ -1,5 +1,5 @@
-// The frame: one lane from start to end, with the latched step of all models. Twin of src/engine/lane_step.rs and
-// src/engine/lane.rs.
+// The frame: the start, one step and the outcome of a lane, with the latched step of all models. Twin of
+// src/engine/lane_step.rs and src/engine/lane.rs.
 //
 // Order inside a step: the gap moves to i (a contact on the way holds it), the state at i gives the criteria and the
 // contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions.
@@ -18,6 +18,10 @@ override frame_abort_above_ttc: f32;
 override frame_model: u32;
 // At least one case has a second vehicle.
 override frame_paired: bool;
+// The continuous values are wanted. Verdicts need none of them.
+override frame_values: bool;
+// An invocation whose lane has ended takes the next one of its workgroup.
+override frame_queue: bool;
 
 const NO_STEP: u32 = 0xffffffffu;
 
@@ -42,80 +46,89 @@ struct EgoState {
     width: f32,
 }
 
-// How a lane ended.
-struct Last {
-    end: u32,
-    index: u32,
-    touch: u32,
-    touched: u32,
+// A lane at the beginning of a step; after its last step, at that step.
+struct LaneState {
+    gap_0: f32,
+    gap_1: f32,
+    driver: DriverState,
     v_ego: f32,
-    closing: f32,
+    v_before: f32,
+    reaction_step: u32,
+    record: Record,
+    index: u32,
+    // END_NOT_YET before the last step.
+    end: u32,
+    // The vehicle of a contact.
+    touched: u32,
 }
 
-// Runs one lane.
-fn run_lane(lane: LaneCase, start: Start) -> OutcomeRecord {
+fn start_lane(lane: LaneCase, start: Start) -> LaneState {
     let gap_start = select(start.value * lane.ego_speed, start.value, start.is_gap != 0u);
-    var gap_0 = gap_start + lane.others[0].gap_offset;
-    var gap_1 = gap_start + lane.others[1].gap_offset;
-    var state = initial();
-    var v_ego = lane.ego_speed;
-    var v_before = v_ego;
-    var reaction_step = NO_STEP;
-    var record = Record(ttc_nothing(), btn_nothing(), UNBOUNDED);
-    // Remains only if a device leaves the loop early.
-    var last = Last(END_NOT_YET, 0u, CONTACT_NONE, 0u, 0.0, 0.0);
-    for (var index = 0u; index < frame_step_cap; index++) {
-        let a_ego = (v_ego - v_before) * frame_inverse_dt;
-        let ego = EgoState(v_ego, a_ego, lane.ego_width);
-        let first = see(ego, lane.others[0], gap_0, index);
-        gap_0 = first.view.gap;
-        record = judge(record, first);
-        var hazard = attentive_check(first, lane.others[0], index);
-        var touch = touches(first, lane.others[0]);
-        var settled = is_settled(first);
-        var touched = 0u;
-        var aborting = aborts(first);
-        var touched_closing = closing(first.view);
-        if frame_paired {
-            if lane.pair != 0u {
-                let second = see(ego, lane.others[1], gap_1, index);
-                gap_1 = second.view.gap;
-                record = judge(record, second);
-                let other_hazard = attentive_check(second, lane.others[1], index);
-                // The nearest unsafe vehicle determines the reaction.
-                let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | (gap_1 < gap_0));
-                hazard.is_unsafe = hazard.is_unsafe | nearer;
-                hazard.demand = select(hazard.demand, other_hazard.demand, nearer);
-                let other_touch = touches(second, lane.others[1]);
-                let by_other = touch == CONTACT_NONE;
-                touched = select(0u, 1u, by_other);
-                touched_closing = select(touched_closing, closing(second.view), by_other);
-                touch = select(touch, other_touch, by_other);
-                settled = settled & is_settled(second);
-                aborting = aborting | aborts(second);
-            }
-        }
+    return LaneState(
+        gap_start + lane.others[0].gap_offset,
+        gap_start + lane.others[1].gap_offset,
+        initial(),
+        lane.ego_speed,
+        lane.ego_speed,
+        NO_STEP,
+        Record(ttc_nothing(), btn_nothing(), UNBOUNDED),
+        0u,
+        END_NOT_YET,
+        0u,
+    );
+}
 
-        let reaction = react(state, hazard, v_ego);
-        let v_next = select(v_ego, reaction.v_next, hazard.is_unsafe);
-        reaction_step = select(reaction_step, index, hazard.is_unsafe & (reaction_step == NO_STEP));
-        let over = (index >= lane.horizon) & frame_end_when_settled;
-        var end = END_NOT_YET;
-        end = select(end, END_CAP, index + 1u >= frame_step_cap);
-        end = select(end, END_SETTLED, over & settled);
-        end = select(end, END_STANDSTILL, over & (v_ego <= 0.0));
-        end = select(end, END_ABORTED, aborting);
-        end = select(end, END_CONTACT, touch != CONTACT_NONE);
-        if end != END_NOT_YET {
-            last = Last(end, index, touch, touched, v_ego, touched_closing);
-            break;
+// One step.
+fn advance(before: LaneState, lane: LaneCase) -> LaneState {
+    var state = before;
+    let index = state.index;
+    let v_ego = state.v_ego;
+    let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width);
+    let first = see(ego, lane.others[0], state.gap_0, index);
+    state.gap_0 = first.view.gap;
+    state.record = judge(state.record, first);
+    var hazard = attentive_check(first, lane.others[0], index);
+    var touching = is_touched(first, lane.others[0]);
+    var touching_second = false;
+    var settled = is_settled(first);
+    var aborting = aborts(first);
+    if frame_paired {
+        if lane.pair != 0u {
+            let second = see(ego, lane.others[1], state.gap_1, index);
+            state.gap_1 = second.view.gap;
+            state.record = judge(state.record, second);
+            let other_hazard = attentive_check(second, lane.others[1], index);
+            // The nearest unsafe vehicle determines the reaction.
+            let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | (state.gap_1 < state.gap_0));
+            hazard.is_unsafe = hazard.is_unsafe | nearer;
+            hazard.demand = select(hazard.demand, other_hazard.demand, nearer);
+            touching_second = !touching & is_touched(second, lane.others[1]);
+            touching = touching | touching_second;
+            settled = settled & is_settled(second);
+            aborting = aborting | aborts(second);
         }
-        state.deceleration = select(state.deceleration, reaction.state.deceleration, hazard.is_unsafe);
-        state.delay_steps = select(state.delay_steps, reaction.state.delay_steps, hazard.is_unsafe);
-        v_before = v_ego;
-        v_ego = v_next;
     }
-    return outcome(record, reaction_step, last);
+
+    state.reaction_step = select(state.reaction_step, index, hazard.is_unsafe & (state.reaction_step == NO_STEP));
+    let over = (index >= lane.horizon) & frame_end_when_settled;
+    let is_capped = index + 1u >= frame_step_cap;
+    // What ended the lane is asked once, not at every step.
+    if touching | aborting | (over & (settled | (v_ego <= 0.0))) | is_capped {
+        state.end = END_CAP;
+        state.end = select(state.end, END_SETTLED, over & settled);
+        state.end = select(state.end, END_STANDSTILL, over & (v_ego <= 0.0));
+        state.end = select(state.end, END_ABORTED, aborting);
+        state.end = select(state.end, END_CONTACT, touching);
+        state.touched = select(0u, 1u, touching_second);
+    } else {
+        let reaction = react(state.driver, hazard, v_ego);
+        state.v_before = v_ego;
+        state.v_ego = select(v_ego, reaction.v_next, hazard.is_unsafe);
+        state.driver.deceleration = select(state.driver.deceleration, reaction.state.deceleration, hazard.is_unsafe);
+        state.driver.delay_steps = select(state.driver.delay_steps, reaction.state.delay_steps, hazard.is_unsafe);
+        state.index = index + 1u;
+    }
+    return state;
 }
 
 // `before`: the gap one step before. Step 0 is the start itself, unless index 0 is one step after it.
@@ -144,7 +157,7 @@ fn judge(record: Record, seen: Seen) -> Record {
     return Record(
         ttc_update(record.ttc, seen.judged, gap, dv),
         btn_update(record.btn, seen.judged, gap, dv),
-        select(record.min_gap, smaller(gap, record.min_gap), seen.judged),
+        select(record.min_gap, smaller(gap, record.min_gap), seen.judged & frame_values),
     );
 }
 
@@ -154,9 +167,9 @@ fn attentive_check(seen: Seen, other: LaneOther, index: u32) -> Hazard {
     return Hazard(hazard.is_unsafe & attentive, hazard.demand);
 }
 
-fn touches(seen: Seen, other: LaneOther) -> u32 {
-    let touch = contact(seen.view.gap, other.half_lengths, seen.view.lateral_gap);
-    return select(CONTACT_NONE, touch, seen.present & (other.judged != 0u));
+fn is_touched(seen: Seen, other: LaneOther) -> bool {
+    let is_overlapping = overlaps(seen.view.gap, other.half_lengths, seen.view.lateral_gap);
+    return is_overlapping & seen.present & (other.judged != 0u);
 }
 
 // No further event is possible with this vehicle: it is behind, out of the lane, or not slower.
@@ -171,24 +184,35 @@ fn aborts(seen: Seen) -> bool {
     return (frame_abort_above_ttc > 0.0) & overlap & far;
 }
 
-fn outcome(record: Record, reaction_step: u32, last: Last) -> OutcomeRecord {
-    let collided = last.touch != CONTACT_NONE;
-    var btn = record.btn;
+// The outcome of a lane after its last step.
+fn outcome(state: LaneState, lane: LaneCase) -> OutcomeRecord {
+    let collided = state.end == END_CONTACT;
+    var touch = CONTACT_NONE;
+    var v_closing = 0.0;
+    if collided {
+        if state.touched == 0u {
+            touch = contact(state.gap_0, lane.others[0].half_lengths);
+            v_closing = state.v_ego - motion_speed(lane.others[0].motion, state.index);
+        } else {
+            touch = contact(state.gap_1, lane.others[1].half_lengths);
+            v_closing = state.v_ego - motion_speed(lane.others[1].motion, state.index);
+        }
+    }
+    var btn = state.record.btn;
     if collided & criteria_any_contact {
         btn = btn_fail();
     }
-    let verdicts = select(0u, 1u, collided) | select(0u, 2u, record.ttc.failed) | select(0u, 4u, btn.failed)
-        | select(0u, 8u, last.end == END_CAP);
-    let touched = select(0u, last.touched, collided);
+    let verdicts = select(0u, 1u, collided) | select(0u, 2u, state.record.ttc.failed) | select(0u, 4u, btn.failed)
+        | select(0u, 8u, state.end == END_CAP);
     return OutcomeRecord(
-        verdicts | (last.touch << 4u) | (touched << 6u) | (last.end << 8u),
-        reaction_step,
-        last.index,
-        select(0.0, last.v_ego, collided),
-        select(0.0, last.closing, collided),
-        ttc_value_bits(record.ttc),
+        verdicts | (touch << 4u) | (state.touched << 6u) | (state.end << 8u),
+        state.reaction_step,
+        state.index,
+        select(0.0, state.v_ego, collided),
+        v_closing,
+        ttc_value_bits(state.record.ttc),
         btn.numerator,
         btn.denominator,
-        bounded_bits(record.min_gap),
+        bounded_bits(state.record.min_gap),
     );
 }

@@ -66,6 +66,8 @@ struct Launch {
     done_word: u32,
     // WANTED_…
     wanted: u32,
+    // Lanes of a workgroup, at least WORKGROUP.
+    lanes_per_group: u32,
 }
 
 const WANTED_VERDICTS: u32 = 0u;

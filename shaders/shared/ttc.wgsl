@@ -28,7 +28,7 @@ fn ttc_value_bits(minimum: TtcMinimum) -> u32 {
 fn ttc_update(minimum: TtcMinimum, seen: bool, signed_gap: f32, closing: f32) -> TtcMinimum {
     let gap = larger(signed_gap, 0.0);
     let counts = seen & (closing > 0.0);
-    let is_smaller = counts & (gap * minimum.closing < minimum.gap * closing);
+    let is_smaller = frame_values & counts & (gap * minimum.closing < minimum.gap * closing);
     return TtcMinimum(
         select(minimum.gap, gap, is_smaller),
         select(minimum.closing, closing, is_smaller),

@@ -85,6 +85,25 @@ fn shaders_without_run_time_checks_give_the_same_words() {
     assert_equal("unchecked", &compare("thresholds", &thresholds(&profile, 4), &gpu, |_| ()).unwrap());
 }
 
+#[test]
+fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
+    let profile = Profile::load("paper").unwrap();
+    let (many, few) = (random(&profile, 3000), random(&profile, 7));
+    let cpu = CpuBackend::lane_arithmetic();
+    // With more, llvmpipe ends the loop: there the first invocations take all lanes of a workgroup.
+    for lanes in [2, 3] {
+        let lanes_per_invocation = Some(lanes);
+        let Some(gpu) = open(GpuOptions { lanes_per_invocation, ..Default::default() }) else { return };
+        for plan in [&many, &few] {
+            let what = format!("{lanes} lanes per invocation");
+            assert_equal(&what, &compare("random", plan, &gpu, |_| ()).unwrap());
+            let [ours, theirs] = [&gpu as &dyn Backend, &cpu].map(|backend| run(backend, plan, Wanted::Counts).counts);
+            assert_eq!(ours, theirs, "{what}");
+        }
+        assert_equal("study", &compare("study", &small_study(), &gpu, |_| ()).unwrap());
+    }
+}
+
 /// What `verify` says of a device whose shaders have one text replaced.
 fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
     let shader_patch = Some((from.to_owned(), to.to_owned()));
@@ -135,14 +154,14 @@ fn the_quick_self_check_finds_a_wrong_shader_and_no_other() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let good = self_check(&gpu).unwrap();
     assert!(good.lanes > 8000 && good.differing == 0, "{good:?}");
-    let shader_patch = Some(("(v_ego - v_before)".to_owned(), "(v_before - v_ego)".to_owned()));
+    let shader_patch = Some(("(v_ego - state.v_before)".to_owned(), "(state.v_before - v_ego)".to_owned()));
     let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     assert!(self_check(&gpu).unwrap().differing > 0);
 }
 
 #[test]
 fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
-    let shader_patch = Some(("if lane >= launch.lanes {".to_owned(), "if lane + 1u >= launch.lanes {".to_owned()));
+    let shader_patch = Some(("select(launch.lanes, ".to_owned(), "select(launch.lanes - 1u, ".to_owned()));
     let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     let plan = random(&Profile::load("paper").unwrap(), 400);
     let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();

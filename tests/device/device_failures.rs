@@ -87,7 +87,7 @@ fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
 #[test]
 fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
     let plan = plan();
-    let shader_patch = Some(("index < frame_step_cap; index++".to_owned(), "index < 100u; index++".to_owned()));
+    let shader_patch = Some(("turn < MAX_TURNS; turn++".to_owned(), "turn < 100u; turn++".to_owned()));
     let options = GpuOptions { shader_patch, ..Default::default() };
     let Some(gpu) = open(options.clone()) else { return };
     for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
@@ -127,8 +127,10 @@ fn without_a_stand_in_the_failure_is_the_users_to_know() {
 fn a_wrong_lane_stops_the_run_and_is_named() {
     let plan = plan();
     // One model's verdict bit, always.
-    let shader_patch =
-        Some(("select(0u, 2u, record.ttc.failed)".to_owned(), "select(2u, 0u, record.ttc.failed)".to_owned()));
+    let shader_patch = Some((
+        "select(0u, 2u, state.record.ttc.failed)".to_owned(),
+        "select(2u, 0u, state.record.ttc.failed)".to_owned(),
+    ));
     let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&gpu).with_fallback(Some(&cpu)).with_recheck(1);

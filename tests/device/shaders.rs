@@ -9,7 +9,7 @@ use crate::wgsl::{
     Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments,
 };
 use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns};
-use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, driver_shader};
+use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
 use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
@@ -56,7 +56,7 @@ fn records() -> Vec<Record> {
         record!("Start", StartRecord, { is_gap: u32, value: f32 }),
         record!("Launch", Launch, {
             lanes: u32, headways: u32, variants: u32, first_case: u32, first_word: u32, first_outcome: u32,
-            first_cell_word: u32, done_word: u32, wanted: u32,
+            first_cell_word: u32, done_word: u32, wanted: u32, lanes_per_group: u32,
         }),
         record!("OutcomeRecord", OutcomeRecord, {
             word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
@@ -108,7 +108,8 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
         parse(&source);
         for (place, constants) in resolved() {
             for paired in [false, true] {
-                let constants = shader::constants(&constants, model, paired);
+                let constants =
+                    shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
                 let sizes = [Checks::Checked, Checks::Unchecked].map(|checks| {
                     let words = exact_spirv(&source, shader::ENTRY, &constants, checks);
                     words.unwrap_or_else(|e| panic!("{model:?}, {place}, paired {paired}, {checks:?}: {e}")).len()
@@ -200,7 +201,8 @@ fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
         let asked: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
         for (place, constants) in resolved() {
             for paired in [false, true] {
-                let given = shader::constants(&constants, model, paired);
+                let given =
+                    shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
                 let names: BTreeSet<&str> = given.iter().map(|(name, _)| *name).collect();
                 assert_eq!(names.len(), given.len(), "{model:?}: a constant is given twice");
                 assert_eq!(names, asked, "{model:?}, {place}");
@@ -273,7 +275,7 @@ fn constants_that_stand_on_both_sides_agree() {
     assert!(expected.iter().all(|(name, code)| !name.starts_with("END_") || *code != constant(&module, "END_NOT_YET")));
     // No constant without a twin is added unseen.
     let known: BTreeSet<&str> = expected.iter().map(|(name, _)| *name).collect();
-    let alone = ["WORKGROUP", "MODELS", "END_NOT_YET"];
+    let alone = ["WORKGROUP", "MODELS", "END_NOT_YET", "MAX_TURNS"];
     for (_, other) in module.constants.iter() {
         let name = other.name.as_deref().unwrap();
         assert!(known.contains(name) || alone.contains(&name), "{name} is compared with nothing");
@@ -456,7 +458,7 @@ fn every_loop_counts_up_to_a_constant_or_an_override() {
         let (module, _) = parse(&shader::assemble(model));
         let (loops, unbounded) = unbounded_loops(&module);
         assert_eq!(unbounded, Vec::<String>::new(), "{model:?}");
-        // exact_div, btn_solve, run_lane, count_lane.
+        // exact_div, btn_solve, lanes, count_lane.
         assert_eq!(loops, 4, "{model:?}");
     }
     for (body, counted) in [

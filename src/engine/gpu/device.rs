@@ -28,6 +28,9 @@ pub struct GpuOptions {
     pub shader_patch: Option<(String, String)>,
     /// Makes one job fail, for tests.
     pub fault: Option<Fault>,
+    /// Lanes that an invocation computes on average, at least 1; `None` follows the number of lanes, but on a software
+    /// device it is 1.
+    pub lanes_per_invocation: Option<u32>,
 }
 
 impl Default for GpuOptions {
@@ -39,6 +42,7 @@ impl Default for GpuOptions {
             plain: false,
             shader_patch: None,
             fault: None,
+            lanes_per_invocation: None,
         }
     }
 }
@@ -281,11 +285,17 @@ impl Device {
     }
 
     /// Workgroups of a dispatch in two dimensions, because one dimension is limited to 65,535.
-    pub fn workgroups(&self, lanes: u32) -> (u32, u32) {
-        let groups = lanes.div_ceil(WORKGROUP).max(1);
+    pub fn grid(&self, groups: u32) -> (u32, u32) {
+        let groups = groups.max(1);
         let most = self.device.limits().max_compute_workgroups_per_dimension.max(1);
         let rows = groups.div_ceil(most);
         (groups.div_ceil(rows), rows)
+    }
+
+    /// Lanes that one invocation computes on average: as many as leave all multiprocessors busy.
+    pub fn lanes_per_invocation(&self, lanes: u32) -> u32 {
+        let busy = || (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
+        self.options.lanes_per_invocation.unwrap_or_else(busy)
     }
 
     /// # Errors
@@ -310,6 +320,10 @@ const MAX_RESULT_BYTES: u64 = 256 << 20;
 const SMALL_RESULT_BYTES: u64 = 4 << 20;
 /// Maximum number of lanes per model of one job, so that every index into their results stays far below 2³².
 const MAX_LANES: u64 = 1 << 27;
+/// Workgroups that keep the largest devices of today busy: 132 multiprocessors of 32 workgroups each.
+const BUSY_WORKGROUPS: u32 = 4224;
+/// With more, a warp's lanes are hardly busier, and the end of a dispatch is longer.
+const MAX_LANES_PER_INVOCATION: u32 = 32;
 
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
 fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {

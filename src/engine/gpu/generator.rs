@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::records::Generation;
+use super::shader::WORKGROUP;
 use crate::Result;
 use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
@@ -139,7 +140,7 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
         entries: &entries,
     });
     let pipeline = device.generator()?;
-    let (x, y) = device.workgroups(count);
+    let (x, y) = device.grid(count.div_ceil(WORKGROUP));
     let mut encoder =
         device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("generator") });
     {

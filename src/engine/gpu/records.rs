@@ -71,6 +71,8 @@ pub struct Launch {
     pub done_word: u32,
     /// 0 verdicts, 1 outcomes, 2 counts.
     pub wanted: u32,
+    /// Lanes of a workgroup, at least [`WORKGROUP`](super::shader::WORKGROUP).
+    pub lanes_per_group: u32,
 }
 
 /// Result of a finished lane.

@@ -8,6 +8,7 @@ use bytemuck::Zeroable;
 use super::device::{Device, PipelineSpec};
 use super::generator::Inputs;
 use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
+use super::shader::WORKGROUP;
 use crate::engine::Wanted;
 use crate::{Error, Result};
 
@@ -119,6 +120,7 @@ impl Slot {
         self.grow(device, &parts, models);
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
+        let lanes_per_group = WORKGROUP * device.lanes_per_invocation(job.lanes());
         let mut launches = vec![0_u8; stride as usize * models];
         let mut counts = vec![0_u32; models];
         for model in 0..models {
@@ -132,6 +134,7 @@ impl Slot {
                 first_cell_word: (models + model * job.cells() * CELL_WORDS) as u32,
                 done_word: model as u32,
                 wanted: job.wanted as u32,
+                lanes_per_group,
             };
             let at = stride as usize * model;
             launches[at..at + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
@@ -159,7 +162,7 @@ impl Slot {
                 binding(7, buffers.counts.as_entire_binding()),
             ],
         });
-        let (x, y) = device.workgroups(job.lanes());
+        let (x, y) = device.grid(job.lanes().div_ceil(lanes_per_group));
         let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
         // Words that no lane writes must be zero.

@@ -8,13 +8,13 @@ use std::thread::JoinHandle;
 
 use rayon::prelude::*;
 
-use super::adapters::{AdapterCard, Adapters};
+use super::adapters::{AdapterCard, Adapters, DeviceKind};
 use super::device::{GpuOptions, PipelineSpec};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::records::{CELL_WORDS, StartRecord, from_ordered};
 use super::ring::{Answer, Job, RING};
-use super::shader;
+use super::shader::{self, Specialization};
 use crate::engine::{Backend, CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
@@ -33,6 +33,8 @@ pub(super) struct GpuSession<'p> {
     prepared: Prepared,
     /// One per block.
     constants: Vec<Constants<f32>>,
+    /// An invocation computes several lanes.
+    queue: bool,
     pacer: Pacer,
     /// The cases on the device: block, its units, and whether one of them has a second vehicle.
     window: Option<(usize, Range<u64>, bool)>,
@@ -49,13 +51,15 @@ struct Piece {
 }
 
 impl<'p> GpuSession<'p> {
-    pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, first_lanes: u64) -> Result<Self> {
+    pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
+        let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
         let tables: Tables<f32> = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
         let mut pipelines = Vec::new();
         for (block, resolved) in plan.blocks.iter().zip(&constants) {
-            pipelines.extend(specs(plan, resolved, block.category == Category::CutOut));
+            let paired = block.category == Category::CutOut;
+            pipelines.extend(specs(plan, resolved, Specialization { paired, values: false, queue }));
         }
         if pipelines.is_empty() {
             return Err(Error::Internal("a plan without lanes cannot run on a device".to_owned()));
@@ -71,8 +75,8 @@ impl<'p> GpuSession<'p> {
         let (reply, answer) = mpsc::channel();
         commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
         let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
-        let pacer = Pacer::new(first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
-        Ok(GpuSession { plan, device, commands, prepared, constants, pacer, window: None, device_s: 0.0 })
+        let pacer = Pacer::new(options.first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
+        Ok(GpuSession { plan, device, commands, prepared, constants, queue, pacer, window: None, device_s: 0.0 })
     }
 
     fn max_lanes(&self, wanted: Wanted) -> u64 {
@@ -113,8 +117,9 @@ impl<'p> GpuSession<'p> {
         };
         let count = self.pacer.units(per_unit, most);
         let end = units.end.min(units.start + count).min(held.end);
+        let specialization = Specialization { paired: *paired, values: wanted != Wanted::Verdicts, queue: self.queue };
         let job = Job {
-            pipelines: specs(plan, &self.constants[block], *paired),
+            pipelines: specs(plan, &self.constants[block], specialization),
             first_case: ((units.start - held.start) * variants) as u32,
             units: (end - units.start) as u32,
             variants: variants as u32,
@@ -226,8 +231,8 @@ impl Drop for GpuSession<'_> {
 }
 
 /// The pipelines of a block, one per model of the plan.
-fn specs(plan: &LanePlan, resolved: &Constants<f32>, paired: bool) -> Vec<PipelineSpec> {
-    let spec = |&model| PipelineSpec { model, constants: shader::constants(resolved, model, paired) };
+fn specs(plan: &LanePlan, resolved: &Constants<f32>, specialization: Specialization) -> Vec<PipelineSpec> {
+    let spec = |&model| PipelineSpec { model, constants: shader::constants(resolved, model, specialization) };
     plan.models.iter().map(spec).collect()
 }
 
@@ -283,9 +288,13 @@ impl GpuBackend {
     ///
     /// # Errors
     /// [`crate::Error::Device`] if its driver refuses.
-    pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
+    pub fn open(adapters: &Adapters, index: usize, mut options: GpuOptions) -> Result<GpuBackend> {
         let adapter = adapters.take(index)?;
         let card = adapters.cards()[index].clone();
+        if card.kind == DeviceKind::Software {
+            // It has no warps that wait for their longest lane, and llvmpipe limits the turns of an invocation.
+            options.lanes_per_invocation.get_or_insert(1);
+        }
         let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
         Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
     }
@@ -322,7 +331,7 @@ impl Backend for GpuBackend {
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
         let commands = self.commands.clone();
-        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, self.options.first_lanes)?))
+        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, &self.options)?))
     }
 }
 

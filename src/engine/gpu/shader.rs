@@ -86,12 +86,29 @@ pub fn assemble_generator() -> String {
     source
 }
 
-/// Values of the `override` constants of a model's pipeline, by name. `paired`: at least one case has a second
-/// vehicle; without one the pipeline skips half of the work.
-pub fn constants(resolved: &Constants<f32>, model: ModelId, paired: bool) -> Vec<(&'static str, f64)> {
+/// What a pipeline is compiled for, beside the profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Specialization {
+    /// At least one case has a second vehicle; without one the pipeline skips half of the work.
+    pub paired: bool,
+    /// The continuous values are wanted, not only verdicts.
+    pub values: bool,
+    /// An invocation whose lane has ended takes the next one of its workgroup.
+    pub queue: bool,
+}
+
+/// Values of the `override` constants of a model's pipeline, by name.
+pub fn constants(
+    resolved: &Constants<f32>,
+    model: ModelId,
+    specialization: Specialization,
+) -> Vec<(&'static str, f64)> {
+    let Specialization { paired, values, queue } = specialization;
     let mut all = resolved.frames[model.index()].shader_constants();
     all.push(("frame_model", model.index() as f64));
-    all.push(("frame_paired", f64::from(u8::from(paired))));
+    for (name, is_set) in [("frame_paired", paired), ("frame_values", values), ("frame_queue", queue)] {
+        all.push((name, f64::from(u8::from(is_set))));
+    }
     all.extend(resolved.criteria.shader_constants());
     all.extend(resolved.driver_shader_constants(model));
     all

@@ -156,6 +156,10 @@ impl<R: Real> AttentionRule<R> {
             if self.kind == WANDERING && early == NEVER && (position - start).abs() > self.travel {
                 early = step;
             }
+            // No later step can change which of the two comes first.
+            if early != NEVER || (event != NEVER && (self.kind != WANDERING || step >= event)) {
+                break;
+            }
             lateral_before = position;
             speed_before = v;
         }
