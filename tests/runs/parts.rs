@@ -217,6 +217,11 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             std::fs::write(&path, &whole).unwrap();
             edit(&path, "\"version\":2,\"engine\":1,", earlier);
             refused(dir, &["merge", name], "its version is 1, this program reads 2");
+            if file == "plan.json" {
+                let plan = format!("{name}/plan.json");
+                let said = format!("{plan}: its version is 1, this program reads 2");
+                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &said);
+            }
             std::fs::write(&path, &whole).unwrap();
         }
         done(dir, &["-q", "merge", name]);
