@@ -217,6 +217,11 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             std::fs::write(&path, &whole).unwrap();
             edit(&path, "\"version\":2,\"engine\":1,", earlier);
             refused(dir, &["merge", name], "its version is 1, this program reads 2");
+            if file == "plan.json" {
+                let plan = format!("{name}/plan.json");
+                let said = format!("{plan}: its version is 1, this program reads 2");
+                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &said);
+            }
             std::fs::write(&path, &whole).unwrap();
         }
         done(dir, &["-q", "merge", name]);
@@ -275,6 +280,42 @@ fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
     std::fs::write(&path, &whole).unwrap();
     let _ = ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
     done(dir, &["-q", "merge", "p"]);
+}
+
+#[test]
+fn a_damaged_plan_is_whole_again_after_the_command_that_its_message_names() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
+        let again = [run, &["--plan-only", "--out", name]].concat();
+        done(dir, &again);
+        let path = dir.join(name).join("plan.json");
+        let whole = std::fs::read(&path).unwrap();
+        let mut damaged = vec![[&whole[..], b"x"].concat()];
+        if name == "study" {
+            let mut changed = whole.clone();
+            *changed.last_mut().unwrap() ^= 1;
+            damaged.extend([changed, whole[..whole.len() - 1].to_vec()]);
+        }
+        for bytes in damaged {
+            std::fs::write(&path, &bytes).unwrap();
+            let plan = format!("{name}/plan.json");
+            let (code, _, err) = lanesweep(dir, &[run[1], "--plan", &plan, "--out", "x"]);
+            assert!(code == 3 && err.contains(&plan), "{err}");
+            done(dir, &again);
+            assert!(std::fs::read(&path).unwrap() == whole, "{name}");
+        }
+        // What stands before the records names the run: another one's plan is never written over.
+        std::fs::write(&path, &whole[..whole.len().min(1000)]).unwrap();
+        refused(dir, &again, "this folder holds the plan of another run");
+    }
+    // A shard that was given a plan leaves a whole one, too.
+    done(dir, &[&STUDY[..], &["--plan-only", "--out", "given"]].concat());
+    let whole = std::fs::read(dir.join("given/plan.json")).unwrap();
+    std::fs::write(dir.join("study/plan.json"), &whole[..whole.len() - 1]).unwrap();
+    done(dir, &["-q", "study", "--plan", "given/plan.json", "--shard", "0/9", "--out", "study", "--backend", "cpu"]);
+    assert!(std::fs::read(dir.join("study/plan.json")).unwrap() == whole);
 }
 
 /// 8,000 scenarios had 22 kB each in a plan: 600 MB to write it, 450 MB to read it.

@@ -1,6 +1,7 @@
 //! A run or one of its parts in a folder: the lock, the journal, the part file, the plan that all parts share.
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -153,27 +154,72 @@ impl<T: Countable> RunState<T> {
 }
 
 /// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once. A plan is told by its
-/// first line, which holds the checksums of all that follows.
+/// first line, which holds the checksums of all that follows. One with this line and other bytes behind it was damaged
+/// and is written again.
 ///
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
-pub fn leave_plan(out: &Path, line: &[u8], mut rest: impl Read) -> Result<()> {
-    let _folder = OutputDir::share(out)?;
-    let path = out.join(PLAN_FILE);
+pub fn leave_plan(out: &Path, line: &[u8], rest: &[u8]) -> Result<()> {
+    let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
+    if let Some(mut there) = open_plan(&path, line)? {
+        if is_rest(&mut there, rest).map_err(|e| Error::io(&path, "read", e))? {
+            return Ok(());
+        }
+        tracing::warn!("{} was damaged: it is written again", path.display());
+    }
+    write_atomically_with(&path, |file| file.write_all(line).and_then(|()| file.write_all(rest)))
+}
+
+/// Copies a plan file into a run's folder, or finds the same one there. A shard reads neither in whole: readers find
+/// damage in what they use.
+///
+/// # Errors
+/// As [`leave_plan`].
+pub fn copy_plan(out: &Path, from: &Path) -> Result<()> {
+    let read = |e| Error::io(from, "read", e);
+    let (mut plan, mut line) = (BufReader::new(input_file::open(from)?), Vec::new());
+    plan.read_until(b'\n', &mut line).map_err(read)?;
+    let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
+    if let Some(there) = open_plan(&path, &line)? {
+        let length = there.get_ref().metadata().map_err(|e| Error::io(&path, "read", e))?.len();
+        if length == plan.get_ref().metadata().map_err(read)?.len() {
+            return Ok(());
+        }
+        tracing::warn!("{} was damaged: it is written again", path.display());
+    }
+    write_atomically_with(&path, |file| {
+        file.write_all(&line)?;
+        std::io::copy(&mut plan, file).map(drop)
+    })
+}
+
+/// The plan file of a folder, behind this first line; `None` without a plan.
+fn open_plan(path: &Path, line: &[u8]) -> Result<Option<BufReader<File>>> {
+    let mut file = match input_file::open(path) {
+        Ok(file) => BufReader::new(file),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(e),
+    };
     let mut there = vec![0; line.len()];
-    match input_file::open(&path).map(|mut file| file.read_exact(&mut there)) {
-        Ok(Ok(())) if there == line => Ok(()),
-        Ok(_) => {
-            let problem = "this folder holds the plan of another run";
-            let help = "give another option `out`, or the flags that the plan was made with; or move the plan and its parts away";
-            Err(Error::input(Place::file(path), problem, help))
+    if file.read_exact(&mut there).is_ok() && there == line {
+        return Ok(Some(file));
+    }
+    let problem = "this folder holds the plan of another run";
+    let help =
+        "give another option `out`, or the flags that the plan was made with; or move the plan and its parts away";
+    Err(Error::input(Place::file(path), problem, help))
+}
+
+/// Whether a file ends with exactly these bytes.
+fn is_rest(file: &mut impl BufRead, mut rest: &[u8]) -> std::io::Result<bool> {
+    loop {
+        let piece = file.fill_buf()?;
+        if piece.is_empty() {
+            return Ok(rest.is_empty());
         }
-        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
-            write_atomically_with(&path, |file| {
-                file.write_all(line)?;
-                std::io::copy(&mut rest, file).map(drop)
-            })
-        }
-        Err(e) => Err(e),
+        let Some(after) = rest.strip_prefix(piece) else { return Ok(false) };
+        let length = piece.len();
+        rest = after;
+        file.consume(length);
     }
 }

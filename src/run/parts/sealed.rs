@@ -166,6 +166,8 @@ pub fn kind_of(path: &Path) -> Result<String> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -199,5 +201,20 @@ mod tests {
             assert!(read(&text[..at]).is_err(), "cut at {at}");
         }
         assert!(unseal::<Vec<f64>>("plan", &text, &place, "").unwrap_err().to_string().contains("a `plan` is needed"));
+    }
+
+    proptest! {
+        #[test]
+        fn every_finite_number_of_a_head_comes_back_with_its_bits(
+            words in prop::collection::vec(any::<u64>(), 0..40)
+        ) {
+            let special = [-0.0, 5e-324, -5e-324, f64::MIN_POSITIVE, f64::MAX, f64::MIN, 0.1 + 0.2];
+            let finite = words.into_iter().map(f64::from_bits).filter(|number| number.is_finite());
+            let numbers: Vec<f64> = special.into_iter().chain(finite).collect();
+            let (text, _) = seal("plan", &numbers).unwrap();
+            let (back, _) = unseal::<Vec<f64>>("plan", &text, &Place::item("here"), "").unwrap();
+            let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<u64>>();
+            prop_assert_eq!(bits(&back), bits(&numbers));
+        }
     }
 }

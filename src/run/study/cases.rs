@@ -19,8 +19,8 @@ use crate::scenario::parameterization::{
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
-/// The cases of a study, or of an interval of its scenarios, as what they follow from, in 1 to 2 kB per scenario. Cases, ten times as
-/// large, are made for a window of scenarios at a time.
+/// The cases of a study, or of an interval of its scenarios, as what they follow from: 0.9 to 1.9 kB per scenario,
+/// depending on the category. Cases, ten times as large, are made for a window of scenarios at a time.
 pub struct StudyCases {
     pub(crate) head: StudyHead,
     pub(crate) outline: LanePlan,

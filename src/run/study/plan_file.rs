@@ -77,6 +77,16 @@ impl StudyHead {
         Ok(head)
     }
 
+    /// The head whose checksums and hash fit these records of one page, whatever they hold.
+    #[cfg(test)]
+    pub(crate) fn with_changed_records(&self, records: &[u8]) -> Result<StudyHead> {
+        assert!(self.unit_count() <= PAGE, "the records of one page");
+        let mut head = self.clone();
+        head.pages = vec![(records.len() as u64, hex(&Sha256::digest(records)))];
+        head.plan_sha256 = head.hash()?;
+        Ok(head)
+    }
+
     /// Hash of the plan: everything that decides the outcomes.
     fn hash(&self) -> Result<String> {
         let StudyHead { plan_sha256: _, profile, models, headways, parameterization, blocks, pages } = self;

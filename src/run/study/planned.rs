@@ -1,6 +1,5 @@
 //! A planned study: made from scenarios by a builder, or read from a plan file.
 
-use std::io::{BufRead, BufReader};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -12,11 +11,10 @@ use super::plan::{StudyOptions, outline_study};
 use super::plan_file::StudyHead;
 use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
-use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
+use crate::run::parts::{Shard, copy_plan, leave_plan, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::hex::sha256;
-use crate::support::input_file;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::{Error, Place, Result};
@@ -229,13 +227,11 @@ impl Study {
     /// # Errors
     /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
     pub fn write_plan(&self, out: &Path) -> Result<()> {
-        let Some((path, _)) = &self.file else {
-            return leave_plan(out, &self.seal()?.0, self.cases.records()?);
-        };
-        // The file as it is: of a shard's scenarios alone the plan could not be written.
-        let (mut file, mut line) = (BufReader::new(input_file::open(path)?), Vec::new());
-        file.read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
-        leave_plan(out, &line, file)
+        match &self.file {
+            // The file as it is: of a shard's scenarios alone the plan could not be written.
+            Some((path, _)) => copy_plan(out, path),
+            None => leave_plan(out, &self.seal()?.0, self.cases.records()?),
+        }
     }
 
     /// Adds the plan file to the results, unless it would be larger than so many bytes; tells whether it did.

@@ -165,8 +165,11 @@ pub(super) fn unit_ids(held: &UnitRecords) -> Vec<String> {
     let ids = held.units().map(|unit| held.get(unit).and_then(id).unwrap_or_default().to_owned());
     ids.collect()
 }
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::traffic::mining::{MiningOptions, mine_generated};
     use crate::traffic::trajectory::generator::GeneratorOptions;
@@ -210,5 +213,66 @@ mod tests {
                 assert!(read(bytes, other).is_none(), "{} as {}", scenario.id, other.key());
             }
         }
+    }
+
+    /// Any bits: normal and subnormal numbers, both zeros, infinities, NaN with any payload.
+    fn float() -> impl Strategy<Value = f64> {
+        let special = [0.0, -0.0, 5e-324, -5e-324, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY, f64::NEG_INFINITY];
+        let payload = (1_u64..1 << 52).prop_map(|payload| f64::from_bits(0x7ff << 52 | payload));
+        prop_oneof![
+            2 => any::<u64>().prop_map(f64::from_bits),
+            1 => prop::sample::select(special.to_vec()),
+            1 => payload,
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn every_bit_of_every_number_comes_back(
+            id in "\\PC{0,40}",
+            category in prop::sample::select(Category::ALL.to_vec()),
+            is_right in any::<bool>(),
+            sizes in prop::array::uniform9(float()),
+            series in prop::collection::vec([float(), float(), float()], 0..80),
+        ) {
+            let [fps, v0, ego_length, ego_width, target_length, target_width, lead_length, lead_width, gap] = sizes;
+            let of = |at: usize| series.iter().map(|values| values[at]).collect::<Vec<f64>>();
+            let mut scenario = empty();
+            (scenario.id, scenario.category, scenario.fps) = (id, category, fps);
+            scenario.side = if is_right { Side::Right } else { Side::Left };
+            scenario.ego = Ego { v0, length: ego_length, width: ego_width };
+            scenario.target = Other { length: target_length, width: target_width, v: of(0), y: of(1) };
+            let lead = Other { length: lead_length, width: lead_width, v: of(2), y: Vec::new() };
+            (scenario.lead, scenario.lead_gap) = (Some(lead), Some(gap));
+            let mut bytes = Vec::new();
+            write(&scenario, &mut bytes);
+            prop_assert!(bytes.len() <= max_bytes(&scenario));
+            prop_assert_eq!(length(&bytes), Some(bytes.len()));
+            let back = read(&bytes, category).unwrap();
+            prop_assert_eq!((&back.id, back.side), (&scenario.id, scenario.side));
+            prop_assert_eq!(bits(&back, category), bits(&scenario, category));
+        }
+    }
+
+    /// A leader without samples, whose numbers are all 0.
+    fn empty() -> Scenario {
+        let record = [&57_u32.to_le_bytes()[..], &[0; 57]].concat();
+        read(&record, Category::Lvd).unwrap()
+    }
+
+    /// The bits of every number that a case of this category follows from.
+    fn bits(scenario: &Scenario, category: Category) -> Vec<u64> {
+        let (ego, target) = (&scenario.ego, &scenario.target);
+        let mut floats = vec![scenario.fps, ego.v0, ego.length, ego.width, target.length, target.width];
+        floats.extend(&target.v);
+        if category != Category::Lvd {
+            floats.extend(&target.y);
+        }
+        if category == Category::CutOut {
+            let lead = scenario.lead.as_ref().unwrap();
+            floats.extend([lead.length, lead.width, scenario.lead_gap.unwrap()]);
+            floats.extend(&lead.v);
+        }
+        floats.into_iter().map(f64::to_bits).collect()
     }
 }
