@@ -116,8 +116,8 @@ fn plant(kernels: &mut Vec<Kernel>, defect: &str) {
         "@group(0) @binding(0) var<uniform> count: u32;\n\
          @group(0) @binding(1) var<storage, read> source: array<f32>;\n\
          @group(0) @binding(2) var<storage, read_write> target_: array<f32>;\n\
-         @compute @workgroup_size(64) fn lanes(@builtin(global_invocation_id) id: vec3<u32>) {{\n\
-         let n = id.x * count;\n{source}}}\n"
+         @compute @workgroup_size(64) fn lanes(@builtin(local_invocation_index) inside: u32) {{\n\
+         let n = inside * count;\n{source}}}\n"
     );
     let words = exact_spirv(&source, shader::ENTRY, &[], Checks::Checked).expect("SPIR-V");
     let name = format!("planted.{defect}");

@@ -4,7 +4,9 @@ import { readFileSync, readdirSync } from 'node:fs';
 import { create } from 'webgpu';
 
 const folder = process.argv[2];
-const adapter = await create(['backend=null']).requestAdapter();
+// Kept until the end: the device does not keep it.
+const gpu = create(['backend=null']);
+const adapter = await gpu.requestAdapter();
 const device = await adapter.requestDevice();
 let compiled = 0;
 let messages = 0;
@@ -27,4 +29,5 @@ for (const file of readdirSync(folder).filter((name) => name.endsWith('.wgsl')).
   compiled += 1;
 }
 console.log(`${compiled} kernels compiled by Chrome's WGSL compiler, ${messages} messages`);
+device.destroy();
 process.exit(messages === 0 && compiled > 0 ? 0 : 1);
