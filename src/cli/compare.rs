@@ -60,7 +60,7 @@ pub struct Compare {
     /// Time headways; paper is 2.0, 1.8, … 0.2
     #[arg(long, value_name = "s,s,…|paper", default_value = "paper")]
     thw: String,
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
     samples: u64,
     #[arg(long, value_name = "N")]
     seed: u64,

@@ -70,7 +70,7 @@ pub struct Sample {
     /// Samples at most [default: 100000; subset: 2000 per level]
     ///
     /// With ce: of the final sample.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) samples: Option<u64>,
     #[command(flatten)]
     models: lists::ModelsFlag,
@@ -95,7 +95,7 @@ pub struct Sample {
     /// Stop at the first check after this time: not reproducible
     #[arg(long, value_name = "s")]
     pub(super) time_limit: Option<f64>,
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<usize>)]
     worst: usize,
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none")]
@@ -103,7 +103,7 @@ pub struct Sample {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
-    #[arg(long, hide = true, value_name = "N")]
+    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) pilot: u64,
     #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION")]
     pub(super) elite_fraction: f64,
@@ -120,9 +120,9 @@ pub struct Sample {
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u32>)]
     pub(super) bootstrap: u32,
-    #[arg(long, hide = true, value_name = "N")]
+    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) bootstrap_samples: u64,
     /// Seed of the draws [default: 157, or the --distribution's]
     #[arg(long, value_name = "N")]
