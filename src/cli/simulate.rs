@@ -142,7 +142,13 @@ impl Simulate {
             (None, Some(path)) => from_table(path, self.row)?,
             (None, None) => CaseFlags::default(),
         };
-        Ok(self.case.over(file))
+        let flags = self.case.over(file);
+        if !flags.says_a_case() {
+            let help = "give a case (--category, --ego-speed, …), --case-file, --table, or a --lane with --from or \
+                        --scenarios";
+            return Err(Error::usage(Place::item("lanesweep simulate"), "there is nothing to simulate", help));
+        }
+        Ok(flags)
     }
 
     /// The figure must be one and must replace no input.
