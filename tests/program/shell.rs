@@ -93,6 +93,19 @@ fn the_short_help_of_every_verb_fits_on_one_screen_below_headings() {
         let help = text(&lanesweep(dir.path(), &words));
         assert!(help.lines().count() <= 40, "{verb}: {} lines\n{help}", help.lines().count());
         assert!(!help.contains("\nOptions:"), "a flag of {verb} has no heading\n{help}");
+        let (flags, examples) = help.split_once("\nExample").unwrap_or((&help, ""));
+        let commands = examples.replace("\\\n", "");
+        for flag in commands.split_whitespace().filter(|word| word.starts_with("--") && *word != "--") {
+            let is_other_verb = commands.lines().any(|line| line.contains(flag) && !line.contains(verb));
+            let is_listed = flags.split([' ', ',']).any(|word| word == flag);
+            let is_told = flag.starts_with("--help") || is_listed || is_other_verb;
+            assert!(is_told, "an example of {verb} uses {flag}, which -h does not list\n{help}");
+        }
+        // What is pasted is one command: a line that goes on ends with a backslash.
+        let lines: Vec<&str> = examples.lines().skip(1).collect();
+        for pair in lines.windows(2).filter(|pair| !pair[1].starts_with("  lanesweep ")) {
+            assert!(pair[0].ends_with(" \\"), "{verb}: `{}` goes on without a backslash", pair[0]);
+        }
     }
 }
 
