@@ -118,6 +118,7 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     let code = ended(&mut study);
     assert_eq!(unfinished(dir.path()), Vec::<PathBuf>::new(), "after {signal}");
     assert_eq!(std::fs::read_to_string(&lanes).unwrap(), "of an earlier run", "what was there stays");
+    assert!(!dir.path().join("out").exists(), "a folder that the run made goes with its lock");
     code
 }
 
