@@ -22,6 +22,7 @@ use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, Expo
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder};
 use crate::support::input_file;
+use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
 use crate::traffic::mining::{Collection, counts_text};
 use crate::{Error, Place, Result};
@@ -146,7 +147,7 @@ impl Fit {
         }
         write(&fitted, folder.as_ref())?;
         self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
-        tracing::info!("{} density files written to {}", fitted.len(), self.out.display());
+        tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
