@@ -13,7 +13,7 @@ use super::source::PlausibilityFlag;
 use crate::Result;
 use crate::cli::settings::SampleSettings;
 pub(super) use crate::cli::settings::{
-    Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
+    EstimatorKind as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
 };
 use crate::engine::Headway;
 use crate::interop::openscenario::Rename;
@@ -38,11 +38,16 @@ use crate::stats::density::DensityModel;
     _ => arg,
 }))]
 #[command(
-    after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
-                        sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
-                        cut-in-1.json --samples 100000000 --shard 0/2 --out big\n  lanesweep sample --distribution \
-                        cut-in-stochastic.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --rename \
-                        Other_Speed_kph=other_speed_kmh"
+    after_help = "Examples (--help has more):\n  \
+                  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
+                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big",
+    after_long_help = "Examples (the repository has the .xosc file in docs/examples):\n  \
+                  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
+                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big\n  \
+                  lanesweep sample --distribution cut-in-stochastic.xosc --category cut-in \\\n      \
+                  --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh"
 )]
 pub struct Sample {
     /// Density file
