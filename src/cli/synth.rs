@@ -37,17 +37,9 @@ impl GeneratorFlags {
             duration_s: self.synth_duration,
             ..configured.settings.generator.clone()
         };
-        options.validate().map_err(as_flag)?;
+        options.validate()?;
         Ok(options)
     }
-}
-
-/// An error about a key of the generator, with the flag that sets it.
-fn as_flag(error: Error) -> Error {
-    let flags = [("generator.recordings", "--synth-recordings"), ("generator.duration_s", "--synth-duration")];
-    let Error::Usage { place, problem, help } = error else { return error };
-    let flag = flags.iter().find(|(key, _)| *place == Place::item(*key)).map(|(_, flag)| Place::item(*flag));
-    Error::Usage { place: flag.map_or(place, Box::new), problem, help }
 }
 
 /// Write the synthetic recordings that `study` uses without data
