@@ -227,7 +227,7 @@ pub(super) fn choose(
         }
     }
     // A lane has a verdict per criterion; a scenario has none.
-    let is_lane_table = ["model", "collision"].iter().all(|name| unknown.iter().any(|column| column == name));
+    let is_lane_table = ["collision", "ttc"].iter().all(|name| unknown.iter().any(|column| column == name));
     if is_lane_table && !others_are_let_be {
         let help = "give a scenario file, such as `lanesweep mine` writes";
         return Err(Error::input(table.header(), "this is a table of lanes, not of scenarios", help));
