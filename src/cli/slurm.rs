@@ -20,7 +20,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  lanesweep cluster slurm study.toml --array 20 --out result\n  lanesweep cluster slurm --array 20 \
-                        --out result --gpus 1 -- sample cut-in-2.json --samples 1000000000"
+                        --out result --gpus 1 -- sample cut-in-2.json --samples 1e9"
 )]
 pub struct Slurm {
     /// Study options: short for `-- study --config STUDY.toml`
