@@ -95,16 +95,15 @@ fn the_short_help_of_every_verb_fits_on_one_screen_below_headings() {
         assert!(!help.contains("\nOptions:"), "a flag of {verb} has no heading\n{help}");
         let (flags, examples) = help.split_once("\nExample").unwrap_or((&help, ""));
         let commands = examples.replace("\\\n", "");
-        for flag in commands.split_whitespace().filter(|word| word.starts_with("--") && *word != "--") {
-            // A verb of its own below it has its own flags.
-            let is_of = |line: &str| {
-                let inner = line.split_once(&format!("lanesweep {verb} ")).and_then(|(_, rest)| rest.split(' ').next());
-                inner.is_some_and(|inner| !flags.contains(&format!("\n  {inner} ")))
-            };
-            let is_other_verb = commands.lines().any(|line| line.contains(flag) && !is_of(line));
-            let is_listed = flags.split([' ', ',']).any(|word| word == flag);
-            let is_told = flag.starts_with("--help") || is_listed || is_other_verb;
-            assert!(is_told, "an example of {verb} uses {flag}, which -h does not list\n{help}");
+        // A verb below it has flags of its own, and what is behind `--` is another command.
+        let is_of = |line: &&str| {
+            let inner = line.split_once(&format!("lanesweep {verb} ")).and_then(|(_, rest)| rest.split(' ').next());
+            inner.is_some_and(|inner| !flags.contains(&format!("\n  {inner} ")))
+        };
+        let own = commands.lines().filter(is_of).filter_map(|line| line.split(" -- ").next());
+        for flag in own.flat_map(str::split_whitespace).filter(|word| word.starts_with("--")) {
+            let is_listed = flags.split([' ', ',', '\n']).any(|word| word == flag);
+            assert!(is_listed, "an example of {verb} uses {flag}, which -h does not list\n{help}");
         }
         // What is pasted is one command: a line that goes on ends with a backslash.
         let lines: Vec<&str> = examples.lines().skip(1).collect();
