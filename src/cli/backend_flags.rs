@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::open_device::{OpenDevice, open_checked, open_device};
+use super::open_device::{OpenDevice, nothing_to_verify, open_checked, open_device};
 use crate::engine::{Backend, BackendChoice, CpuBackend, DeviceName, Executor};
 use crate::report::run_record::DeviceRecord;
 use crate::report::sampling::HostRecord;
@@ -53,9 +53,7 @@ impl BackendFlags {
         if self.backend == BackendChoice::Cpu && self.device.is_none() {
             return Ok(Opened { cpu, device: None });
         }
-        let backend = if self.backend == BackendChoice::Cpu { BackendChoice::Cpu } else { BackendChoice::Gpu };
-        let device = open_device(backend, self.device.as_ref())?
-            .ok_or_else(|| Error::Internal("a device was requested, but none was chosen".to_owned()))?;
+        let device = open_device(self.backend, self.device.as_ref())?.ok_or_else(nothing_to_verify)?;
         Ok(Opened { cpu, device: Some(device) })
     }
 

@@ -152,7 +152,11 @@ impl CaseFlags {
         let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
         let judged =
             doubts.judge(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
-        judged.map_err(|text| wrong("acceleration", format!("it results in a speed that no vehicle has: {text}")))?;
+        judged.map_err(|text| {
+            let problem = format!("it results in a speed that no vehicle has: {text}");
+            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
+            Error::usage(Place::item("acceleration"), problem, help)
+        })?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         plain.case(frame.time_cap_s)
     }

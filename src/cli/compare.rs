@@ -38,9 +38,11 @@ const BYTES_OF_COUNTS: u64 = 8 << 20;
 /// Without data it runs on generated recordings. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
-#[command(after_help = "Examples:\n  lanesweep compare\n  lanesweep compare recordings --categories cut-in --samples \
-                        1000000\n  lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models \
-                        FSM,RSS --thw 0.6,1.0")]
+#[command(after_help = "Examples:\n  \
+                  lanesweep compare\n  \
+                  lanesweep compare recordings --categories cut-in --samples 1000000\n  \
+                  lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models FSM,RSS \\\n      \
+                  --thw 0.6,1.0")]
 pub struct Compare {
     /// Folder of highD-format recordings [default: synthetic recordings]
     #[arg(value_name = "DIR", conflicts_with = "scenarios")]
@@ -60,7 +62,7 @@ pub struct Compare {
     /// Time headways; paper is 2.0, 1.8, … 0.2
     #[arg(long, value_name = "s,s,…|paper", default_value = "paper")]
     thw: String,
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
     samples: u64,
     #[arg(long, value_name = "N")]
     seed: u64,

@@ -133,7 +133,7 @@ impl Configured {
             }
         }
         let configured = Configured { settings: layers.settings()?, layers };
-        configured.settings.validate()?;
+        configured.settings.validate().map_err(|error| configured.at_origin(error))?;
         configured.check_profile()?;
         let given: Vec<(&str, Setting)> = flags
             .iter()
@@ -162,6 +162,14 @@ impl Configured {
                 Err(Error::usage(at.1.origin.place(&key.name), problem, format!("expected {}", key.expected())))
             }
         }
+    }
+
+    /// An error about a key, at the flag, line or variable that sets it.
+    fn at_origin(&self, error: Error) -> Error {
+        let Error::Usage { place, problem, help } = error else { return error };
+        let setting = place.item.as_ref().and_then(|key| self.layers.get(key));
+        let origin = setting.map(|setting| setting.origin.place(&setting.key.name));
+        Error::Usage { place: origin.map_or(place, Box::new), problem, help }
     }
 
     /// Does a value of another source than the flag count for the verb?

@@ -13,15 +13,14 @@ use crate::interop::openscenario::{EgoMotion, export_folder};
 use crate::report::records::document;
 use crate::scenario::Side;
 use crate::support::files::check_folder;
-use crate::support::readable::count_of;
+use crate::support::readable::counted;
 use crate::{Error, Place, Result};
 
 /// Write scenarios for other simulators
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \
-                  --lateral-speed 1.0 --out played"
-)]
+#[command(after_help = "Example:\n  \
+                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
+                  --lateral-speed 1.0 --out played")]
 pub struct Export {
     #[command(subcommand)]
     format: Format,
@@ -47,12 +46,11 @@ impl Export {
 /// own motion, step by step; the ego what the driver model drove, or with --ego external only its start is written.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
-#[command(
-    after_help = "Examples:\n  lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out \
-                  worst\n  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS \
-                  --out played\n  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw \
-                  1.2 --lateral-speed 1.0 --out played"
-)]
+#[command(after_help = "Examples:\n  \
+                  lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out worst\n  \
+                  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS\n  \
+                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
+                  --lateral-speed 1.0 --out played")]
 pub struct Xosc {
     #[command(flatten)]
     case: CaseFlags,
@@ -132,7 +130,7 @@ impl Xosc {
             document(&rows.collect())
         };
         self.format.print(|| lines, list)?;
-        tracing::info!("{} scenarios written to {}", count_of(rows.len()), self.out.display());
+        tracing::info!("{} written to {}", counted(rows.len(), "scenario"), self.out.display());
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 

@@ -19,8 +19,10 @@ use crate::report::records;
 use crate::scenario::parameterization::Parameterization;
 use crate::scenario::write_scenarios_to;
 use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder};
 use crate::support::input_file;
+use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
 use crate::traffic::mining::{Collection, counts_text};
 use crate::{Error, Place, Result};
@@ -60,7 +62,7 @@ pub struct Fit {
     bandwidth_rule: BandwidthInterval,
     #[arg(long, value_name = "N")]
     seed: u64,
-    #[arg(long, hide = true, value_name = "N")]
+    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
     valid_draws: u64,
     /// Do not compare drawn with unseen scenarios
     #[arg(long)]
@@ -125,7 +127,7 @@ impl Fit {
             let result = match result {
                 Ok(result) => result,
                 Err(error @ Error::Input { .. }) => {
-                    failed.push(error);
+                    push_once(&mut failed, error);
                     continue;
                 }
                 Err(error) => return Err(error),
@@ -145,7 +147,7 @@ impl Fit {
         }
         write(&fitted, folder.as_ref())?;
         self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
-        tracing::info!("{} density files written to {}", fitted.len(), self.out.display());
+        tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 

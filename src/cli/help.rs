@@ -131,15 +131,16 @@ const FLAGS: [Group; 5] = [
 ];
 
 /// Flags that are seldom used, but by this verb.
-const OFTEN: [(&str, &[&str]); 2] =
-    [("synth", &["synth_recordings", "synth_seed", "synth_duration"]), ("study", &["published", "reference"])];
+const OFTEN: [(&str, &[&str]); 4] = [
+    ("synth", &["synth_recordings", "synth_seed", "synth_duration"]),
+    ("study", &["published", "reference"]),
+    ("map", &["set", "rename"]),
+    ("xosc", &["ego"]),
+];
 
 /// Flags that this verb uses seldom.
-const SELDOM: [(&str, &[&str]); 3] = [
-    ("sample", &["category", "given", "worst", "device"]),
-    ("simulate", &["row", "ahead_speed", "ahead_gap"]),
-    ("xosc", &["case_file", "ahead_speed", "ahead_gap", "variant"]),
-];
+const SELDOM: [(&str, &[&str]); 3] =
+    [("sample", &["category", "worst"]), ("simulate", &["ahead_speed"]), ("xosc", &["ahead_speed", "variant"])];
 
 /// The command with its help laid out.
 pub(super) fn laid_out(command: Command) -> Command {

@@ -12,6 +12,21 @@ use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::Driven;
 use crate::{Error, Place, Result};
 
+/// A whole number as the configuration writes it too: `10000`, `10_000` or `1e4`.
+///
+/// # Errors
+/// What to write, for a text that is none or does not fit.
+pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
+    let plain = text.replace('_', "");
+    let of_power = || {
+        // Beyond 2^53 a floating-point number does not tell which whole one is meant.
+        let value = plain.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && (0.0..9e15).contains(value));
+        value.map(|value| value as u64)
+    };
+    let value = plain.parse().ok().or_else(of_power).ok_or("write a whole number such as 10000, 10_000 or 1e4")?;
+    T::try_from(value).map_err(|_| format!("{value} is too large"))
+}
+
 /// `--categories`.
 #[derive(Debug, Clone, Args)]
 pub struct CategoriesFlag {

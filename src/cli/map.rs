@@ -108,19 +108,23 @@ pub struct Map {
     out: PathBuf,
 }
 
-const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  lanesweep map cut-in --preset jrc --out maps\n  \
+const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  \
+                        lanesweep map cut-in --preset jrc --out maps\n  \
                         lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
+
+const MORE_EXAMPLES: &str = "Examples (the repository has the .xosc file in docs/examples):\n  \
+                             lanesweep map cut-in --preset jrc --out maps\n  \
+                             lanesweep map cut-in --x gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 \\\n      \
+                             --panel ego_speed_kmh=60,90,120 --panel other_speed_kmh=30,50 \\\n      \
+                             --models FSM,RSS --against un-r157\n  \
+                             lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 \\\n      \
+                             --against FSM\n  \
+                             lanesweep map cut-in --distribution cut-in-deterministic.xosc \\\n      \
+                             --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh";
 
 fn after_long_help() -> String {
     let names: Vec<&str> = PARAMETERS.iter().map(|p| p.key).collect();
-    format!(
-        "Parameters: {}\n\nExamples:\n  lanesweep map cut-in --preset jrc --out maps\n  lanesweep map cut-in --x \
-         gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 --panel ego_speed_kmh=60,90,120 --panel \
-         other_speed_kmh=30,50 --models FSM,RSS --against un-r157\n  lanesweep map lvd --x \
-         deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM\n  lanesweep map cut-in \
-         --distribution cut-in-deterministic.xosc --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh",
-        names.join(", ")
-    )
+    format!("Parameters: {}\n\n{MORE_EXAMPLES}", names.join(", "))
 }
 
 impl Map {

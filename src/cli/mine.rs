@@ -14,7 +14,7 @@ use crate::stats::density::{Driven, ExposureFile};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
-use crate::support::readable::count_of;
+use crate::support::readable::counted;
 use crate::traffic::mining::counts_text;
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
@@ -70,7 +70,7 @@ impl Mine {
                     let (data, synthetic) = (from.describe(collection.synthetic), collection.synthetic);
                     ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
                 }
-                tracing::info!("{} scenarios written to {}", count_of(collection.scenarios.len()), path.display());
+                tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
             }
             None => {
                 let mut text = Vec::new();

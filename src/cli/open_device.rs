@@ -5,7 +5,7 @@ use crate::report::run_record::DeviceRecord;
 use crate::{Error, Result};
 
 #[cfg(feature = "gpu")]
-pub use with_gpu::{open_checked, open_device};
+pub use with_gpu::{nothing_to_verify, open_checked, open_device};
 
 /// A device that is open.
 pub struct OpenDevice {
@@ -44,6 +44,14 @@ mod with_gpu {
             }
             Err(error) => Err(error),
         }
+    }
+
+    /// What `verify` says where no device is named and there is no GPU.
+    pub fn nothing_to_verify() -> Error {
+        let problem = "it compares a device with the CPU, and there is no GPU that it may use";
+        let help = "name a device with --device (`lanesweep verify devices` lists them), such as --device llvmpipe; \
+                    --backend cpu compares the CPU's vector instructions with its scalar code";
+        Error::device("lanesweep verify", problem, help)
     }
 
     fn chosen(backend: BackendChoice, device: Option<&DeviceName>) -> Result<Option<(Adapters, usize)>> {
@@ -104,6 +112,12 @@ pub fn open_checked(backend: BackendChoice, device: Option<&DeviceName>) -> Resu
 
 #[cfg(not(feature = "gpu"))]
 pub use open_checked as open_device;
+
+/// What `verify` says where no device is named.
+#[cfg(not(feature = "gpu"))]
+pub fn nothing_to_verify() -> Error {
+    no_gpu("lanesweep verify")
+}
 
 /// What a program without GPUs says where one is asked for.
 #[cfg(not(feature = "gpu"))]

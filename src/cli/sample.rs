@@ -13,7 +13,7 @@ use super::source::PlausibilityFlag;
 use crate::Result;
 use crate::cli::settings::SampleSettings;
 pub(super) use crate::cli::settings::{
-    Estimator as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
+    EstimatorKind as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
 };
 use crate::engine::Headway;
 use crate::interop::openscenario::Rename;
@@ -38,11 +38,16 @@ use crate::stats::density::DensityModel;
     _ => arg,
 }))]
 #[command(
-    after_help = "Examples:\n  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1000000\n  lanesweep \
-                        sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  lanesweep sample \
-                        cut-in-1.json --samples 100000000 --shard 0/2 --out big\n  lanesweep sample --distribution \
-                        cut-in-stochastic.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --rename \
-                        Other_Speed_kph=other_speed_kmh"
+    after_help = "Examples (--help has more):\n  \
+                  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
+                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big",
+    after_long_help = "Examples (the repository has the .xosc file in docs/examples):\n  \
+                  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
+                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big\n  \
+                  lanesweep sample --distribution cut-in-stochastic.xosc --category cut-in \\\n      \
+                  --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh"
 )]
 pub struct Sample {
     /// Density file
@@ -70,7 +75,7 @@ pub struct Sample {
     /// Samples at most [default: 100000; subset: 2000 per level]
     ///
     /// With ce: of the final sample.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) samples: Option<u64>,
     #[command(flatten)]
     models: lists::ModelsFlag,
@@ -95,7 +100,7 @@ pub struct Sample {
     /// Stop at the first check after this time: not reproducible
     #[arg(long, value_name = "s")]
     pub(super) time_limit: Option<f64>,
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<usize>)]
     worst: usize,
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none")]
@@ -103,7 +108,7 @@ pub struct Sample {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
-    #[arg(long, hide = true, value_name = "N")]
+    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) pilot: u64,
     #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION")]
     pub(super) elite_fraction: f64,
@@ -120,9 +125,9 @@ pub struct Sample {
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
     /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = lists::whole::<u32>)]
     pub(super) bootstrap: u32,
-    #[arg(long, hide = true, value_name = "N")]
+    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
     pub(super) bootstrap_samples: u64,
     /// Seed of the draws [default: 157, or the --distribution's]
     #[arg(long, value_name = "N")]

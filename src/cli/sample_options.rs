@@ -7,6 +7,7 @@ use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
 use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Pilot, StopRule};
+use crate::support::plausibility::{Doubts, HELP};
 use crate::{Error, Place, Result};
 
 impl Sample {
@@ -26,6 +27,7 @@ impl Sample {
             EstimatorFlag::Subset => 2000,
             _ => 100_000,
         });
+        self.judge_given(density)?;
         let headways = self.headways(density)?;
         if let SampleHeadways::Each(list) = &headways
             && list.len() != 1
@@ -48,6 +50,19 @@ impl Sample {
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         })
+    }
+
+    /// Looks at the values of `--given`, and tells what is doubtful.
+    fn judge_given(&self, density: &DensityModel) -> Result<()> {
+        let mut doubts = Doubts::new(self.plausibility.policy());
+        for (name, value) in &self.given {
+            let parameter = &density.space.parameters()[density.space.index_of(name)?];
+            let Some(quantity) = parameter.quantity() else { continue };
+            let judged = doubts.judge(quantity, *value, || format!("--given {name}"));
+            judged.map_err(|problem| Error::usage(Place::item("--given"), format!("`{name}`: {problem}"), HELP))?;
+        }
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        Ok(())
     }
 
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {

@@ -29,10 +29,11 @@ use crate::{Error, Place, Result};
 /// another in the CSV and share the figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
-#[command(after_help = "Examples:\n  lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw \
-                        1.2 --lateral-speed 1.0 --plot case.svg\n  lanesweep simulate --from lanesweep-out --lane \
-                        01_cut_in_24_22_1/2/1.2s/RSS --compare S --plot lane.svg\n  lanesweep simulate --scenarios \
-                        scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS")]
+#[command(after_help = "Examples:\n  \
+                  lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 \\\n      \
+                  --plot case.svg\n  \
+                  lanesweep simulate --from lanesweep-out --lane 01_cut_in_24_22_1/2/1.2s/RSS --compare S\n  \
+                  lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS")]
 pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
@@ -142,7 +143,13 @@ impl Simulate {
             (None, Some(path)) => from_table(path, self.row)?,
             (None, None) => CaseFlags::default(),
         };
-        Ok(self.case.over(file))
+        let flags = self.case.over(file);
+        if !flags.says_a_case() {
+            let help = "give a case (--category, --ego-speed, …), --case-file, --table, or a --lane with --from or \
+                        --scenarios";
+            return Err(Error::usage(Place::item("lanesweep simulate"), "there is nothing to simulate", help));
+        }
+        Ok(flags)
     }
 
     /// The figure must be one and must replace no input.

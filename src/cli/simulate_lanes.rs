@@ -184,13 +184,36 @@ pub(super) fn refuse_void(plan: &LanePlan, key: &LaneKey) -> Result<()> {
 
 pub(super) fn find(plan: &LanePlan, key: &str) -> Result<LaneKey> {
     plan.parse_key(key).ok_or_else(|| {
+        let why = wrong_part(plan, key);
         let example = plan.key(0).map_or(String::new(), |key| format!(", for instance {}", plan.key_text(&key)));
         Error::usage(
             Place::item("--lane"),
-            format!("there is no lane `{key}`"),
+            format!("there is no lane `{key}`: {why}"),
             format!("a key is scenario/variant/headway/model, as errors and tables print it{example}"),
         )
     })
+}
+
+/// What of a key is in no lane of the plan.
+fn wrong_part(plan: &LanePlan, key: &str) -> String {
+    let parts: Vec<&str> = key.rsplitn(4, '/').collect();
+    let [model, headway, variant, scenario] = parts[..] else {
+        return format!("it has {} of four parts", parts.len());
+    };
+    let models: Vec<&str> = plan.models.iter().map(|model| model.name()).collect();
+    if !ModelId::parse(model).is_some_and(|model| plan.models.contains(&model)) {
+        return format!("no model `{model}` in this run ({})", models.join(", "));
+    }
+    let headways: Vec<String> = plan.headways.iter().map(ToString::to_string).collect();
+    let is_there = headways.iter().any(|h| h == headway)
+        || Headway::parse(headway).is_some_and(|headway| plan.headways.contains(&headway));
+    if !is_there {
+        return format!("no headway `{headway}` in this run ({})", headways.join(", "));
+    }
+    match plan.blocks.iter().find(|block| block.units.find(scenario).is_some()) {
+        None => format!("no scenario `{scenario}` in this run"),
+        Some(block) => format!("no variant `{variant}` of this scenario ({})", block.variants.join(", ")),
+    }
 }
 
 /// Runs what is asked for: variants, and for each of them models.

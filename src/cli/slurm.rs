@@ -8,6 +8,7 @@ use super::configured::command;
 use super::{Exit, console};
 use crate::interop::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
 use crate::support::atomic_file::refuse_link;
+use crate::support::input_file::{MAX_SETTINGS_BYTES, read_text};
 use crate::support::run_dir::OutputDir;
 use crate::{Error, Place, Result};
 
@@ -19,7 +20,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  lanesweep cluster slurm study.toml --array 20 --out result\n  lanesweep cluster slurm --array 20 \
-                        --out result --gpus 1 -- sample cut-in-2.json --samples 1000000000"
+                        --out result --gpus 1 -- sample cut-in-2.json --samples 1e9"
 )]
 pub struct Slurm {
     /// Study options: short for `-- study --config STUDY.toml`
@@ -110,7 +111,10 @@ impl Slurm {
     /// The run, checked as far as its flags go: a typing error is told here rather than by the cluster.
     fn split_run(&self) -> Result<SplitRun> {
         let words = match &self.study {
-            Some(config) => vec!["study".to_owned(), "--config".to_owned(), text("STUDY.toml", config)?],
+            Some(config) => {
+                read_text(config, MAX_SETTINGS_BYTES)?;
+                vec!["study".to_owned(), "--config".to_owned(), text("STUDY.toml", config)?]
+            }
             None => self.run.clone(),
         };
         let run = SplitRun::new(&words)?;

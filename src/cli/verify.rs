@@ -12,7 +12,7 @@ use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags};
+use super::{Exit, ProfileFlags, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -44,10 +44,10 @@ pub struct Verify {
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
     /// Random lanes per model and category
-    #[arg(long, alias = "lanes", value_name = "N", default_value_t = 100_000)]
+    #[arg(long, alias = "lanes", value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>)]
     random_lanes: u64,
     /// Units of 12 lanes per model, threshold and category
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>)]
     threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
     #[arg(long, value_name = "N", default_value_t = 157)]

@@ -237,8 +237,8 @@ impl CompareFile {
         let text = format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
-             beyond. ? undecided: it holds 1 and is wider, or fewer than {failures} failed lanes or {clusters} failing \
-             scenarios are on one side and the two intervals meet. S' is replayed, density is drawn. \
+             beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {failures} failed \
+             lanes or fewer than {clusters} failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn. \
              S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, from headways that are imposed, not observed. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
              says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \

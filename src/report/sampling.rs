@@ -311,7 +311,7 @@ impl EstimateFile {
         }
         let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
         let rule = format!(
-            "Intervals at {} %{}; ± is the half-width of that of P over P; ≤ bounds from above where nothing failed",
+            "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
             value(100.0 * level),
             self.interval_rule()
         );

@@ -224,9 +224,9 @@ impl EstimateFile {
         if self.density.kernels == 0 {
             ""
         } else if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
-            " hold what other scenarios would change (bandwidth and scale held)"
+            " cover the draws and what other scenarios would change, at fixed bandwidth and scale"
         } else {
-            " are of the draws alone: what other scenarios would change is not in them"
+            " cover the draws alone, not what other scenarios would change"
         }
     }
 }

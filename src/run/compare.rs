@@ -12,6 +12,7 @@ use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
 use crate::stats::estimate::Enough;
+use crate::support::error::push_once;
 use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
@@ -161,7 +162,9 @@ impl<'a> Compare<'a> {
                     of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
                 }
                 // A profile whose cut-outs cannot be sampled is a usage error of that category alone.
-                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => result.failed.push(error),
+                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => {
+                    push_once(&mut result.failed, error);
+                }
                 Err(error) => return Err(error),
             }
         }

@@ -226,6 +226,12 @@ pub(super) fn choose(
             Resolved::Unknown => unknown.push(column),
         }
     }
+    // A lane has a verdict per criterion; a scenario has none.
+    let is_lane_table = ["collision", "ttc"].iter().all(|name| unknown.iter().any(|column| column == name));
+    if is_lane_table && !others_are_let_be {
+        let help = "give a scenario file, such as `lanesweep mine` writes";
+        return Err(Error::input(table.header(), "this is a table of lanes, not of scenarios", help));
+    }
     for column in unknown {
         let missing = (0..known.len()).filter(|&at| !chosen.iter().any(|other| other.field == field_of(at)));
         let near = nearest(column, missing.map(|at| known[at].name.as_str()));

@@ -2,8 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::Scenario;
 use super::check::{Problem, admit};
+use super::{Category, Scenario};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
 
@@ -128,6 +128,42 @@ impl ScenariosRead {
             let problem = format!("{} more scenarios cannot be used", self.more);
             self.problems.push(Error::input(file, problem, "correct the others first"));
         }
-        Ok(ScenarioFile { scenarios: self.scenarios, problems: self.problems, notes: self.doubts.sentences() })
+        let mut notes = self.doubts.sentences();
+        notes.extend(lateral_notes(&self.scenarios));
+        Ok(ScenarioFile { scenarios: self.scenarios, problems: self.problems, notes })
     }
+}
+
+/// Lateral motion below this is no contradiction, m.
+const LATERAL_NOISE_M: f64 = 0.5;
+
+/// Kept lane changes whose lateral position contradicts their category or side, one sentence per kind.
+fn lateral_notes(scenarios: &[Scenario]) -> Vec<String> {
+    let ends = |scenario: &Scenario| {
+        let y = &scenario.target.y;
+        let (first, last) = (*y.first()?, *y.last()?);
+        // A cut-in begins beside the ego's lane, a cut-out ends there.
+        match scenario.category {
+            Category::CutIn => Some((first, last)),
+            Category::CutOut => Some((last, first)),
+            Category::Lvd => None,
+        }
+    };
+    let note = |what: &str, help: &str, applies: &dyn Fn(f64, f64) -> bool| {
+        let is_such = |s: &&Scenario| s.kept && ends(s).is_some_and(|(outside, inside)| applies(outside, inside));
+        let mut such = scenarios.iter().filter(is_such);
+        let first = such.next()?;
+        Some(format!("{} lane change(s) {what}, the first is scenario {}: {help}", such.count() + 1, first.id))
+    };
+    let wrong_way = note(
+        "move away from the ego's lane where they should enter it, or the reverse",
+        "y is the distance from the middle of the ego's lane",
+        &|outside, inside| inside.abs() > outside.abs() + LATERAL_NOISE_M,
+    );
+    let wrong_side = note(
+        "have a lateral position against their `side`",
+        "y is positive on the side that the vehicle comes from or leaves to",
+        &|outside, _| outside < -LATERAL_NOISE_M,
+    );
+    wrong_way.into_iter().chain(wrong_side).collect()
 }

@@ -108,7 +108,7 @@ impl Reader {
             let leaf = &self.leaves[column.field];
             leaf.put(&mut scenario, leaf.typed(value, column.divisor));
         }
-        self.take(scenario, row.number);
+        self.take(scenario, &[row.number]);
     }
 
     /// A row that is an instant of a scenario.
@@ -197,15 +197,25 @@ impl Reader {
             Ok(rate_hz) if !has_rate => drop(scenario.insert("fps".to_owned(), Value::from(rate_hz))),
             Ok(_) => {}
         }
-        self.take(scenario, open.rows[0]);
+        self.take(scenario, &open.rows);
     }
 
-    /// Makes the scenario.
-    fn take(&mut self, scenario: Map<String, Value>, row: u64) {
+    /// Makes the scenario of one row, or of a row per instant.
+    fn take(&mut self, scenario: Map<String, Value>, rows: &[u64]) {
         let value = Value::Object(scenario);
         let item = value.get("id").and_then(Value::as_str).map(name);
         let (table, leaves, chosen) = (&self.table, &self.leaves, &self.chosen);
-        let place = |field: &str| -> Place { table.place(row, item.clone()).column(column_of(leaves, chosen, field)) };
+        let row = rows[0];
+        let place = |field: &str| -> Place {
+            let instant = rows.get(1).and_then(|_| field.split_once('[')?.1.strip_suffix(']')?.parse::<usize>().ok());
+            match instant.and_then(|at| rows.get(at)) {
+                Some(row) => {
+                    let column = column_of(leaves, chosen, field.split('[').next().unwrap_or_default());
+                    table.place(*row, item.clone()).column(column)
+                }
+                None => table.place(row, item.clone()).column(column_of(leaves, chosen, field)),
+            }
+        };
         if let Some((field, problem)) = wrong_field(&value) {
             return self.found.refuse(Error::input(place(&field), problem, HELP));
         }

@@ -1,15 +1,14 @@
 //! Files that are there whole or not at all: written beside their place under a hidden name, brought to
 //! the disk, then renamed. Used by everything that leaves results behind.
 
-use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
+use crate::support::live_files::{Live, live};
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -19,44 +18,6 @@ const SUFFIX: &str = ".part";
 const RANDOM: usize = 6;
 /// Longest file name, in bytes, that a hidden name repeats: file systems end at 255 for all of it.
 const LONGEST: usize = 200;
-
-/// The hidden files of this process that exist now.
-static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// An entry in the registry of hidden files, for as long as the file has that name.
-struct Live(PathBuf);
-
-impl Drop for Live {
-    fn drop(&mut self) {
-        live().remove(&self.0);
-    }
-}
-
-/// Removes the hidden files of this process, which is about to end. While the answer is kept, no other begins.
-#[cfg(unix)]
-pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
-    // A file system that hangs while a file is begun there must not keep the process from ending.
-    for _ in 0..100 {
-        let paths = match LIVE.try_lock() {
-            Ok(paths) => paths,
-            Err(std::sync::TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(std::sync::TryLockError::WouldBlock) => {
-                std::thread::sleep(std::time::Duration::from_millis(10));
-                continue;
-            }
-        };
-        for path in paths.iter() {
-            // One that has just got its proper name is not there any more.
-            let _ = std::fs::remove_file(path);
-        }
-        return Some(paths);
-    }
-    None
-}
 
 /// Removes from `dir` the hidden files that killed processes left there, of one target or of all. A process locks the
 /// hidden files that it writes, and the lock ends with the process. What cannot be removed stays; it harms nobody.

@@ -10,6 +10,13 @@ use crate::support::plain_text::shown_in_line;
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Adds an error to a list that users read, unless the list has it already.
+pub(crate) fn push_once(list: &mut Vec<Error>, error: Error) {
+    if !list.iter().any(|known| known.to_string() == error.to_string()) {
+        list.push(error);
+    }
+}
+
 /// Where in a user's input a problem lies. Parts that are unknown stay out of the message.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Place {

@@ -121,7 +121,7 @@ fn say(line: &str) {
 #[cfg(unix)]
 fn end_at_once(signal: i32) -> ! {
     // Nobody begins another file until the end.
-    let _live = crate::support::atomic_file::remove_live();
+    let _live = crate::support::live_files::remove_live();
     // Without the exit handlers of libraries (a driver's, say) whose threads are at work.
     signal_hook::low_level::exit(128 + signal)
 }

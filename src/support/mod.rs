@@ -9,6 +9,7 @@ pub mod files;
 pub(crate) mod hex;
 pub(crate) mod input_file;
 pub mod interrupt;
+pub(crate) mod live_files;
 pub(crate) mod lock;
 pub(crate) mod near_name;
 pub(crate) mod plain_text;

@@ -103,6 +103,7 @@ impl Quantity {
             true => (of.plausible, "is not plausible"),
             false => (of.physical, "is beyond what is physical"),
         };
+        let article = if of.name.starts_with('a') { "an" } else { "a" };
         let hint = of.mistaken.iter().find(|(_, per_own)| contains(of.plausible, value / per_own));
         let hint = hint.map_or(String::new(), |(unit, per_own)| {
             format!(
@@ -113,7 +114,7 @@ impl Quantity {
             )
         });
         format!(
-            "{} {} {words} for a {} ({least} to {most} {}){hint}",
+            "{} {} {words} for {article} {} ({least} to {most} {}){hint}",
             crate::support::readable::value(value),
             of.unit,
             of.name,

@@ -14,6 +14,11 @@ pub(crate) fn count_of(length: usize) -> String {
     grouped(&length.to_string())
 }
 
+/// `1 scenario`, `2 scenarios`.
+pub(crate) fn counted(length: usize, noun: &str) -> String {
+    format!("{} {noun}{}", count_of(length), if length == 1 { "" } else { "s" })
+}
+
 /// A quantity with four significant digits at most and no idle zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
 pub(crate) fn value(value: f64) -> String {
     let text = significant(value, DIGITS);
@@ -69,6 +74,7 @@ mod tests {
             [0_u64, 999, 1000, 151_760, 100_000_000].map(count),
             ["0", "999", "1,000", "151,760", "100,000,000"]
         );
+        assert_eq!([1, 1200].map(|n| counted(n, "file")), ["1 file", "1,200 files"]);
         assert_eq!((count(7_u32), count_of(4114)), ("7".to_owned(), "4,114".to_owned()));
     }
 

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::support::atomic_file::{AtomicFile, StagedFile, clear_stale, refuse_link, sync_folder};
 use crate::support::files::make_folder;
 use crate::support::input_file;
+use crate::support::live_files::Live;
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
 
@@ -54,6 +55,8 @@ pub struct OutputDir {
     record: Option<&'static str>,
     is_new: bool,
     lock: Option<FolderLock>,
+    /// What a signal takes away: the lock, and the folder if it is new and empty.
+    live: Vec<Live>,
 }
 
 impl OutputDir {
@@ -64,7 +67,8 @@ impl OutputDir {
     /// [`Error::Busy`] where another process writes it; [`Error::Usage`] where it holds another verb's run;
     /// [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
     pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
-        let folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
+        let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
+        folder.enter_lock();
         folder.refuse_another_verb(record)?;
         Ok(folder)
     }
@@ -74,7 +78,9 @@ impl OutputDir {
     /// # Errors
     /// As [`OutputDir::open`].
     pub fn open_without_record(dir: &Path) -> Result<OutputDir> {
-        OutputDir::take(dir, None, FolderLock::acquire)
+        let mut folder = OutputDir::take(dir, None, FolderLock::acquire)?;
+        folder.enter_lock();
+        Ok(folder)
     }
 
     /// The same for a part of a run, together with other parts.
@@ -89,10 +95,16 @@ impl OutputDir {
         let is_new = !dir.exists();
         make_folder(dir)?;
         let lock = Some(lock(&dir.join(LOCK))?);
-        let folder = OutputDir { dir: dir.to_path_buf(), record, is_new, lock };
+        let live = if is_new { vec![Live::enter(dir.to_path_buf())] } else { Vec::new() };
+        let folder = OutputDir { dir: dir.to_path_buf(), record, is_new, lock, live };
         record.into_iter().chain([UNFINISHED]).try_for_each(|name| refuse_link(&dir.join(name)))?;
         clear_stale(dir, None);
         Ok(folder)
+    }
+
+    /// A lock that nobody shares is this process's to take away.
+    fn enter_lock(&mut self) {
+        self.live.push(Live::enter(self.dir.join(LOCK)));
     }
 
     /// Where it is.
@@ -133,6 +145,7 @@ impl OutputDir {
 
 impl Drop for OutputDir {
     fn drop(&mut self) {
+        self.live.clear();
         self.lock = None;
         if self.is_new {
             // A run that failed leaves no folder of its own: only an empty one goes.

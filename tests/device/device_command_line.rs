@@ -122,7 +122,12 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
     assert_eq!(code(&output), 7, "{}", stderr(&output));
     assert!(stderr(&output).contains("no GPU") && stderr(&output).contains("--backend cpu"), "{}", stderr(&output));
     assert!(!Path::new(&out).exists());
-    assert_eq!(code(&lanesweep(&["verify"])), 7);
+    let verify = lanesweep(&["verify"]);
+    let said = stderr(&verify);
+    assert_eq!(code(&verify), 7, "{said}");
+    let (problem, help) = said.split_once("help:").unwrap();
+    assert!(!problem.contains("--backend") && problem.contains("compares a device with the CPU"), "{said}");
+    assert!(help.contains("--device") && help.contains("--backend cpu compares"), "{said}");
 }
 
 #[test]

@@ -45,7 +45,13 @@ fn verbs(dir: &Path) -> Vec<String> {
 fn examples(dir: &Path, verb: &str) -> Vec<String> {
     let help = String::from_utf8(run(dir, &format!("lanesweep {verb} --help")).stdout).unwrap();
     let (_, examples) = help.split_once("\nExample").unwrap_or_else(|| panic!("{verb} ends with no example"));
-    examples.lines().map(str::trim).filter(|line| line.starts_with("lanesweep ")).map(str::to_owned).collect()
+    examples
+        .replace("\\\n", "")
+        .lines()
+        .map(str::trim)
+        .filter(|line| line.starts_with("lanesweep "))
+        .map(str::to_owned)
+        .collect()
 }
 
 /// What a shell would do with the output is the shell's.

@@ -93,6 +93,23 @@ fn the_short_help_of_every_verb_fits_on_one_screen_below_headings() {
         let help = text(&lanesweep(dir.path(), &words));
         assert!(help.lines().count() <= 40, "{verb}: {} lines\n{help}", help.lines().count());
         assert!(!help.contains("\nOptions:"), "a flag of {verb} has no heading\n{help}");
+        let (flags, examples) = help.split_once("\nExample").unwrap_or((&help, ""));
+        let commands = examples.replace("\\\n", "");
+        // A verb below it has flags of its own, and what is behind `--` is another command.
+        let is_of = |line: &&str| {
+            let inner = line.split_once(&format!("lanesweep {verb} ")).and_then(|(_, rest)| rest.split(' ').next());
+            inner.is_some_and(|inner| !flags.contains(&format!("\n  {inner} ")))
+        };
+        let own = commands.lines().filter(is_of).filter_map(|line| line.split(" -- ").next());
+        for flag in own.flat_map(str::split_whitespace).filter(|word| word.starts_with("--")) {
+            let is_listed = flags.split([' ', ',', '\n']).any(|word| word == flag);
+            assert!(is_listed, "an example of {verb} uses {flag}, which -h does not list\n{help}");
+        }
+        // What is pasted is one command: a line that goes on ends with a backslash.
+        let lines: Vec<&str> = examples.lines().skip(1).collect();
+        for pair in lines.windows(2).filter(|pair| !pair[1].starts_with("  lanesweep ")) {
+            assert!(pair[0].ends_with(" \\"), "{verb}: `{}` goes on without a backslash", pair[0]);
+        }
     }
 }
 

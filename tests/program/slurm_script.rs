@@ -15,6 +15,9 @@ fn said(bytes: &[u8]) -> String {
 
 /// Array, merge and submit script in a folder, after the verb succeeded.
 fn scripts(folder: &Path, out: &str, args: &[&str]) -> [(PathBuf, String); 3] {
+    for study in ["study.toml", "s.toml"] {
+        std::fs::write(folder.join(study), "").unwrap();
+    }
     let written = lanesweep(folder, args);
     assert!(written.status.success(), "{}", said(&written.stderr));
     let stdout = String::from_utf8(written.stdout).unwrap();
@@ -186,8 +189,13 @@ fn what_cannot_work_is_refused_and_nothing_is_written() {
         let stderr = said(&refused.stderr);
         assert!(stderr.contains(told), "{flags:?}: {stderr}");
     }
+    // A study file that is not there would be found missing by the cluster, after the queue.
+    let missing = lanesweep(dir.path(), &[&start[..], &["s.toml"]].concat());
+    assert!(missing.status.code() == Some(6) && said(&missing.stderr).contains("s.toml: cannot read"));
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    std::fs::write(dir.path().join("s.toml"), "").unwrap();
     for tasks in ["0", "100000"] {
         assert_eq!(lanesweep(dir.path(), &["slurm", "s.toml", "--array", tasks, "--out", "o"]).status.code(), Some(2));
     }
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
 }

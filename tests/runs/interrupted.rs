@@ -118,7 +118,25 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     let code = ended(&mut study);
     assert_eq!(unfinished(dir.path()), Vec::<PathBuf>::new(), "after {signal}");
     assert_eq!(std::fs::read_to_string(&lanes).unwrap(), "of an earlier run", "what was there stays");
+    assert!(!dir.path().join("out/run.lock").exists(), "the lock goes, whatever else stays");
     code
+}
+
+#[test]
+fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let mut compare = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .args(["-q", "--threads", "1", "compare", "--backend", "cpu", "--synth-recordings", "2", "--samples", "1e8"])
+        .args([Path::new("--out"), &out])
+        .spawn()
+        .unwrap();
+    wait_until("the folder is locked", || {
+        assert!(compare.try_wait().unwrap().is_none(), "the comparison ended before it was interrupted");
+        out.join("run.lock").exists()
+    });
+    send("INT", compare.id());
+    assert_eq!((ended(&mut compare), out.exists()), (Some(128 + 2), false));
 }
 
 #[test]

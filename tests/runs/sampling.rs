@@ -300,7 +300,7 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
         assert!(few["estimate"]["trust"]["warnings"].to_string().contains("few_scenarios"), "{few}");
     }
     let subset = estimated(dir.path(), "all.json", &["--thw", "0.4", "--estimator", "subset", "--samples", "500"]);
-    assert!(subset.1.contains("of the draws alone") && !subset.1.contains("sound"), "{}", subset.1);
+    assert!(subset.1.contains("cover the draws alone") && !subset.1.contains("sound"), "{}", subset.1);
 }
 
 #[test]

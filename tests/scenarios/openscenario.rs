@@ -255,7 +255,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
         root,
         &["export", "xosc", "--from", "study", "--lane", "no/S/1.2s/RSS"],
         2,
-        "there is no lane `no/S/1.2s/RSS`",
+        "there is no lane `no/S/1.2s/RSS`: no scenario `no` in this run",
     );
     refused(root, &["export", "xosc", "--from", "study", "--worst", "1", "--variant", "9"], 2, "variant `9`");
 }

@@ -45,6 +45,24 @@ fn a_row_per_instant_makes_scenarios_with_converted_units_and_the_rate_of_their_
 }
 
 #[test]
+fn a_cut_in_that_moves_away_or_stands_on_the_other_side_is_told_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let warned = |name: &str, content: &str| {
+        file(dir.path(), name, content);
+        let (code, said) = said(dir.path(), &["study", "--scenarios", name, "--dry-run", "--backend", "cpu"]);
+        assert_eq!(code, 0, "{said}");
+        said
+    };
+    let away = INSTANTS.replace("72,3.5", "72,2.75").replace("72,3.4", "72,3.1").replace("90,3.3", "90,3.4");
+    assert!(warned("away.csv", &away).contains("move away from the ego's lane"), "{away}");
+    assert!(warned("away.csv", &away).contains("the first is scenario a"), "{away}");
+    let other_side = INSTANTS.replace("72,3.", "72,-3.").replace("90,3.", "90,-3.");
+    assert!(warned("side.csv", &other_side).contains("against their `side`, the first is scenario a"));
+    let good = warned("good.csv", INSTANTS);
+    assert!(!good.contains("lane change(s)"), "{good}");
+}
+
+#[test]
 fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() {
     let cases = [
         ("10.08,106", "10.20,106", "s.csv, line 4, column `time_s`, scenario a", "they must be equal"),
@@ -54,7 +72,7 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
             "line 3, column `ego_length_m`, scenario a",
             "is 4.6, but 4.5",
         ),
-        ("72,3.4", "fast,3.4", "column `target_speed_kmh[1]`, scenario a", "expected a number"),
+        ("72,3.4", "fast,3.4", "line 3, column `target_speed_kmh`, scenario a", "expected a number"),
         ("10.04", "soon", "line 3, column `time_s`", "expected a time in seconds"),
         ("Right,4.2", "up,4.2", "line 5, column `side`, scenario b", "\"left\", \"right\""),
         ("b,,0.1,,,,,,,36,0.1,\n", "", "line 5, column `time_s`, scenario b", "one instant"),
@@ -64,7 +82,7 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
         ("weather", "target_v", "column `target_v`", "holds the same as the column `target_speed_kmh`"),
         ("target_width_m,", "target_wide,", "column `target_wide`", "no such column"),
         (",weather", "", "line 2", "12 fields, but the header has 11"),
-        ("72,3.4,rain", "-72,3.4,rain", "column `target_speed_kmh[1]`", "at least 0"),
+        ("72,3.4,rain", "-72,3.4,rain", "line 3, column `target_speed_kmh`", "at least 0"),
     ];
     for (old, new, place, problem) in cases {
         assert!(INSTANTS.contains(old), "{old}");
@@ -332,7 +350,7 @@ fn one_bad_scenario_in_ten_is_left_out_and_told_and_more_are_no_result_with_all_
     let jump = |id, k| if (id, k) == (7, 10) { row(7, 10, 20.0, 0.0) } else { None };
     let (code, text) = study(&cut_ins(30, jump), &[]);
     assert_eq!(code, 4, "{text}");
-    assert!(text.contains("column `target_lateral_m[9]`, scenario s7: lateral jump: -26 m/s"), "{text}");
+    assert!(text.contains("line 151, column `target_lateral_m`, scenario s7: lateral jump: -26 m/s"), "{text}");
     let run: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("out/run.json")).unwrap()).unwrap();
     assert_eq!(run["categories"][0]["kept"].as_u64(), Some(29));

@@ -136,6 +136,11 @@ fn sets_that_make_no_density_are_told_apart() {
         assert!(stderr(&output).contains(hint), "{name} should say `{hint}`: {}", stderr(&output));
         assert!(output.stdout.is_empty() && !out.exists(), "{name}: nothing may be written");
     }
+    // A category without scenarios is told once, with what there is.
+    let empty = fit("empty", &lvd, "a,b,c,i");
+    let said = stderr(&empty);
+    assert_eq!((code(&empty), said.matches("there is no such scenario").count()), (4, 1), "{said}");
+    assert!(said.contains("cut-out: there is no such scenario") && said.contains("--categories lvd"), "{said}");
     // What can be fitted is, and the exit status says that something is missing.
     let some = fit("some", &lvd, "i,v");
     assert_eq!(code(&some), 4, "{}", stderr(&some));

@@ -21,7 +21,7 @@ pub use layers::{Assignment, Layers, Origin, Setting};
 pub use profile_schema::profile_schema;
 pub use schema::settings_schema;
 pub use tables::{
-    BandwidthInterval, CompareSettings, Estimator, FitSettings, IntervalKind, PointKind, RunSettings, SampleSettings,
-    Settings,
+    BandwidthInterval, CompareSettings, EstimatorKind, FitSettings, IntervalKind, PointKind, RunSettings,
+    SampleSettings, Settings,
 };
 pub use value::text_of;

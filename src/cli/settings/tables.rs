@@ -121,7 +121,7 @@ pub enum BandwidthInterval {
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
     /// Estimator.
-    pub estimator: Estimator,
+    pub estimator: EstimatorKind,
     /// Samples at most; of ce: of the final sample; of subset: per level. Without it: 100000, of subset 2000.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
@@ -170,7 +170,7 @@ pub struct SampleSettings {
 impl Default for SampleSettings {
     fn default() -> Self {
         SampleSettings {
-            estimator: Estimator::Mc,
+            estimator: EstimatorKind::Mc,
             samples: None,
             criterion: Criterion::Collision,
             points: PointKind::Random,
@@ -193,7 +193,7 @@ impl Default for SampleSettings {
 /// Estimator of a probability of failure.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum Estimator {
+pub enum EstimatorKind {
     #[default]
     #[allow(missing_docs)]
     Mc,
@@ -205,14 +205,14 @@ pub enum Estimator {
     Subset,
 }
 
-impl Estimator {
+impl EstimatorKind {
     /// As flags and files name it.
     pub fn key(self) -> &'static str {
         match self {
-            Estimator::Mc => "mc",
-            Estimator::Is => "is",
-            Estimator::Ce => "ce",
-            Estimator::Subset => "subset",
+            EstimatorKind::Mc => "mc",
+            EstimatorKind::Is => "is",
+            EstimatorKind::Ce => "ce",
+            EstimatorKind::Subset => "subset",
         }
     }
 }

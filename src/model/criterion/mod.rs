@@ -4,7 +4,8 @@
 //! comparing a printed value. Here lives no time loop. Constants come from a profile; verdicts go to the
 //! lane's outcome.
 //!
-//! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`].
+//! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`], and what counts verdicts; the
+//! chapter `docs/src/extend/criterion.md` names every place.
 
 mod btn;
 mod collision;

@@ -2,7 +2,8 @@
 //!
 //! A claim holds if the paired bootstrap interval of its statistic excludes 0 with the claimed sign, is
 //! contradicted if it excludes 0 with the other, and undecided otherwise. Cells with few failures in S are
-//! left out; where none remains the data is too few. A claimed equality holds if the interval lies within
+//! left out; where none remains the data is too few. It is also too few below ten scenarios: a bootstrap over one
+//! scenario has no width. A claimed equality holds if the interval lies within
 //! ±0.05 and is contradicted if it lies wholly outside; over several cells it is about the mean size of the
 //! difference, so that differences of opposite sign do not cancel.
 //!
@@ -20,6 +21,9 @@ use crate::scenario::Category;
 
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
+
+/// Below so many scenarios a bootstrap over scenarios says nothing, and no claim is judged.
+const MIN_SCENARIOS: u64 = 10;
 
 /// Share of undefined draws above which a claim is undecided.
 const MAX_UNDEFINED: f64 = 0.05;
@@ -48,7 +52,7 @@ pub enum ClaimVerdict {
     Contradicted,
     /// The interval holds 0.
     Undecided,
-    /// Fewer failures in S than needed.
+    /// Fewer failures in S than needed, or fewer than ten scenarios.
     TooFew,
     /// A variant, a model or a headway that it speaks of was not run.
     NotRun,
@@ -247,7 +251,7 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         let value = mean(None);
         let interval = interval(values, confidence).filter(|_| value.is_some());
         let total: u64 = all.iter().map(failures).sum();
-        let verdict = if cells.is_empty() || total < u64::from(least) {
+        let verdict = if scores.scenarios < MIN_SCENARIOS || cells.is_empty() || total < u64::from(least) {
             ClaimVerdict::TooFew
         } else if f64::from(undefined_draws) > MAX_UNDEFINED * scores.draws.len() as f64 {
             ClaimVerdict::Undecided
@@ -356,6 +360,16 @@ mod tests {
     #[test]
     fn a_claim_about_few_failures_is_not_judged() {
         assert_eq!(verdict_of(&table([3; 4], GOOD, GOOD), "cut-out c < a"), ClaimVerdict::TooFew);
+    }
+
+    #[test]
+    fn a_claim_about_fewer_than_ten_scenarios_is_not_judged_however_many_lanes_fail() {
+        let mut one = table([100; 4], GOOD, GOOD);
+        let scenarios = |table: &mut ScoreTable, count| table.categories[0].scenarios = count;
+        scenarios(&mut one, 9);
+        assert!(judge_claims(&one).iter().all(|r| r.overall.verdict == ClaimVerdict::TooFew));
+        scenarios(&mut one, 10);
+        assert_eq!(verdict_of(&one, "cut-out b = d"), ClaimVerdict::Holds);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::options::ParameterizationOptions;
 use super::series::{lateral_speed, mean_acceleration};
 use super::sizes::vehicle_ahead;
 use crate::scenario::{Category, Scenario};
+use crate::support::plausibility::Quantity;
 use crate::{Error, Place, Result};
 
 /// Shortest duration T of a valid point and of a reconstruction, s.
@@ -133,6 +134,18 @@ impl Variable {
 }
 
 impl Parameter {
+    /// Whose plausible and physical range its values have; `None` where there is no such range.
+    pub(crate) fn quantity(&self) -> Option<Quantity> {
+        match (&*self.name, &*self.unit) {
+            ("lateral_speed_mps", _) => Some(Quantity::LateralSpeed),
+            ("acceleration_target_mps2" | "acceleration_lead_mps2", _) => Some(Quantity::Acceleration),
+            ("gap_lead_m", _) => Some(Quantity::Gap),
+            ("thw_s", _) => Some(Quantity::Headway),
+            (_, "m/s") => Some(Quantity::Speed),
+            _ => None,
+        }
+    }
+
     /// Coefficient `j` of a decomposition, counted from 0: unbounded and without a unit.
     pub(super) fn coefficient(j: usize) -> Parameter {
         Parameter { name: format!("c{}", j + 1), unit: "1".to_owned(), lower: None, lower_excluded: false, upper: None }

@@ -63,7 +63,7 @@ pub fn fit_svd(
     if weights.iter().any(|w| !w.is_finite()) {
         return Err(Error::input(
             place(),
-            "a series or an extra is equal in all scenarios, so its scale is zero",
+            "a series, a duration, a speed or a gap is equal in all scenarios and cannot be scaled",
             "use scenarios that differ in speed, lateral motion, duration and gap",
         ));
     }

@@ -122,11 +122,19 @@ impl DensityModel {
         let kept: Vec<&Scenario> = of_category().filter(|s| s.kept).collect();
         let name = || id.name();
         if kept.is_empty() {
-            return Err(Error::input(
-                Place::item(name()),
-                format!("none of {} {} scenarios passed the filters", of_category().count(), id.category.label()),
-                "use more recordings, or relax the filters in the study file (option `config`)",
-            ));
+            // The same for every parameterization of the category, so that a user reads it once.
+            let found = match of_category().count() {
+                0 => "there is no such scenario".to_owned(),
+                count => format!("none of {count} scenarios passed the filters"),
+            };
+            let others = Category::ALL.map(|c| (c, scenarios.iter().any(|s| s.kept && s.category == c)));
+            let others: Vec<String> =
+                others.iter().filter(|(_, is_kept)| *is_kept).map(|(c, _)| c.label().to_lowercase()).collect();
+            let help = match others.is_empty() {
+                true => "use more recordings, or relax the filters in the study file (option `config`)".to_owned(),
+                false => format!("use more recordings, or leave it out: option `categories = {}`", others.join(",")),
+            };
+            return Err(Error::input(Place::item(id.category.label()), found, help));
         }
         let reduction = reduction(&id, scenarios, &kept, options)?;
         let space = ParameterSpace::new(id.clone(), &options.parameterization, reduction.as_ref(), options.with_thw)?;

@@ -106,7 +106,9 @@ pub fn mine_folder(
             let part = highd::read_judged(files, implausible).map(|loaded| {
                 let mined = mine(&loaded.recording, options);
                 let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
-                MinedPart { mined, summary, notes: loaded.notes, synthetic: loaded.recording.synthetic }
+                let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
+                let notes = loaded.notes.into_iter().map(name).collect();
+                MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
             });
             done();
             part

@@ -67,7 +67,7 @@ impl GeneratorOptions {
             // Written so that NaN fails too.
             if !(value >= low && value <= high) {
                 return Err(Error::usage(
-                    Place::item(format!("generator option `{name}`")),
+                    Place::item(format!("generator.{name}")),
                     format!("{value} is outside {low} to {high}"),
                     format!("choose a value from {low} to {high}"),
                 ));
