@@ -63,7 +63,7 @@ fn sampling(folder: &Path) {
         is_sampled_headway: false,
     };
     pairs("sample", folder, plan.unit_count(), &checkpoints(samples), |ledger: &mut Ledger<SampleTally>| {
-        sample_into(&plan, ledger, &executor, &counting, &crude, |_| Ok(())).unwrap();
+        sample_into(&plan, ledger, &executor, &counting, &crude, false, |_| Ok(())).unwrap();
     });
 }
 

@@ -71,7 +71,7 @@ fn lanes(
 
 fn write_outcome(lane: u32, variant: u32, record: OutcomeRecord) {
     if !frame_values | (launch.wanted != WANTED_COUNTS) {
-        pack_verdicts(launch, lane, record.word);
+        pack_verdicts(launch, lane, record);
     }
     if frame_values {
         if launch.wanted == WANTED_COUNTS {

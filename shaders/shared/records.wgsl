@@ -68,6 +68,10 @@ struct Launch {
     wanted: u32,
     // Lanes of a workgroup, at least WORKGROUP.
     lanes_per_group: u32,
+    // A smaller TTC fails, s: the profile's, or a watch's.
+    ttc_threshold_s: f32,
+    // Verdicts mark contacts at this closing speed, m/s, or a greater one.
+    marks_contacts_from: f32,
 }
 
 const WANTED_VERDICTS: u32 = 0u;

@@ -1,8 +1,5 @@
 // Time to collision: gap over closing speed, 0 at contact. Twin of src/model/criterion/ttc.rs.
 
-// s
-override ttc_threshold_s: f32;
-
 // Minimum TTC so far, as a quotient, so that a step never divides.
 struct TtcMinimum {
     gap: f32,
@@ -32,6 +29,6 @@ fn ttc_update(minimum: TtcMinimum, seen: bool, signed_gap: f32, closing: f32) ->
     return TtcMinimum(
         select(minimum.gap, gap, is_smaller),
         select(minimum.closing, closing, is_smaller),
-        minimum.failed | (counts & (gap < ttc_threshold_s * closing)),
+        minimum.failed | (counts & (gap < launch.ttc_threshold_s * closing)),
     );
 }

@@ -4,15 +4,19 @@ use std::ops::Range;
 
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
+use super::watch::Watch;
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
 use crate::{Error, Result};
 
 /// How much of a lane comes back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wanted {
     /// Verdict bits only.
     Verdicts,
+    /// Verdict bits, and the continuous values of the lanes that the watch marks. A backend's verdicts show the marks;
+    /// the [executor](super::Executor) values these lanes. A backend without marks returns every outcome.
+    Watched(Watch),
     /// Verdict bits and the continuous values.
     Outcomes,
     /// No lane at all: failures and smallest values per variant and model.
@@ -78,6 +82,8 @@ pub struct Chunk {
     pub verdicts: Vec<Verdicts>,
     /// One per lane where outcomes were wanted, else empty. Values are exact widenings of the lane's own.
     pub outcomes: Vec<Outcome<f64>>,
+    /// The lanes that a [watch](Watch) marked, ascending, with their outcomes; `None` without a watch.
+    pub valued: Option<Vec<(u64, Outcome<f64>)>>,
     /// One per cell of the plan ([`LanePlan::cell`]) where counts were wanted, else empty.
     pub counts: Vec<CellCounts>,
 }
@@ -94,7 +100,7 @@ impl Chunk {
     /// [`Error::Internal`] where it is not.
     pub fn check_asked(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
         let complete = match wanted {
-            Wanted::Verdicts => self.counts.is_empty(),
+            Wanted::Verdicts | Wanted::Watched(_) => self.counts.is_empty(),
             Wanted::Outcomes => self.outcomes.len() == self.verdicts.len(),
             Wanted::Counts => !self.counts.is_empty(),
         };

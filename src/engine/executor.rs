@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
+use super::cpu::runner::LaneRunner;
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
 use crate::{Error, Result};
@@ -101,6 +102,12 @@ impl<'a> Executor<'a> {
             }
             (Err(error), None) => return Err(error),
         };
+        let valuing = wanted.watch().map(|watch| (watch, LaneRunner::of_few(plan)));
+        let value = |chunk: &mut Chunk| {
+            if let Some((watch, runner)) = &valuing {
+                watch.value(plan, runner, chunk);
+            }
+        };
         let mut from = units.start;
         // The backend is not asked for units before this one.
         let mut redo_until = if session.is_some() { units.start } else { units.end };
@@ -109,10 +116,11 @@ impl<'a> Executor<'a> {
                 let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
                 let by = backend.rechecked_by(wanted);
                 match (chunk_and_samples(plan, session.as_mut(), range.clone(), wanted, recheck, by), fallback) {
-                    (Ok((chunk, samples)), _) => {
+                    (Ok((mut chunk, samples)), _) => {
+                        value(&mut chunk);
                         if let Some(recheck) = recheck {
                             let name = backend.describe();
-                            summary.rechecked_lanes += recheck.check(&chunk, &name, by)?;
+                            summary.rechecked_lanes += recheck.check(&chunk, wanted, &name, by)?;
                             for sample in &samples {
                                 summary.rechecked_lanes += recheck.check_all(sample, &name, by)?;
                             }
@@ -140,11 +148,12 @@ impl<'a> Executor<'a> {
                 none => none.insert(fallback.prepare(plan)?),
             };
             let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(most));
-            let chunk = session.run(range.clone(), wanted)?;
+            let mut chunk = session.run(range.clone(), wanted)?;
             chunk.check_asked(plan, &range, wanted)?;
+            value(&mut chunk);
             if let Some(recheck) = recheck {
                 let by = fallback.rechecked_by(wanted);
-                summary.rechecked_lanes += recheck.check(&chunk, &fallback.describe(), by)?;
+                summary.rechecked_lanes += recheck.check(&chunk, wanted, &fallback.describe(), by)?;
             }
             summary.redone_chunks += 1;
             summary.redone_lanes += chunk.lanes();

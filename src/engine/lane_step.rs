@@ -218,7 +218,8 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
     let state = LaneState {
         index: index + runs.one(),
-        v_ego: hazard.is_unsafe.choose(v_reacting, v_ego),
+        // A contact keeps its speed.
+        v_ego: (hazard.is_unsafe & !touched).choose(v_reacting, v_ego),
         v_before: if keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
         gaps,
         driver: DriverState {

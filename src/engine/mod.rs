@@ -30,6 +30,7 @@ mod trace;
 pub(crate) mod units;
 pub mod verify;
 pub(crate) mod version;
+mod watch;
 
 pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
 pub use confusion::Confusion;
@@ -56,3 +57,4 @@ pub use time_step::check_time_step;
 pub use trace::{StepMark, Trace, TracedStep, TracedVehicle};
 pub use units::Units;
 pub use version::ENGINE_VERSION;
+pub use watch::{Marks, Watch};

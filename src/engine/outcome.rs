@@ -15,6 +15,8 @@ pub struct Verdicts(pub u8);
 impl Verdicts {
     /// The lane ended at the time cap.
     pub const CAPPED: u8 = 1 << 3;
+    /// A contact that a [watch](super::Watch) marks: no lane ends both by contact and at the cap.
+    pub(super) const MARKED_CONTACT: u8 = Verdicts::CAPPED | 1 << Criterion::Collision as u8;
 
     /// Did this criterion fail?
     pub fn failed(self, criterion: Criterion) -> bool {

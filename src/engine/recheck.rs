@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::backend::{Chunk, RecheckBy};
+use super::backend::{Chunk, RecheckBy, Wanted};
 use super::cpu::instructions::Instructions;
 use super::cpu::runner::LaneRunner;
 use super::outcome::{Outcome, Verdicts};
@@ -75,11 +75,11 @@ impl<'p> Recheck<'p> {
     ///
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
-    pub fn check(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
-        self.check_some(chunk, backend, by, self.one_in)
+    pub fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
+        self.check_some(chunk, wanted, backend, by, self.one_in)
     }
 
-    fn check_some(&self, chunk: &Chunk, backend: &str, by: RecheckBy, one_in: u64) -> Result<u64> {
+    fn check_some(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy, one_in: u64) -> Result<u64> {
         if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
             return Ok(0);
         }
@@ -89,7 +89,7 @@ impl<'p> Recheck<'p> {
         keys.sort_by_key(|key| (key.block, key.model));
         let groups = keys.chunk_by(|a, b| (a.block, a.model) == (b.block, b.model));
         let tasks: Vec<&[LaneKey]> = groups.flat_map(|group| group.chunks(TASK)).collect();
-        let differing = tasks.into_par_iter().filter_map(|keys| self.first_differing(chunk, by, keys));
+        let differing = tasks.into_par_iter().filter_map(|keys| self.first_differing(chunk, wanted, by, keys));
         match differing.min() {
             Some(lane) => Err(self.mismatch(chunk, lane, backend, by)),
             None => Ok(keys.len() as u64),
@@ -97,7 +97,7 @@ impl<'p> Recheck<'p> {
     }
 
     /// The first lane of one block and model that differs.
-    fn first_differing(&self, chunk: &Chunk, by: RecheckBy, keys: &[LaneKey]) -> Option<u64> {
+    fn first_differing(&self, chunk: &Chunk, wanted: Wanted, by: RecheckBy, keys: &[LaneKey]) -> Option<u64> {
         let mut first: Option<u64> = None;
         let mut compare = |key: &LaneKey, is_same: &dyn Fn(usize) -> bool| {
             let lane = self.plan.lane(key);
@@ -110,13 +110,20 @@ impl<'p> Recheck<'p> {
             let ours = self.again.single(key);
             compare(key, &|at| match chunk.outcomes.get(at) {
                 Some(theirs) => same_words(&ours.widen(), theirs),
-                None => chunk.verdicts[at] == ours.verdicts,
+                None => chunk.verdicts[at] == ours.verdicts && !self.misses_mark(chunk, wanted, key, &ours),
             });
         }
         if is_batched {
             self.again.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts[at] == ours));
         }
         first
+    }
+
+    /// Whether a lane should have been valued and was not.
+    fn misses_mark(&self, chunk: &Chunk, wanted: Wanted, key: &LaneKey, ours: &Outcome<f32>) -> bool {
+        let model = self.plan.models[key.model];
+        wanted.watch().is_some_and(|watch| watch.means(model, &ours.widen()))
+            && !chunk.valued.iter().flatten().any(|(lane, _)| *lane == self.plan.lane(key))
     }
 
     /// Whether a lane that is checked in a batch is also checked as a single lane.
@@ -134,7 +141,7 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     pub fn check_all(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
-        self.check_some(chunk, backend, by, 1)
+        self.check_some(chunk, Wanted::Verdicts, backend, by, 1)
     }
 
     /// The chosen lanes of an interval, ascending.
@@ -360,7 +367,7 @@ mod tests {
             let keys: Vec<LaneKey> = lanes.map(|lane| self.plan.key(lane).unwrap()).collect();
             let mut verdicts = vec![Verdicts::default(); keys.len()];
             Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
-            Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), counts: Vec::new() })
+            Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), valued: None, counts: Vec::new() })
         }
     }
 

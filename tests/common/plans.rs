@@ -84,6 +84,7 @@ pub fn chunk(
         first_lane,
         verdicts: lanes.iter().map(|l| l.0).collect(),
         outcomes: if with_outcomes { lanes.iter().map(outcome).collect() } else { Vec::new() },
+        valued: None,
         counts: Vec::new(),
     }
 }

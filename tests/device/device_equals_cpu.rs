@@ -140,7 +140,10 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
         ("driver_ttc * abs(dv)", "bitcast<f32>(bitcast<u32>(driver_ttc) + 1u) * abs(dv)"),
         ("v_ego * driver_tau", "v_ego * bitcast<f32>(bitcast<u32>(driver_tau) + 1u)"),
         ("v_ego * driver_response_time", "v_ego * bitcast<f32>(bitcast<u32>(driver_response_time) + 1u)"),
-        ("gap < ttc_threshold_s * closing", "gap < bitcast<f32>(bitcast<u32>(ttc_threshold_s) + 1u) * closing"),
+        (
+            "gap < launch.ttc_threshold_s * closing",
+            "gap < bitcast<f32>(bitcast<u32>(launch.ttc_threshold_s) + 1u) * closing",
+        ),
         ("closing * btn_ramp_delay", "closing * bitcast<f32>(bitcast<u32>(btn_ramp_delay) + 1u)"),
     ];
     for (from, to) in plants {

@@ -10,7 +10,7 @@ use crate::wgsl::{
 };
 use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns};
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
-use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
+use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv, wanted_code};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
@@ -56,7 +56,7 @@ fn records() -> Vec<Record> {
         record!("Start", StartRecord, { is_gap: u32, value: f32 }),
         record!("Launch", Launch, {
             lanes: u32, headways: u32, variants: u32, first_case: u32, first_word: u32, first_outcome: u32,
-            first_cell_word: u32, done_word: u32, wanted: u32, lanes_per_group: u32,
+            first_cell_word: u32, done_word: u32, wanted: u32, lanes_per_group: u32, ttc_threshold_s: f32, marks_contacts_from: f32,
         }),
         record!("OutcomeRecord", OutcomeRecord, {
             word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
@@ -246,9 +246,9 @@ fn constants_that_stand_on_both_sides_agree() {
         ("SPEED_SAMPLED", SPEED_SAMPLED),
         ("LATERAL_SAMPLED", LATERAL_SAMPLED),
         ("NO_STEP", NO_STEP),
-        ("WANTED_VERDICTS", Wanted::Verdicts as u32),
-        ("WANTED_OUTCOMES", Wanted::Outcomes as u32),
-        ("WANTED_COUNTS", Wanted::Counts as u32),
+        ("WANTED_VERDICTS", wanted_code(Wanted::Verdicts)),
+        ("WANTED_OUTCOMES", wanted_code(Wanted::Outcomes)),
+        ("WANTED_COUNTS", wanted_code(Wanted::Counts)),
         ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
         ("GATE_OVERLAP", LateralGate::Overlap as u32),
         ("BTN_EQUIVALENT_DELAY", BtnForm::EquivalentDelay as u32),

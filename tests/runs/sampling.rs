@@ -7,16 +7,18 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Wanted};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, Headway, LanePlan, RecheckOptions, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
+    CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
+    sample_crude,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
+use lanesweep::stats::estimate::{BinomialInterval, StopRule};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -93,6 +95,48 @@ fn counts_and_worst_lanes_are_the_same_however_a_run_is_cut_up() {
         }
         if let Some(device) = common::device::software_backend() {
             assert!(whole == tally(&plan, &*device, &[(2000, n), (0, 2000)], &options), "{key}: device");
+        }
+    }
+}
+
+#[test]
+fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valued() {
+    let profile = Profile::load("paper").unwrap();
+    let cpu = CpuBackend::lane_arithmetic();
+    let device = common::device::software_backend();
+    for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {
+        let plan = plan(&density(category, key), 30_000, &profile);
+        for criterion in Criterion::ALL {
+            let counting = TallyOptions { worst: 7, criterion, map: None };
+            let crude = CrudeOptions {
+                stop: StopRule::samples(30_000),
+                interval: BinomialInterval::Wilson,
+                level: 0.95,
+                exposure: None,
+                is_sampled_headway: false,
+            };
+            let every_value = tally(&plan, &cpu, &[(0, 30_000)], &counting);
+            let valued = std::cell::Cell::new(0);
+            let sampled = |backend: &dyn Backend, range: std::ops::Range<u64>| {
+                let executor =
+                    Executor { recheck: Some(RecheckOptions { seed: 1, one_in: 10 }), ..Executor::new(backend) };
+                let of_chunk = |chunk: &Chunk| {
+                    let few = chunk.valued.as_ref().map(Vec::len);
+                    valued.set(valued.get() + few.unwrap_or(chunk.outcomes.len()));
+                    Ok(())
+                };
+                sample_crude(&plan, range, &executor, &counting, &crude, of_chunk).unwrap().tally
+            };
+            assert!(every_value == sampled(&cpu, 0..30_000), "{key}, {criterion:?}");
+            // The first samples are valued whole, and from then on about as many again as stand in the lists.
+            let share = valued.get() as f64 / plan.lane_count() as f64;
+            assert!(criterion != Criterion::Collision || share < 0.16, "{key}: {share} of the lanes were valued");
+            let shards = [17_000..30_000, 0..17_000].map(|range| sampled(&cpu, range));
+            let [last, first] = shards;
+            assert!(every_value == last.merge(first).unwrap(), "{key}, {criterion:?}: shards");
+            if let Some(device) = device.as_deref().filter(|_| criterion == Criterion::Collision) {
+                assert!(every_value == sampled(device, 0..30_000), "{key}, {criterion:?}: device");
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::LanePlan;
+use crate::engine::watch::Watch;
 use crate::model::scalar::Real;
 use crate::scenario::Category;
 
@@ -96,7 +97,10 @@ impl Backend for CpuBackend<f32> {
     /// Verdict-only batches skip steps.
     fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
         let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
-        if wanted == Wanted::Verdicts && !makes_every_step { RecheckBy::Batches } else { RecheckBy::Nothing }
+        match wanted {
+            Wanted::Verdicts | Wanted::Watched(_) if !makes_every_step => RecheckBy::Batches,
+            _ => RecheckBy::Nothing,
+        }
     }
 
     fn describe(&self) -> String {
@@ -138,8 +142,8 @@ trait RunUnits<R>: Sync {
     /// Gives each outcome with its position, counted from the first unit on.
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
 
-    /// Verdicts only.
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
+    /// Verdicts only, with the marks of a watch.
+    fn verdicts(&self, block: usize, units: Range<u64>, watch: Option<&Watch>, verdicts: &mut [Verdicts]);
 }
 
 /// Lanes in batches.
@@ -150,11 +154,11 @@ struct InBatches<'p> {
 
 impl RunUnits<f32> for InBatches<'_> {
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<f32>)) {
-        self.runner.run_units(self.instructions, block, units, each);
+        self.runner.run_units(self.instructions, block, units, None, each);
     }
 
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
-        self.runner.run_units(self.instructions, block, units, |at, verdict| verdicts[at] = verdict);
+    fn verdicts(&self, block: usize, units: Range<u64>, watch: Option<&Watch>, verdicts: &mut [Verdicts]) {
+        self.runner.run_units(self.instructions, block, units, watch, |at, verdict| verdicts[at] = verdict);
     }
 }
 
@@ -167,7 +171,7 @@ impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
         }
     }
 
-    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+    fn verdicts(&self, block: usize, units: Range<u64>, _watch: Option<&Watch>, verdicts: &mut [Verdicts]) {
         self.outcomes(block, units, &mut |at, outcome| verdicts[at] = outcome.verdicts);
     }
 }
@@ -211,6 +215,8 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
     }
 
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
+        // Single lanes gather the values in any case.
+        let wanted = if self.in_batches || wanted.watch().is_none() { wanted } else { Wanted::Outcomes };
         let plan = self.plan;
         let run = &self.run;
         let first_lane = plan.first_lane_of(units.start);
@@ -228,9 +234,10 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                 verdicts.resize(from + count * per_unit, Verdicts::default());
             }
             match wanted {
-                Wanted::Verdicts => {
+                Wanted::Verdicts | Wanted::Watched(_) => {
+                    let watch = wanted.watch();
                     verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
-                        run.verdicts(block, task(k), lanes);
+                        run.verdicts(block, task(k), watch.as_ref(), lanes);
                     });
                 }
                 Wanted::Outcomes => {
@@ -271,6 +278,6 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
         if wanted == Wanted::Counts {
             counts.resize(plan.cell_count(), CellCounts::EMPTY);
         }
-        Ok(Chunk { units, first_lane, verdicts, outcomes, counts })
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts })
     }
 }

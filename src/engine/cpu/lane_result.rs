@@ -58,8 +58,8 @@ impl Ending for Outcome<f32> {
     }
 }
 
-/// Verdicts of a lane after its last step. Verdict-only batches do not know the ego's speed there, so neither that
-/// speed nor a closing speed may decide.
+/// Verdicts of a lane after its last step. Verdict-only batches know the ego's speed there only after a contact, which
+/// keeps it, so no speed may decide a verdict.
 #[inline(always)]
 pub fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,
@@ -69,14 +69,17 @@ pub fn verdicts<R: Real, M>(
 ) -> Verdicts {
     let [first, second] = last_seen(simulation, lane, state, places);
     let scene = simulation.scene;
-    let mut touched = is_touched(scene, &first, &lane.others[0]);
+    let by_first = is_touched(scene, &first, &lane.others[0]);
+    let mut touched = by_first;
     if scene.is_pair {
         touched = touched | is_touched(scene, &second, &lane.others[1]);
     }
+    let closing = state.v_ego - by_first.choose(places[0].speed, places[1].speed);
+    let is_marked = touched.holds() && closing.abs() >= simulation.criteria.marks_contacts_from;
     let record = &state.record;
     let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
     // No other reason remains: the time cap.
-    let capped = if state.over.holds() { 0 } else { Verdicts::CAPPED };
+    let capped = if state.over.holds() && !is_marked { 0 } else { Verdicts::CAPPED };
     let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
     Verdicts(
         bit(Criterion::Collision, touched)

@@ -15,6 +15,7 @@ use crate::engine::lane_case::LaneCase;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::{LaneKey, LanePlan};
 use crate::engine::scene::{Scene, may_cross};
+use crate::engine::watch::Watch;
 use crate::model::driver::ModelId;
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
@@ -148,12 +149,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
 impl LaneRunner<'_, f32> {
     /// All lanes of some units of a block, in batches: position counted from the first unit on, and result. The order
-    /// is unspecified.
+    /// is unspecified. Verdicts show the marks of a watch.
     pub fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
         block: usize,
         units: Range<u64>,
+        watch: Option<&Watch>,
         mut each: impl FnMut(usize, E),
     ) {
         let variants = self.plan.blocks[block].variants.len();
@@ -180,7 +182,9 @@ impl LaneRunner<'_, f32> {
         for (at_model, &model) in self.plan.models.iter().enumerate() {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
             if in_batches {
-                constants.run_stream(model, instructions, &stream, series.entries(), each);
+                let watched = watch.map(|watch| watch.criteria(&self.plan.profile, model, constants.criteria));
+                let criteria = watched.as_ref().unwrap_or(&constants.criteria);
+                constants.run_stream(model, criteria, instructions, &stream, series.entries(), each);
             } else {
                 self.one_by_one(block, &cases, tables, model, each);
             }
@@ -217,7 +221,8 @@ impl LaneRunner<'_, f32> {
         let may_cross = cases.iter().any(|case| may_cross(case, &tables, self.dt()));
         let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
         let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
-        constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
+        let (model, criteria) = (self.plan.models[model], &constants.criteria);
+        constants.run_stream(model, criteria, instructions, &stream, series.entries(), each);
     }
 
     /// All lanes of a model, one by one.

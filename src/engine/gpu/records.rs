@@ -7,7 +7,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
+use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts, Wanted};
 use crate::model::criterion::{BrakeThreatMaximum, Contact, Criteria};
 use crate::model::driver::MODELS;
 use crate::model::flag::Flag;
@@ -51,7 +51,7 @@ impl From<Start<f32>> for StartRecord {
 
 /// One dispatch: the lanes of one model over an interval of cases.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Launch {
     /// Lanes of this dispatch.
     pub lanes: u32,
@@ -73,6 +73,19 @@ pub struct Launch {
     pub wanted: u32,
     /// Lanes of a workgroup, at least [`WORKGROUP`](super::shader::WORKGROUP).
     pub lanes_per_group: u32,
+    /// A smaller TTC fails, s: the profile's, or a watch's.
+    pub ttc_threshold_s: f32,
+    /// Verdicts mark contacts at this closing speed, m/s, or a greater one.
+    pub marks_contacts_from: f32,
+}
+
+/// The number of what is wanted, in [`Launch`].
+pub fn wanted_code(wanted: Wanted) -> u32 {
+    match wanted {
+        Wanted::Verdicts | Wanted::Watched(_) => 0,
+        Wanted::Outcomes => 1,
+        Wanted::Counts => 2,
+    }
 }
 
 /// Result of a finished lane.

@@ -7,9 +7,10 @@ use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
 use super::generator::Inputs;
-use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord};
+use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord, wanted_code};
 use super::shader::WORKGROUP;
 use crate::engine::Wanted;
+use crate::model::criterion::Criteria;
 use crate::{Error, Result};
 
 /// Maximum number of jobs in flight.
@@ -26,6 +27,8 @@ pub(super) struct Job {
     pub variants: u32,
     pub headways: u32,
     pub wanted: Wanted,
+    /// The criteria of each model.
+    pub criteria: Vec<Criteria<f32>>,
 }
 
 impl Job {
@@ -133,8 +136,11 @@ impl Slot {
                 first_outcome: (model * job.records()) as u32,
                 first_cell_word: (models + model * job.cells() * CELL_WORDS) as u32,
                 done_word: model as u32,
-                wanted: job.wanted as u32,
+                wanted: wanted_code(job.wanted),
                 lanes_per_group,
+                ttc_threshold_s: job.criteria[model].ttc.threshold,
+                // No closing speed is larger.
+                marks_contacts_from: job.criteria[model].marks_contacts_from.min(f32::MAX),
             };
             let at = stride as usize * model;
             launches[at..at + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));

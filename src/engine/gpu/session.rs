@@ -12,7 +12,7 @@ use super::adapters::{AdapterCard, Adapters, DeviceKind};
 use super::device::{GpuOptions, PipelineSpec};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
-use super::records::{CELL_WORDS, StartRecord, from_ordered};
+use super::records::{CELL_WORDS, StartRecord, from_ordered, wanted_code};
 use super::ring::{Answer, Job, RING};
 use super::shader::{self, Specialization};
 use crate::engine::{Backend, CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
@@ -80,7 +80,7 @@ impl<'p> GpuSession<'p> {
     }
 
     fn max_lanes(&self, wanted: Wanted) -> u64 {
-        self.prepared.max_lanes[wanted as usize]
+        self.prepared.max_lanes[wanted_code(wanted) as usize]
     }
 
     /// Sends one job of units from the start of `units`; returns its end.
@@ -117,9 +117,16 @@ impl<'p> GpuSession<'p> {
         };
         let count = self.pacer.units(per_unit, most);
         let end = units.end.min(units.start + count).min(held.end);
-        let specialization = Specialization { paired: *paired, values: wanted != Wanted::Verdicts, queue: self.queue };
+        let values = matches!(wanted, Wanted::Outcomes | Wanted::Counts);
+        let specialization = Specialization { paired: *paired, values, queue: self.queue };
+        let constants = &self.constants[block];
+        let criteria = |&model| match wanted.watch() {
+            Some(watch) => watch.criteria(&plan.profile, model, constants.criteria),
+            None => constants.criteria,
+        };
         let job = Job {
-            pipelines: specs(plan, &self.constants[block], specialization),
+            pipelines: specs(plan, constants, specialization),
+            criteria: plan.models.iter().map(criteria).collect(),
             first_case: ((units.start - held.start) * variants) as u32,
             units: (end - units.start) as u32,
             variants: variants as u32,
@@ -152,7 +159,7 @@ impl<'p> GpuSession<'p> {
                     }
                 }
             }
-            Wanted::Verdicts => spread(&answer.words, &mut chunk.verdicts[from..from + lanes]),
+            Wanted::Verdicts | Wanted::Watched(_) => spread(&answer.words, &mut chunk.verdicts[from..from + lanes]),
             Wanted::Outcomes => {
                 spread(&answer.words, &mut chunk.verdicts[from..from + lanes]);
                 let criteria = &self.constants[piece.block].criteria;
@@ -175,11 +182,19 @@ impl<'p> GpuSession<'p> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
         let lanes = (plan.first_lane_of(units.end) - first_lane) as usize;
-        let mut chunk =
-            Chunk { units: units.clone(), first_lane, verdicts: Vec::new(), outcomes: Vec::new(), counts: Vec::new() };
+        let mut chunk = Chunk {
+            units: units.clone(),
+            first_lane,
+            verdicts: Vec::new(),
+            outcomes: Vec::new(),
+            valued: None,
+            counts: Vec::new(),
+        };
         match wanted {
             Wanted::Counts => chunk.counts = vec![CellCounts::EMPTY; plan.cell_count()],
-            Wanted::Verdicts | Wanted::Outcomes => chunk.verdicts = vec![Verdicts::default(); lanes],
+            Wanted::Verdicts | Wanted::Watched(_) | Wanted::Outcomes => {
+                chunk.verdicts = vec![Verdicts::default(); lanes]
+            }
         }
         let mut pending: VecDeque<Piece> = VecDeque::new();
         for (block, inside) in plan.segments(units) {

@@ -104,6 +104,8 @@ pub struct Criteria<R> {
     pub btn: BrakeThreat<R>,
     /// Smallest and largest values are gathered beside the verdicts, which do not need them.
     pub keeps_values: bool,
+    /// Verdicts mark contacts at this closing speed, m/s, or a greater one; infinite: none.
+    pub marks_contacts_from: R,
 }
 
 impl CriteriaProfile {
@@ -115,6 +117,7 @@ impl CriteriaProfile {
             ttc: TimeToCollision { threshold: R::from_f64(self.ttc_threshold_s) },
             btn: BrakeThreat::new(self.btn, self.btn_threshold, self.max_deceleration_mps2, self.jerk_mps3),
             keeps_values: true,
+            marks_contacts_from: R::INFINITY,
         }
     }
 }
@@ -125,7 +128,6 @@ impl<R: Real> Criteria<R> {
         let mut all = vec![
             ("criteria_gate", f64::from(self.gate as u32)),
             ("criteria_any_contact", f64::from(u8::from(self.btn_contact == BtnContact::Any))),
-            ("ttc_threshold_s", self.ttc.threshold.to_f64()),
         ];
         all.extend(self.btn.shader_constants());
         all

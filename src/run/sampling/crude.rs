@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::rows::{EstimateRow, crude_rows};
 use super::tally::{SampleTally, TallyOptions};
+use super::watch;
 use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -82,7 +83,7 @@ pub fn sample_crude(
     each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
     let mut ledger = Ledger::new(range, &checkpoints(plan.unit_count()));
-    sample_into(plan, &mut ledger, executor, counting, options, each)
+    sample_into(plan, &mut ledger, executor, counting, options, false, each)
 }
 
 /// The sample sizes at which a run of so many samples is looked at.
@@ -91,7 +92,8 @@ pub fn checkpoints(samples: u64) -> Vec<u64> {
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }
 
-/// The same, as far as the ledger does not hold it already; its cuts must be the plan's [`checkpoints`].
+/// The same, as far as the ledger does not hold it already; its cuts must be the plan's [`checkpoints`]. With
+/// `every_value` the chunks that `each` takes have the outcome of every lane.
 ///
 /// # Errors
 /// As [`sample_crude`], and of the ledger's journal; [`Error::Interrupted`].
@@ -101,6 +103,7 @@ pub fn sample_into(
     executor: &Executor,
     counting: &TallyOptions,
     options: &CrudeOptions,
+    every_value: bool,
     mut each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
     let started = Instant::now();
@@ -118,7 +121,6 @@ pub fn sample_into(
         let problem = "a part of a run cannot tell when the whole is good enough";
         return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
     }
-    let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
     let mut tally = SampleTally::empty(plan, counting);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let mut convergence = Vec::new();
@@ -128,11 +130,19 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
-            let part = executor.sweep(plan, missing, wanted, |chunk| {
-                each(&chunk)?;
-                ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
-            })?;
-            summary.add(&part);
+            for piece in watch::pieces(missing, range.start) {
+                let wanted = match ledger.counts(range.start..piece.start)? {
+                    _ if every_value => Wanted::Outcomes,
+                    None if counting.worst > 0 => Wanted::Outcomes,
+                    None => Wanted::Verdicts,
+                    Some(known) => watch::wanted(plan, &known, counting),
+                };
+                let part = executor.sweep(plan, piece, wanted, |chunk| {
+                    each(&chunk)?;
+                    ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
+                })?;
+                summary.add(&part);
+            }
         }
         if let Some(counts) = ledger.counts(at..next)? {
             tally = tally.merge(counts)?;

@@ -7,7 +7,7 @@ use crate::model::profile::Profile;
 /// Far from any failure: nothing ever closed in.
 const FAR: f64 = 1e3;
 /// No demand counts for more: an infinite Brake Threat Number says only that no braking helps.
-const MAX_BTN: f64 = 10.0;
+pub(super) const MAX_BTN: f64 = 10.0;
 /// Values that rounding would put on the wrong side stand this close to the limit.
 const LEAST: f64 = 1e-12;
 

@@ -23,6 +23,7 @@ mod sample_result;
 mod sample_run;
 mod sequential;
 mod tally;
+mod watch;
 mod weighted;
 pub(crate) mod weighted_plan;
 mod weighted_tally;

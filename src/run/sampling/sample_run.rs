@@ -7,7 +7,7 @@ use super::bootstrap::{BootstrapRecord, bootstrap};
 use super::crude::{CrudeRun, checkpoints, crude_of_segments, sample_into};
 use super::sample::{Sample, SampleKind};
 use super::sample_result::SampleResult;
-use super::tally::{SampleTally, TallyOptions};
+use super::tally::SampleTally;
 use super::weighted_plan::PILOT_FILE;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{Chunk, Executor, SweepSummary};
@@ -45,7 +45,7 @@ impl Sample {
                 let units = plan.plan.unit_count();
                 let (mut ledger, counting) = (Ledger::new(0..units, &checkpoints(units)), plan.counting());
                 let options = plan.options(*stop);
-                let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, |_| Ok(()))?;
+                let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, false, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
             }
             SampleKind::Weighted(plan) => {
@@ -196,16 +196,21 @@ impl SampleRun<'_> {
                 if state.units.is_empty() {
                     return Ok(());
                 }
-                let mut counting = planned.counting();
-                if chunks.is_some() {
-                    counting = TallyOptions { worst: counting.worst.max(1), ..counting };
-                }
+                let (counting, every_value) = (planned.counting(), chunks.is_some());
                 let options = planned.options(*stop);
                 let each = |chunk: &Chunk| {
                     progress(chunk.units.end - chunk.units.start);
                     chunks.as_mut().map_or(Ok(()), |each| each(chunk))
                 };
-                self.crude = Some(sample_into(&planned.plan, &mut state.ledger, executor, &counting, &options, each)?);
+                self.crude = Some(sample_into(
+                    &planned.plan,
+                    &mut state.ledger,
+                    executor,
+                    &counting,
+                    &options,
+                    every_value,
+                    each,
+                )?);
                 Ok(())
             }
             (State::Weighted(state), SampleKind::Weighted(planned)) => {

@@ -94,7 +94,8 @@ impl SampleTally {
             return Err(Error::Internal("a plan that holds its cases has no points to map".to_owned()));
         }
         chunk.check(plan)?;
-        if chunk.verdicts.is_empty() || (options.worst > 0 && chunk.outcomes.is_empty()) {
+        let has_values = !chunk.outcomes.is_empty() || chunk.valued.is_some();
+        if chunk.verdicts.is_empty() || (options.worst > 0 && !has_values) {
             return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
         }
         let empty = || SampleTally { by_kernel: None, ..SampleTally::empty(plan, options) };
@@ -112,6 +113,13 @@ impl SampleTally {
             a.add(b);
             a
         });
+        if options.worst > 0 {
+            for (lane, outcome) in chunk.valued.iter().flatten() {
+                let value = limit_state(&plan.profile, options.criterion, outcome);
+                // The model is the innermost part of a lane's index.
+                tally.offer((lane % plan.models.len() as u64) as usize, WorstSample { value, lane: *lane });
+            }
+        }
         tally.covered = vec![units];
         tally.by_kernel = KernelCounts::empty(plan);
         if let Some(counts) = &mut tally.by_kernel {
@@ -151,8 +159,10 @@ impl SampleTally {
                     self.failures[at * criteria + criterion.index()] += fails;
                     failed[criterion.index()] += fails;
                 }
-                if self.worst_limit > 0 {
-                    let value = limit_state(&plan.profile, options.criterion, &chunk.outcomes[first + at]);
+                if self.worst_limit > 0
+                    && let Some(outcome) = chunk.outcomes.get(first + at)
+                {
+                    let value = limit_state(&plan.profile, options.criterion, outcome);
                     let lane = chunk.first_lane + (first + at) as u64;
                     self.offer(model, WorstSample { value, lane });
                 }
