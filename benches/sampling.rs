@@ -1,5 +1,6 @@
 //! Sampled lanes: wall time of crude Monte Carlo over one density per kind of parameterization, and memory at 10⁶,
-//! 10⁷ and 10⁸ samples (with `-- --large` at 10⁹ too).
+//! 10⁷ and 10⁸ samples (with `-- --large` at 10⁹ too). `-- --worst` only sets 10⁷ samples with the default list of worst
+//! lanes beside as many without, in turn.
 //!
 //! `cargo bench --bench sampling` prints one CSV row per run to stdout and a summary to stderr. Synthetic data of the
 //! default size, profile `paper`, THW 1 s, all threads of the pool.
@@ -31,6 +32,16 @@ fn main() {
     println!("part,density,models,samples,lanes,worst,seconds,peak_bytes,failures");
     let scenarios = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios;
     let million = 1_000_000;
+    if std::env::args().any(|arg| arg == "--worst") {
+        for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {
+            let density = density(category, key, &scenarios);
+            for _ in 0..2 {
+                run("list", &density, &ModelId::ALL, 10 * million, 20);
+                run("no list", &density, &ModelId::ALL, 10 * million, 0);
+            }
+        }
+        return;
+    }
     for (category, key) in [
         (Category::CutIn, "2"),
         (Category::CutIn, "6"),
@@ -44,7 +55,7 @@ fn main() {
         run("speed", &density, &ModelId::ALL, million, 20);
     }
     let density = density(Category::CutIn, "2", &scenarios);
-    run("verdicts alone", &density, &ModelId::ALL, million, 0);
+    run("no list", &density, &ModelId::ALL, 10 * million, 0);
     run("ten million", &density, &ModelId::ALL, 10 * million, 20);
     let large = std::env::args().any(|arg| arg == "--large");
     for samples in [million, 10 * million, 100 * million, 1000 * million].into_iter().take(if large { 4 } else { 3 }) {

@@ -58,8 +58,9 @@ struct LaneState {
     index: u32,
     // END_NOT_YET before the last step.
     end: u32,
-    // The vehicle of a contact.
+    // The vehicle of a contact, and the closing speed at it.
     touched: u32,
+    v_closing: f32,
 }
 
 fn start_lane(lane: LaneCase, start: Start) -> LaneState {
@@ -75,6 +76,7 @@ fn start_lane(lane: LaneCase, start: Start) -> LaneState {
         0u,
         END_NOT_YET,
         0u,
+        0.0,
     );
 }
 
@@ -90,6 +92,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
     var hazard = attentive_check(first, lane.others[0], index);
     var touching = is_touched(first, lane.others[0]);
     var touching_second = false;
+    var v_closing = closing(first.view);
     var settled = is_settled(first);
     var aborting = aborts(first);
     if frame_paired {
@@ -103,6 +106,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
             hazard.is_unsafe = hazard.is_unsafe | nearer;
             hazard.demand = select(hazard.demand, other_hazard.demand, nearer);
             touching_second = !touching & is_touched(second, lane.others[1]);
+            v_closing = select(v_closing, closing(second.view), touching_second);
             touching = touching | touching_second;
             settled = settled & is_settled(second);
             aborting = aborting | aborts(second);
@@ -120,6 +124,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
         state.end = select(state.end, END_ABORTED, aborting);
         state.end = select(state.end, END_CONTACT, touching);
         state.touched = select(0u, 1u, touching_second);
+        state.v_closing = select(0.0, v_closing, touching);
     } else {
         let reaction = react(state.driver, hazard, v_ego);
         state.v_before = v_ego;
@@ -188,14 +193,11 @@ fn aborts(seen: Seen) -> bool {
 fn outcome(state: LaneState, lane: LaneCase) -> OutcomeRecord {
     let collided = state.end == END_CONTACT;
     var touch = CONTACT_NONE;
-    var v_closing = 0.0;
     if collided {
         if state.touched == 0u {
             touch = contact(state.gap_0, lane.others[0].half_lengths);
-            v_closing = state.v_ego - motion_speed(lane.others[0].motion, state.index);
         } else {
             touch = contact(state.gap_1, lane.others[1].half_lengths);
-            v_closing = state.v_ego - motion_speed(lane.others[1].motion, state.index);
         }
     }
     var btn = state.record.btn;
@@ -209,7 +211,7 @@ fn outcome(state: LaneState, lane: LaneCase) -> OutcomeRecord {
         state.reaction_step,
         state.index,
         select(0.0, state.v_ego, collided),
-        v_closing,
+        state.v_closing,
         ttc_value_bits(state.record.ttc),
         btn.numerator,
         btn.denominator,

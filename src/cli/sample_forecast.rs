@@ -13,7 +13,7 @@ use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
 use crate::run::sampling::crude_plan::CrudePlan;
 use crate::run::sampling::weighted_plan::WeightedPlan;
-use crate::run::sampling::{Estimator, Sample, SampleKind, SampleTally};
+use crate::run::sampling::{Estimator, Sample, SampleKind, SampleTally, TallyOptions};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{CrossEntropy, StopRule, Subset};
 
@@ -84,9 +84,10 @@ fn forecast_adaptive(
 /// What the run would be.
 fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format: FormatFlag) -> Result<Exit> {
     let (plan, counting) = (&planned.plan, planned.counting());
-    let wanted = if counting.worst > 0 { Wanted::Outcomes } else { Wanted::Verdicts };
-    let forecast = forecast(plan, opened.backend(), wanted, BUDGET, |chunk| {
-        SampleTally::of_chunk(plan, &chunk, &counting).map(drop)
+    // Few lanes are valued.
+    let verdicts = TallyOptions { worst: 0, ..counting.clone() };
+    let forecast = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
+        SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
     })?;
     let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
     DryRun {
