@@ -5,6 +5,8 @@ override driver_always_unsafe: bool;
 override driver_lateral_gate: f32;
 // s
 override driver_ttc: f32;
+// s; 0 where the danger is a TTC
+override driver_headway: f32;
 // m/s²
 override driver_coasting: f32;
 // m/s² per step
@@ -13,19 +15,31 @@ override driver_jerk_per_step: f32;
 override driver_max_deceleration: f32;
 override driver_delay_steps: u32;
 
+// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
+fn danger_gap(v_ego: f32, dv: f32) -> f32 {
+    return select(driver_ttc * abs(dv), driver_headway * v_ego, driver_headway > 0.0);
+}
+
 // The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
 fn initial() -> DriverState {
     return DriverState(driver_coasting, driver_delay_steps);
 }
 
 // Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver continues braking below the other's speed until
-// the opening gap exceeds 2 s of |dv|.
+// the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
 fn check(view: View) -> Hazard {
     let dv = closing(view);
     let near = view.lateral_gap <= driver_lateral_gate;
-    let soon = (dv != 0.0) & (abs(view.gap) <= driver_ttc * abs(dv));
+    let near_gap = danger_gap(view.v_ego, dv);
+    let soon = select((dv != 0.0) & (abs(view.gap) <= near_gap), view.gap <= near_gap, driver_headway > 0.0);
     let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
     return Hazard(is_unsafe, driver_max_deceleration);
+}
+
+// A reaction to a cut-out that has begun goes on to standstill.
+fn keeps_braking(state: DriverState) -> bool {
+    let has_begun = (state.delay_steps != driver_delay_steps) | (state.deceleration > driver_coasting);
+    return (driver_headway > 0.0) & has_begun;
 }
 
 // Coast at 0.4 m/s² during the delay, then ramp at 12.65 m/s³ up to 0.774 g.

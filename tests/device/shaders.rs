@@ -69,7 +69,7 @@ fn records() -> Vec<Record> {
 fn generator_records() -> Vec<Record> {
     vec![
         record!("AttentionRule", AttentionRule<f32>, {
-            kind: u32, delay_steps: u32, with_ahead: u32, threshold: f32, travel: f32,
+            kind: u32, delay_steps: u32, below_trigger: u32, threshold: f32,
         }),
         record!("ReducedColumns", ReducedColumns, {
             width: u32, instants: u32, coefficients: u32, lateral: u32, speed: u32, lead_speed: u32, ego_speed: u32,
@@ -349,6 +349,7 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         "time_step_bounds",
         "attention",
         "abort_above_ttc_s",
+        "reaction_and_margin_s",
         "safe_gap",
         "ignores",
         "steady_gap",

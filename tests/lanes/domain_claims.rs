@@ -1,12 +1,12 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::engine::{Constants, LaneCase, Outcome, Silent, Start};
+use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent, Start};
 use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
-use lanesweep::model::driver::ModelId;
+use lanesweep::model::driver::{BelowTrigger, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::{Counting, Real};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
-use lanesweep::scenario::{Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
+use lanesweep::scenario::{Ahead, Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
     let mut tables = Tables::default();
@@ -51,6 +51,21 @@ fn cut_in(v_ego: f64, v_other: f64, lateral: Lateral) -> Case {
         principal: Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(v_other), lateral },
         ahead: None,
         horizon_s: 6.0,
+    }
+}
+
+/// A vehicle at the ego's speed leaves the lane at a lateral speed; one that stands is ahead of it.
+fn cut_out(speed: f64, lateral_speed: f64, lead_gap_m: f64) -> Case {
+    let participant = |v, lateral| Participant { length_m: 4.3, width_m: 1.9, speed: Speed::constant(v), lateral };
+    let leaves = Lateral::Kinematic { start_m: 0.0, rate_mps: lateral_speed, end_m: 3.5 };
+    Case {
+        category: Category::CutOut,
+        ego_length_m: 4.3,
+        ego_width_m: 1.9,
+        ego_speed_mps: speed,
+        principal: participant(speed, leaves),
+        ahead: Some(Ahead { vehicle: participant(0.0, Lateral::Centred), gap_m: lead_gap_m }),
+        horizon_s: 3.5,
     }
 }
 
@@ -358,10 +373,67 @@ fn jrc_2021_un_r157_and_paper_fit_run_every_category_and_differ_from_paper_where
     assert_eq!(reaction("paper-fit", ModelId::Cchdm), reaction("paper", ModelId::Cchdm));
     let hard = lvd(30.0, 0.0, 6.0);
     let un = run(&Profile::load("un-r157").unwrap(), &hard, ModelId::Cchdm, 1.0);
-    assert_eq!(un.reaction_step, 1, "a leader beyond 5 m/s² is perceived at once");
+    assert_eq!(un.reaction_step, 1 + 10, "a leader beyond 5 m/s² is perceived for 0.4 s");
+    // A soft deceleration: by option.
     let soft = lvd(30.0, 0.0, 3.0);
-    let un = run(&Profile::load("un-r157").unwrap(), &soft, ModelId::Cchdm, 1.0);
-    assert_eq!(un.reaction_step, lanesweep::engine::NO_STEP, "a soft deceleration never triggers it");
+    let mut profile = Profile::load("un-r157").unwrap();
+    for (below, step) in [(BelowTrigger::DelayOnly, 1), (BelowTrigger::Never, NO_STEP), (BelowTrigger::AtOnce, 0)] {
+        profile.cchdm.lvd_below_threshold = below;
+        assert_eq!(run(&profile, &soft, ModelId::Cchdm, 1.0).reaction_step, step, "{below:?}");
+    }
+}
+
+/// Every difference between the two readings is a named option (docs/src/methods/profiles.md): set one by one, they turn
+/// the regulation's text into the JRC's simulator.
+#[test]
+fn named_options_alone_turn_un_r157_into_jrc_2021() {
+    let (mut profile, jrc) = (Profile::load("un-r157").unwrap(), Profile::load("jrc-2021").unwrap());
+    macro_rules! set {
+        ($($table:ident.$key:ident)+) => {
+            $(
+                assert_ne!(profile.$table.$key, jrc.$table.$key, "{}.{}", stringify!($table), stringify!($key));
+                profile.$table.$key = jrc.$table.$key.clone();
+            )+
+        };
+    }
+    set! {
+        frame.dt_s frame.time_cap_s frame.start_shift frame.end_when_settled frame.cut_out_target
+        criteria.gate
+        reg157.margin_s reg157.margin_steps reg157.visible_lateral_movement_s reg157.always_unsafe
+        cchdm.lateral_gate_m cchdm.always_unsafe cchdm.wandering_m cchdm.perception_time_s cchdm.cut_out_headway_s
+        cchdm.lead_deceleration_trigger_mps2
+        fsm.cfs_step
+    }
+    (profile.name, profile.description) = (jrc.name.clone(), jrc.description.clone());
+    assert_eq!(profile, jrc);
+}
+
+/// Annex 3, cut-out: 0.375 m, 0.4 s of perception, a headway of at most 2.0 s, then the braking goes on to standstill.
+#[test]
+fn under_un_r157_cchdm_brakes_in_a_cut_out_by_headway_and_goes_on() {
+    let profile = Profile::load("un-r157").unwrap();
+    let (speed, rate) = (20.0, 1.0);
+    // 0.375 m at 1 m/s: exceeded at step 10 of 0.04 s; 0.4 s are 10 steps.
+    let perceived = 10 + 10;
+    let case = cut_out(speed, rate, 150.0);
+    for thw_s in [0.8, 1.6, 2.0] {
+        let lane = run(&profile, &case, ModelId::Cchdm, thw_s);
+        assert_eq!(lane.reaction_step, perceived, "{thw_s} s is a danger");
+    }
+    // Farther away the driver waits until the vehicle ahead is 2.0 s away.
+    let far = run(&profile, &case, ModelId::Cchdm, 2.2);
+    let first_gap_m = 2.2 * speed + 4.3 + 150.0;
+    let steps = ((first_gap_m - 2.0 * speed) / (speed * 0.04)).ceil() as u32;
+    assert_eq!(far.reaction_step, steps, "a headway above 2.0 s is none");
+    // From 2.0 s the car stops within 0.75 s, 0.6 s of ramp and v²/2a: 20 m/s need 47 m, and 44 + 150 are there.
+    let near = run(&profile, &case, ModelId::Cchdm, 2.0);
+    assert_eq!((near.contact_step, near.end), (NO_STEP, EndReason::Standstill));
+    // 0.75 s, then 0.6 s of ramp and 20 m/s at 7.59 m/s².
+    let stops_s = f64::from(near.end_step) * 0.04;
+    assert!(
+        (stops_s - (0.8 + 0.75 + 0.3 + 20.0 / 7.593)).abs() < 0.15,
+        "it does not wait for the vehicle ahead: {stops_s}"
+    );
 }
 
 /// Time steps from fine to the longest that the profiles allow.

@@ -265,7 +265,14 @@ fn first_step(plan: &LanePlan, block: usize, case: &LaneCase<f64>, headway: usiz
 
 /// The two sides of a threshold's comparison, written down once more and in f32, constants rounded once.
 /// `None` for thresholds in time.
-fn sides(threshold: Threshold, p: &Profile, view: &View<f32>, y: f32, ego_width: f32) -> Option<(f32, f32)> {
+fn sides(
+    threshold: Threshold,
+    category: Category,
+    p: &Profile,
+    view: &View<f32>,
+    y: f32,
+    ego_width: f32,
+) -> Option<(f32, f32)> {
     let (v, vo, g, h, w, half) =
         (view.v_ego, view.v_other, view.gap, view.lateral_gap, view.lateral_towards, view.half_lengths);
     let dv = v - vo;
@@ -283,10 +290,13 @@ fn sides(threshold: Threshold, p: &Profile, view: &View<f32>, y: f32, ego_width:
         Threshold::Btn => (dv * dv, f(2.0 * c.btn_threshold * c.max_deceleration_mps2) * room),
         Threshold::BtnRoom => (room, 0.0),
         Threshold::Reg157Ttc => {
-            let constant = f(p.reg157.reaction_time_s + p.reg157.margin_s);
+            let constant = f(p.reg157.reaction_and_margin_s(p.frame.dt_s));
             (g.abs(), dv.abs() * (dv * f(1.0 / (2.0 * p.reg157.deceleration_mps2)) + constant))
         }
         Threshold::Reg157Gate => (h, f(p.reg157.lateral_gate_m)),
+        Threshold::CchdmTtc if category == Category::CutOut && p.cchdm.cut_out_headway_s > 0.0 => {
+            (g, f(p.cchdm.cut_out_headway_s) * v)
+        }
         Threshold::CchdmTtc => (g.abs(), f(p.cchdm.ttc_s) * dv.abs()),
         Threshold::CchdmGate => (h, f(p.cchdm.lateral_gate_m)),
         Threshold::RssLongitudinal => {
@@ -338,7 +348,14 @@ fn lanes_sit_exactly_on_each_threshold_with_a_neighbour_on_either_side() {
                     let seen = [0, 1, 2].map(|side| {
                         let case = plan.case(block, unit, side);
                         let both = |(view, y): &(View<f32>, f32)| {
-                            sides(threshold, &plan.profile, view, *y, case.ego_width as f32)
+                            sides(
+                                threshold,
+                                plan.blocks[block].category,
+                                &plan.profile,
+                                view,
+                                *y,
+                                case.ego_width as f32,
+                            )
                         };
                         first_step(&plan, block, &case, headway).iter().map(both).collect::<Option<Vec<_>>>()
                     });

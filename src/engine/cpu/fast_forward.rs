@@ -56,6 +56,9 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
         let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
         return (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps: state.gaps });
     }
+    if simulation.model.keeps_braking(&state.driver).holds() {
+        return None;
+    }
     // A model that does not see its acceleration does not keep the previous speed.
     if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
         return None;

@@ -142,9 +142,9 @@ pub struct Recipe {
     pub attention: [AttentionRule<f32>; MODELS],
 }
 
-const _: () = assert!(size_of::<AttentionRule<f32>>() == 20);
+const _: () = assert!(size_of::<AttentionRule<f32>>() == 16);
 const _: () = assert!(size_of::<ReducedColumns>() == 36);
-const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 20 * MODELS);
+const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 16 * MODELS);
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Recipe {}

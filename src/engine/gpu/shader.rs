@@ -65,6 +65,9 @@ macro_rules! declare_shaders {
 }
 for_every_driver_model!(declare_shaders);
 
+/// What holds of a model whose shader does not say otherwise, as in its trait.
+const NO_LATCH: &str = "fn keeps_braking(state: DriverState) -> bool { return false; }\n";
+
 /// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
 pub fn assemble(model: ModelId) -> String {
     let (_, driver) = driver_shader(model);
@@ -72,6 +75,9 @@ pub fn assemble(model: ModelId) -> String {
     for text in SHARED.iter().map(|(_, text)| *text).chain([driver]) {
         source.push_str(text);
         source.push('\n');
+    }
+    if !driver.contains("fn keeps_braking(") {
+        source.push_str(NO_LATCH);
     }
     source
 }

@@ -158,9 +158,11 @@ impl ThresholdCases {
                     s.v_ego = s.v_other - rounded(draw.between(0.5, 1.9));
                 }
                 let dv = s.v_ego - s.v_other;
-                let ttc =
-                    if on == Threshold::Reg157Ttc { constants.reg157.ttc_threshold(dv) } else { self.cchdm_ttc() };
-                signed(draw, dv.abs() * ttc)
+                if on == Threshold::Reg157Ttc {
+                    signed(draw, dv.abs() * constants.reg157.ttc_threshold(dv))
+                } else {
+                    signed(draw, constants.cchdm.danger_gap(s.v_ego, dv))
+                }
             }
             Threshold::RssLongitudinal => constants.rss.longitudinal_distance(s.v_ego, s.v_other),
             Threshold::PfsSafe => turn(nearest, FAR, |gap| fsm.pfs(s.v_ego, s.v_other, gap) > 0.0)?.1,
@@ -256,7 +258,7 @@ impl ThresholdCases {
                 rounded(self.profile.reg157.lateral_gate_m)
             }
             Threshold::CchdmGate => {
-                s.gap = part * dv * self.cchdm_ttc();
+                s.gap = part * constants.cchdm.danger_gap(s.v_ego, dv);
                 rounded(self.profile.cchdm.lateral_gate_m)
             }
             Threshold::RssLateral => {
@@ -356,10 +358,6 @@ impl ThresholdCases {
             gap += (motion.speed(&self.series.lane_tables, index) - s.v_ego) * dt;
             gap < 0.0
         })
-    }
-
-    fn cchdm_ttc(&self) -> f32 {
-        rounded(self.profile.cchdm.ttc_s)
     }
 
     fn view(&self, s: &FirstStep) -> View<f32> {

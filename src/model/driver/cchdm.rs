@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, Perception, View, delay_bound_s,
+    AttentionRule, BelowTrigger, Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s,
     delay_steps, latched_braking,
 };
 use crate::model::case::Category;
@@ -32,13 +32,16 @@ pub struct CchdmProfile {
     /// Lateral wandering that counts as normal: risk perception begins beyond it, m (Annex 3: 0.375 m);
     /// 0 switches the perception rule off.
     pub wandering_m: f64,
-    /// Risk perception time after the wandering was exceeded, s (Annex 3: 0.4 s).
+    /// Risk perception time after the wandering or the trigger below was exceeded, s (Annex 3: 0.4 s).
     pub perception_time_s: f64,
-    /// Lateral travel that ends the perception early, m (Annex 3: 0.72 m).
-    pub perception_travel_m: f64,
+    /// Cut-out: the danger is a time headway of at most this, s, in place of the TTC (Annex 3: 2.0 s), and the braking
+    /// goes on to standstill; 0 keeps the TTC check.
+    pub cut_out_headway_s: f64,
     /// LVD: perception begins once the leader decelerates more than this, m/s² (Annex 3: 5 m/s²);
     /// 0 switches the rule off.
     pub lead_deceleration_trigger_mps2: f64,
+    /// LVD: what the driver does where the leader never exceeds the trigger.
+    pub lvd_below_threshold: BelowTrigger,
     /// The JRC's cut-in sweep aborts a run at any step with lateral overlap and |TTC| above `ttc_s`.
     pub abort_on_large_ttc: bool,
 }
@@ -49,6 +52,8 @@ pub struct Cchdm<R> {
     always_unsafe: bool,
     lateral_gate: R,
     ttc: R,
+    /// The danger is a headway of at most this, s; 0 where it is a TTC.
+    headway: R,
     coasting: R,
     jerk_per_step: R,
     max_deceleration: R,
@@ -64,6 +69,7 @@ impl DriverProfile for CchdmProfile {
             always_unsafe: self.always_unsafe.contains(&category),
             lateral_gate: R::from_f64(self.lateral_gate_m),
             ttc: R::from_f64(self.ttc_s),
+            headway: R::from_f64(if category == Category::CutOut { self.cut_out_headway_s } else { 0.0 }),
             coasting: R::from_f64(self.coasting_mps2),
             jerk_per_step: R::from_f64(self.jerk_mps3 * dt_s),
             max_deceleration: R::from_f64(self.max_deceleration_mps2),
@@ -81,7 +87,7 @@ impl DriverProfile for CchdmProfile {
             ("coasting_mps2", self.coasting_mps2, Bound::ACCELERATION),
             ("wandering_m", self.wandering_m, Bound::DISTANCE),
             ("perception_time_s", self.perception_time_s, Bound::DELAY),
-            ("perception_travel_m", self.perception_travel_m, Bound::DISTANCE),
+            ("cut_out_headway_s", self.cut_out_headway_s, Bound::DELAY),
             ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::ACCELERATION),
             ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
         ]
@@ -92,19 +98,27 @@ impl DriverProfile for CchdmProfile {
     }
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
-        let perception = Perception {
-            wandering_m: self.wandering_m,
-            time_s: self.perception_time_s,
-            travel_m: self.perception_travel_m,
-        };
+        let (wandering_m, perception_s) = (self.wandering_m, self.perception_time_s);
         match category {
-            Category::Lvd => AttentionRule::after_deceleration(self.lead_deceleration_trigger_mps2, dt_s),
-            Category::CutIn | Category::CutOut => AttentionRule::after_wandering(perception, dt_s, category),
+            Category::CutIn => AttentionRule::cutting_in(wandering_m, perception_s, dt_s),
+            Category::CutOut => AttentionRule::cutting_out(wandering_m, perception_s, dt_s),
+            Category::Lvd => {
+                let (trigger_mps2, below) = (self.lead_deceleration_trigger_mps2, self.lvd_below_threshold);
+                AttentionRule::after_deceleration(trigger_mps2, perception_s, below, dt_s)
+            }
         }
     }
 
     fn abort_above_ttc_s(&self) -> f64 {
         if self.abort_on_large_ttc { self.ttc_s } else { 0.0 }
+    }
+}
+
+impl<R: Real> Cchdm<R> {
+    /// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
+    #[inline(always)]
+    pub fn danger_gap(&self, v_ego: R, dv: R) -> R {
+        if self.headway > R::ZERO { self.headway * v_ego } else { self.ttc * dv.abs() }
     }
 }
 
@@ -114,7 +128,7 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
 
     #[inline(always)]
     fn safe_gap(&self, v_ego: R, v_other: R) -> R {
-        if self.always_unsafe { R::INFINITY } else { self.ttc * (v_ego - v_other).abs() }
+        if self.always_unsafe { R::INFINITY } else { self.danger_gap(v_ego, v_ego - v_other) }
     }
 
     #[inline(always)]
@@ -129,15 +143,24 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
     }
 
     /// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver goes on braking below the other's
-    /// speed until the opening gap exceeds 2 s of |dv|.
+    /// speed until the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
         let near = view.lateral_gap.is_at_most(self.lateral_gate);
         let moves = dv.is_negative() | dv.is_positive();
-        let soon = moves & view.gap.abs().is_at_most(self.ttc * dv.abs());
+        let danger_gap = self.danger_gap(view.v_ego, dv);
+        let soon = moves & view.gap.abs().is_at_most(danger_gap);
+        let soon = if self.headway > R::ZERO { view.gap.is_at_most(danger_gap) } else { soon };
         let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
         Hazard { is_unsafe, demand: self.max_deceleration }
+    }
+
+    #[inline(always)]
+    fn keeps_braking(&self, state: &DriverState<R>) -> Flag {
+        let has_begun =
+            Flag::of(state.delay_steps != self.delay_steps) | state.deceleration.is_above(self.coasting);
+        Flag::of(self.headway > R::ZERO) & has_begun
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {
@@ -145,6 +168,7 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
             ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
             ("driver_lateral_gate", self.lateral_gate.to_f64()),
             ("driver_ttc", self.ttc.to_f64()),
+            ("driver_headway", self.headway.to_f64()),
             ("driver_coasting", self.coasting.to_f64()),
             ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
             ("driver_max_deceleration", self.max_deceleration.to_f64()),

@@ -14,7 +14,9 @@ mod registry;
 mod attention;
 mod profile;
 
-pub use attention::{ALWAYS, AttentionRule, DECELERATION, NEVER, Perception, VISIBLE_MOVEMENT, WANDERING};
+pub use attention::{
+    ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, NEVER, VISIBLE_MOVEMENT,
+};
 pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
 
 use crate::model::flag::Flag;
@@ -180,6 +182,11 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
     fn check(&self, view: &View<R>) -> Hazard<R>;
+    /// Whether a reaction that has begun goes on to standstill, whatever the check says.
+    #[inline(always)]
+    fn keeps_braking(&self, _state: &DriverState<R>) -> Flag {
+        Flag::FALSE
+    }
     /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.
     fn shader_constants(&self) -> Vec<(&'static str, f64)>;
     /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0 and not above `v_ego`.

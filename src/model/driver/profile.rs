@@ -41,6 +41,8 @@ impl Bound {
     pub const DISTANCE: Bound = Bound::new("m", 0.001, 100.0).or_zero();
     /// A distance with a sign, m.
     pub const SIGNED_DISTANCE: Bound = Bound { has_negative: true, ..Bound::DISTANCE };
+    /// A number of time steps that may be none.
+    pub const STEPS: Bound = Bound::new("steps", 1.0, 1000.0).or_zero();
     /// A ratio.
     pub const RATIO: Bound = Bound::new("", 0.001, 1000.0);
 

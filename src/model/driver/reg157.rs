@@ -26,6 +26,9 @@ pub struct Reg157Profile {
     /// Added to the threshold, s. Not in the regulation; the public simulators have 0.1 s, and without
     /// it the model collides in 80–100 % of LVD runs, which the paper's table rules out.
     pub margin_s: f64,
+    /// Added as well, time steps; the reaction time then counts as rounded up to whole steps, as the driver makes
+    /// it. The regulation's threshold is exactly what the braking needs: without a step more, rounding decides contacts.
+    pub margin_steps: f64,
     /// Time for which the lateral movement must have been visible before the model may react to a
     /// vehicle that starts outside the gate, s (R157: 0.72 s; 0 switches the rule off).
     pub visible_lateral_movement_s: f64,
@@ -55,7 +58,7 @@ impl DriverProfile for Reg157Profile {
             always_unsafe: self.always_unsafe.contains(&category),
             lateral_gate: R::from_f64(self.lateral_gate_m),
             half_inverse_deceleration: R::from_f64(1.0 / (2.0 * self.deceleration_mps2)),
-            constant: R::from_f64(self.reaction_time_s + self.margin_s),
+            constant: R::from_f64(self.reaction_and_margin_s(dt_s)),
             deceleration: R::from_f64(self.deceleration_mps2),
             delay_steps: delay_steps(self.reaction_time_s, dt_s),
             dt: R::from_f64(dt_s),
@@ -67,6 +70,7 @@ impl DriverProfile for Reg157Profile {
             ("deceleration_mps2", self.deceleration_mps2, Bound::DECELERATION),
             ("reaction_time_s", self.reaction_time_s, Bound::DELAY),
             ("margin_s", self.margin_s, Bound::DELAY),
+            ("margin_steps", self.margin_steps, Bound::STEPS),
             ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::DELAY),
             ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
         ]
@@ -77,7 +81,7 @@ impl DriverProfile for Reg157Profile {
         let steps = f64::from(delay_steps(self.reaction_time_s, dt_s));
         let late_s = steps * dt_s - self.reaction_time_s + dt_s / 2.0;
         let longest_s = self.margin_s.max(SHORT_STEP_S);
-        // A margin below half a step is for something else, such as 0 for the regulation's text.
+        // A margin below half a step is for something else, such as 0 for the regulation's text; whole steps suffice.
         let is_late = dt_s <= longest_s && self.margin_s >= dt_s / 2.0 && late_s > self.margin_s + 1e-9;
         let margin_bound_s = if is_late { rounded_down_s(self.reaction_time_s / steps) } else { longest_s };
         vec![
@@ -89,6 +93,17 @@ impl DriverProfile for Reg157Profile {
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
         AttentionRule::after_visible_movement(self.visible_lateral_movement_s, self.lateral_gate_m, dt_s, category)
+    }
+}
+
+impl Reg157Profile {
+    /// What the threshold adds to the time of braking, s: reaction time and margins.
+    pub fn reaction_and_margin_s(&self, dt_s: f64) -> f64 {
+        if self.margin_steps == 0.0 {
+            return self.reaction_time_s + self.margin_s;
+        }
+        let steps = f64::from(delay_steps(self.reaction_time_s, dt_s)) + self.margin_steps;
+        steps * dt_s + self.margin_s
     }
 }
 
