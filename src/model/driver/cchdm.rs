@@ -158,8 +158,7 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
 
     #[inline(always)]
     fn keeps_braking(&self, state: &DriverState<R>) -> Flag {
-        let has_begun =
-            Flag::of(state.delay_steps != self.delay_steps) | state.deceleration.is_above(self.coasting);
+        let has_begun = Flag::of(state.delay_steps != self.delay_steps) | state.deceleration.is_above(self.coasting);
         Flag::of(self.headway > R::ZERO) & has_begun
     }
 
