@@ -1,4 +1,5 @@
-// Entry point: bindings, and the lanes of an invocation. All other functions are pure.
+// Entry point: bindings, and the lanes of an invocation. Other functions read their arguments, constants
+// and the launch only; those of shared/reduction.wgsl also write results.
 //
 // Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion. Their numbers of
 // steps differ by far: an invocation whose lane has ended takes the next one of its workgroup, so that a warp does not

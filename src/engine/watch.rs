@@ -81,8 +81,7 @@ impl Watch {
         let valued = tasks.flat_map_iter(|(task, lanes)| {
             let lanes = lanes.iter_mut().zip(first_lane + (task * TASK) as u64..);
             lanes.filter_map(|(verdicts, lane)| {
-                // The model is the innermost part of a lane's index.
-                let model = plan.models[(lane % plan.models.len() as u64) as usize];
+                let model = plan.models[plan.model_of(lane)];
                 if !self.marks(model, *verdicts) {
                     return None;
                 }
@@ -163,7 +162,7 @@ mod tests {
             }
             let mut meant = 0;
             for (outcome, lane) in every_value.outcomes.iter().zip(0_u64..) {
-                let model = plan.models[(lane % plan.models.len() as u64) as usize];
+                let model = plan.models[plan.model_of(lane)];
                 if watch.means(model, outcome) {
                     meant += 1;
                     assert!(valued.binary_search_by_key(&lane, |(lane, _)| *lane).is_ok(), "{marks:?}, lane {lane}");

@@ -8,7 +8,7 @@ use crate::{Error, Place, Result};
 /// Default lateral distance of a lane change, m.
 pub const LATERAL_DISTANCE_M: f64 = 3.5;
 
-/// The numbers; speeds in m/s, lengths in m. What a category does not have is not looked at.
+/// The numbers; speeds in m/s, lengths in m. Fields that a category does not have are ignored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlainCase {
     /// Kind of scenario.

@@ -94,7 +94,7 @@ impl RadarChart {
     }
 }
 
-/// One score per spoke; whatever is no number in 0..=1 is undefined.
+/// One score per spoke, undefined unless it lies in 0..=1.
 fn scores(series: &RadarSeries, spokes: usize) -> Vec<Option<f64>> {
     let score = |i: usize| series.values.get(i).copied().flatten().filter(|v| (0.0..=1.0).contains(v));
     (0..spokes).map(score).collect()

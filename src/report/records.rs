@@ -27,7 +27,7 @@ const TEXTS: &[&str] = &[
 /// not have (infinite) is null as well. The column `data` is left out: a document says once what it is about.
 ///
 /// # Errors
-/// [`Error::Internal`] for what is no table with a header.
+/// [`Error::Internal`] where the bytes are not a table with a header.
 pub(super) fn records(csv: &[u8]) -> Result<Value> {
     let broken = |e: csv::Error| Error::Internal(format!("a table cannot be read again: {e}"));
     let mut reader = csv::Reader::from_reader(csv);

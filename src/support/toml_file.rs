@@ -58,7 +58,7 @@ fn meant(message: &str) -> Option<&str> {
 /// The settings in a regular file.
 ///
 /// # Errors
-/// As [`parse`]; [`Error::Io`]; [`Error::Input`] for what is no text file of a few megabytes at most.
+/// As [`parse`]; [`Error::Io`]; [`Error::Input`] where it is not a text file, or larger than a few megabytes.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
     parse(&input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }

@@ -23,7 +23,7 @@ pub(super) struct Line {
 ///
 /// # Errors
 /// [`Error::Usage`] with the line: what is not TOML, an unknown table or key, a value that the key does not take.
-/// [`Error::Io`]; [`Error::Input`] for what is no text file of a few megabytes at most.
+/// [`Error::Io`]; [`Error::Input`] where it is not a text file, or larger than a few megabytes.
 pub(super) fn read(path: &Path, keys: &[Key]) -> Result<Vec<Line>> {
     parse(&input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?, &Place::file(path), keys)
 }

@@ -179,7 +179,7 @@ mod tests {
         let faster = LaneState { v_ego: 25.0, ..state };
         let near = (steps(&lane, &nearer, &place), steps(&lane, &faster, &place));
         assert!(near.0 > 10 && near.0 < 250 && near.1 > 100 && near.1 < 500, "{near:?}");
-        // A model whose distance is no number promises nothing.
+        // A model promises nothing where its distance is NaN.
         let mut profile = Profile::load("paper").unwrap().fsm;
         profile.comfortable_deceleration_mps2 = 0.0;
         let model = &profile.resolve::<f32>(0.04, Category::Lvd);

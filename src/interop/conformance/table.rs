@@ -131,7 +131,7 @@ impl<'a> Row<'a> {
         }
         text.parse()
             .map(Some)
-            .map_err(|_| Error::input(self.place(column), format!("`{text}` is no number"), "expected a number"))
+            .map_err(|_| Error::input(self.place(column), format!("`{text}` is not a number"), "expected a number"))
     }
 
     /// A flag written as 0 or 1.

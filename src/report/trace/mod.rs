@@ -113,7 +113,7 @@ impl TraceFigure<'_> {
     fn notes(&self, shown: &Shown, columns: &[Column]) -> Vec<String> {
         let mut notes = Vec::new();
         if shown.has_unjudged() {
-            notes.push("Thin in gap, TTC, BTN: not looked at by the criteria.".to_owned());
+            notes.push("Thin in gap, TTC, BTN: the criteria ignore it.".to_owned());
         }
         let is_cut = |panel: &Panel| {
             let Ends::Exactly(_, top) = panel.plot.y.ends else { return false };

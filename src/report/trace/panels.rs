@@ -24,7 +24,7 @@ const BTN_SHOWN: f64 = 2.5;
 /// A run of points, (time in s, value), without a gap.
 #[derive(Debug, Clone, PartialEq)]
 struct Curve {
-    /// Of another vehicle in a panel of the ego, or not looked at by the criteria.
+    /// Of another vehicle in a panel of the ego, or ignored by the criteria.
     is_thin: bool,
     look: Look,
     points: Vec<(f64, f64)>,

@@ -31,7 +31,7 @@ impl GridAxis {
         let parameter = MapParameter::find(category, key.trim(), flag)?;
         let number = |part: &str| {
             let value = part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-            value.ok_or_else(|| wrong(format!("`{}` in `{text}` is no number", part.trim()), FORM))
+            value.ok_or_else(|| wrong(format!("`{}` in `{text}` is not a number", part.trim()), FORM))
         };
         let values = match values.split_once("..") {
             None => values.split(',').map(number).collect::<Result<Vec<_>>>()?,

@@ -34,7 +34,7 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
             continue;
         }
         match Shard::of_stem(stem) {
-            Some(shard) if (1..=Shard::MOST).contains(&shard.of) && shard.index < shard.of => {
+            Some(shard) if (1..=Shard::MAX_SHARDS).contains(&shard.of) && shard.index < shard.of => {
                 parts.push((shard, path));
             }
             _ => {

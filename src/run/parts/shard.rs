@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct Shard {
     /// From 0, below [`Shard::of`].
     pub index: u64,
-    /// Number of shards, 1 to [`Shard::MOST`].
+    /// Number of shards, 1 to [`Shard::MAX_SHARDS`].
     pub of: u64,
 }
 
@@ -19,7 +19,7 @@ const SLURM: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN"];
 
 impl Shard {
     /// More parts than any cluster runs at once.
-    pub const MOST: u64 = 100_000;
+    pub const MAX_SHARDS: u64 = 100_000;
 
     /// The units that this shard computes, of so many.
     pub fn units(&self, count: u64) -> Range<u64> {
@@ -50,8 +50,8 @@ impl Shard {
         let number = |text: &str| text.trim().parse::<u64>().map_err(|_| form.to_owned());
         let of = number(of)?;
         let index = if index.trim() == "auto" { from_environment(environment)? } else { number(index)? };
-        if of == 0 || of > Self::MOST {
-            return Err(format!("there can be 1 to {} shards", Self::MOST));
+        if of == 0 || of > Self::MAX_SHARDS {
+            return Err(format!("there can be 1 to {} shards", Self::MAX_SHARDS));
         }
         if index >= of {
             return Err(format!("there is no shard {index} of {of}: they count from 0 to {}", of - 1));

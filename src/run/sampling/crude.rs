@@ -131,11 +131,13 @@ pub fn sample_into(
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
             for piece in watch::pieces(missing, range.start) {
-                let wanted = match ledger.counts(range.start..piece.start)? {
-                    _ if every_value => Wanted::Outcomes,
-                    None if counting.worst > 0 => Wanted::Outcomes,
-                    None => Wanted::Verdicts,
-                    Some(known) => watch::wanted(plan, &known, counting),
+                let wanted = match (every_value, counting.worst) {
+                    (true, _) => Wanted::Outcomes,
+                    (false, 0) => Wanted::Verdicts,
+                    (false, _) => {
+                        let known = ledger.counts(range.start..piece.start)?;
+                        known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, counting))
+                    }
                 };
                 let part = executor.sweep(plan, piece, wanted, |chunk| {
                     each(&chunk)?;

@@ -9,7 +9,7 @@ const FAR: f64 = 1e3;
 /// No demand counts for more: an infinite Brake Threat Number says only that no braking helps.
 pub(super) const MAX_BTN: f64 = 10.0;
 /// Values that rounding would put on the wrong side stand this close to the limit.
-const LEAST: f64 = 1e-12;
+const MIN_UNFAILED: f64 = 1e-12;
 
 /// Limit state of a lane. The verdict decides the sign, as the lane itself decides it.
 ///
@@ -31,5 +31,5 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
         Criterion::Ttc => ttc - profile.criteria.ttc_threshold_s,
         Criterion::Btn => profile.criteria.btn_threshold - outcome.max_btn.min(MAX_BTN),
     };
-    if failed { value.min(0.0) } else { value.max(LEAST) }
+    if failed { value.min(0.0) } else { value.max(MIN_UNFAILED) }
 }

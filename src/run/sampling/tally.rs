@@ -116,8 +116,7 @@ impl SampleTally {
         if options.worst > 0 {
             for (lane, outcome) in chunk.valued.iter().flatten() {
                 let value = limit_state(&plan.profile, options.criterion, outcome);
-                // The model is the innermost part of a lane's index.
-                tally.offer((lane % plan.models.len() as u64) as usize, WorstSample { value, lane: *lane });
+                tally.offer(plan.model_of(*lane), WorstSample { value, lane: *lane });
             }
         }
         tally.covered = vec![units];

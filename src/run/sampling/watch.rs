@@ -24,11 +24,8 @@ pub(super) fn pieces(range: Range<u64>, first: u64) -> impl Iterator<Item = Rang
 }
 
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
-/// values. The lanes of `tally` have smaller indices.
+/// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
 pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions) -> Wanted {
-    if options.worst == 0 {
-        return Wanted::Verdicts;
-    }
     let mut marks = [Marks::Nothing; MODELS];
     let mut share = 0.0;
     for (at, model) in plan.models.iter().enumerate() {

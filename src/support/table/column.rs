@@ -48,7 +48,7 @@ pub struct Column {
     pub name: Cow<'static, str>,
     /// Type.
     pub kind: ColumnKind,
-    /// Unit: `m`, `m/s`, `s`, …; `1` for numbers without one; empty for what is no number.
+    /// Unit: `m`, `m/s`, `s`, …; `1` for numbers without one; empty for columns that are not numbers.
     pub unit: Cow<'static, str>,
     /// One sentence, with when a field is empty.
     pub description: Cow<'static, str>,

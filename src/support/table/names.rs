@@ -7,7 +7,7 @@ use crate::support::near_name;
 pub(crate) struct Named {
     /// Its name, without a unit.
     pub name: String,
-    /// Its unit; empty for what is no number, `1` for a number without one.
+    /// Its unit; empty for fields that are not numbers, `1` for a number without one.
     pub unit: &'static str,
 }
 
@@ -67,7 +67,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
         }
         let suffix = SUFFIXES.iter().find(|(_, unit)| *unit == field.unit).map_or("", |(suffix, _)| suffix);
         let wanted = match field.unit {
-            "" => format!("`{}` is no number and has no unit", field.name),
+            "" => format!("`{}` is not a number and has no unit", field.name),
             "m/s" => format!("convert it and call it `{0}_mps` (m/s) or `{0}_kmh` (km/h)", field.name),
             unit => format!("convert it to {unit} and call it `{}_{suffix}`", field.name),
         };

@@ -226,12 +226,12 @@ impl MiningOptions {
             )
         };
         for (name, value) in positive {
-            if !(value > 0.0 && value <= LARGEST) {
+            if !(value > 0.0 && value <= MAX_SETTING) {
                 return Err(refused(name, value, "above 0 and at most 1e6"));
             }
         }
         for (name, value) in at_least_zero {
-            if !(0.0..=LARGEST).contains(&value) {
+            if !(0.0..=MAX_SETTING).contains(&value) {
                 return Err(refused(name, value, "at least 0 and at most 1e6"));
             }
         }
@@ -240,7 +240,7 @@ impl MiningOptions {
 }
 
 /// Maximum of all options: larger values have no meaning in traffic, and their number of samples would overflow.
-const LARGEST: f64 = 1e6;
+const MAX_SETTING: f64 = 1e6;
 
 /// Positions (m), filter values and times (s) within this distance of a limit count as equal to it.
 pub(super) const TOLERANCE: f64 = LIMIT_TOLERANCE_M;
