@@ -484,7 +484,7 @@ fn what_makes_no_map_is_answered_with_what_would() {
         (&[&["--x", "gap_m=1..60"], &y, &set], "has no step"),
         (&[&["--x", "gap_m=1..sixty/1"], &y, &set], "`sixty`"),
         (&[&["--x", "gap_m=3,2"], &y, &set], "rising order"),
-        (&[&["--x", "gap_m=nan"], &y, &set], "no number"),
+        (&[&["--x", "gap_m=nan"], &y, &set], "not a number"),
         (&[&["--x", "gap=1..60/1"], &y, &set], "did you mean `gap_m`?"),
         (&[&["--x", "ahead_gap_m=1..60/1"], &y, &set], "a cut-in has no parameter"),
         (&[&["--x", "gap_m=1..60/0.00001"], &y, &set], "longer step"),
