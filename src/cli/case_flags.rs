@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, CaseParameters, Category, ParameterRows, at_least};
+use crate::scenario::{Case, CaseParameters, Category, ParameterRows, PlainCase, at_least};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::support::table::{TableFormat, TableReader};
 use crate::support::toml_file;
@@ -25,10 +25,10 @@ pub(super) struct CaseFlags {
     #[serde(alias = "model")]
     models: Option<String>,
     /// Initial speed of the ego
-    #[arg(long, value_name = "m/s")]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     ego_speed: Option<f64>,
     /// Initial speed of the other vehicle [default: the ego's]
-    #[arg(long, value_name = "m/s")]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     speed: Option<f64>,
     /// Initial gap, bumper to bumper
     #[arg(long, value_name = "m", conflicts_with = "thw")]
@@ -37,7 +37,7 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "s")]
     thw: Option<f64>,
     /// Cut-in, cut-out: lateral speed
-    #[arg(long, value_name = "m/s")]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     lateral_speed: Option<f64>,
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
     #[arg(long, value_name = "m")]
@@ -46,10 +46,10 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m/s²")]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends [default: standstill, or never]
-    #[arg(long, value_name = "m/s")]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     end_speed: Option<f64>,
     /// Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
-    #[arg(long, value_name = "m/s")]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     ahead_speed: Option<f64>,
     /// Cut-out: gap between the two, bumper to bumper
     #[arg(long, value_name = "m")]
@@ -97,6 +97,16 @@ impl CaseFlags {
         CaseFlags { models: None, ..self.clone() } != CaseFlags::default()
     }
 
+    /// Does it say where the ego starts?
+    pub(super) fn says_a_start(&self) -> bool {
+        self.gap.is_some() || self.thw.is_some()
+    }
+
+    /// Does it say anything of the case beside that?
+    pub(super) fn says_more_than_a_start(&self) -> bool {
+        CaseFlags { gap: None, thw: None, ..self.clone() }.says_a_case()
+    }
+
     /// The models that are named; `None` where none is.
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
         self.models.as_ref().map(|_| self.models()).transpose()
@@ -137,6 +147,11 @@ impl CaseFlags {
 
     /// The case; what is doubtful of it is told.
     pub(super) fn case(&self, profile: &Profile, implausible: Implausible) -> Result<Case> {
+        self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s)
+    }
+
+    /// Its numbers; what is doubtful of them is told.
+    pub(super) fn plain_case(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
         let (frame, mut doubts) = (&profile.frame, Doubts::new(implausible));
         let mut parameters = self.parameters();
         parameters.settle(&mut doubts, str::to_owned);
@@ -158,7 +173,7 @@ impl CaseFlags {
             Error::usage(Place::item("acceleration"), problem, help)
         })?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        plain.case(frame.time_cap_s)
+        Ok(plain)
     }
 
     fn parameters(&self) -> CaseParameters {
@@ -176,6 +191,24 @@ impl CaseFlags {
             width: self.width,
         }
     }
+}
+
+/// Units of a speed, and how many of each are 1 m/s.
+const SPEED_UNITS: [(&str, f64); 6] =
+    [("km/h", 3.6), ("kmh", 3.6), ("kph", 3.6), ("mph", 1.0 / 0.44704), ("m/s", 1.0), ("mps", 1.0)];
+
+/// A speed in m/s, from a number (m/s) or a number with its unit: `16.7`, `60km/h`, `37 mph`.
+///
+/// # Errors
+/// What to write, for a text that is none.
+fn speed_mps(text: &str) -> std::result::Result<f64, String> {
+    let text = text.trim();
+    let (number, per_mps) = SPEED_UNITS
+        .iter()
+        .find_map(|(unit, per_mps)| Some((text.strip_suffix(unit)?, *per_mps)))
+        .unwrap_or((text, 1.0));
+    let value = number.trim_end().parse::<f64>().ok().filter(|value| value.is_finite());
+    value.map(|value| value / per_mps).ok_or_else(|| "write a speed such as 16.7, 60km/h or 37mph".to_owned())
 }
 
 /// The flags that a TOML file holds.

@@ -10,6 +10,8 @@ use crate::Error;
 pub enum Exit {
     /// Everything was done.
     Ok = 0,
+    /// The case that was checked is not preventable; the sheet was written.
+    NotPreventable = 1,
     /// A flag, a key or a profile cannot be used; nothing was done.
     Usage = 2,
     /// The data cannot be used; nothing was written.
@@ -30,8 +32,9 @@ pub enum Exit {
 
 impl Exit {
     /// All, for documentation.
-    pub const ALL: [Exit; 9] = [
+    pub const ALL: [Exit; 10] = [
         Exit::Ok,
+        Exit::NotPreventable,
         Exit::Usage,
         Exit::BadInput,
         Exit::Incomplete,
@@ -51,6 +54,7 @@ impl Exit {
     pub fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => "done",
+            Exit::NotPreventable => "the checked case is not preventable (check)",
             Exit::Usage => "invalid flag, key or profile; nothing was done",
             Exit::BadInput => "invalid data; nothing was written",
             Exit::Incomplete => "a result was written, but parts of the input were left out",

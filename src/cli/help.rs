@@ -7,7 +7,7 @@ use clap::{Arg, ArgAction, Command};
 const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["study", "mine", "compare"]),
     ("Probabilities", &["fit", "sample"]),
-    ("Single cases and grids", &["simulate", "map", "export"]),
+    ("Single cases and grids", &["check", "simulate", "map", "export"]),
     ("More machines", &["cluster"]),
     ("Tools", &["verify", "config", "synth"]),
 ];
@@ -35,6 +35,7 @@ const FLAGS: [Group; 5] = [
             "case_file",
             "table",
             "row",
+            "scenario",
             "hours",
             "km",
             "proposal",
@@ -83,7 +84,17 @@ const FLAGS: [Group; 5] = [
     ),
     (
         "Models and criteria",
-        &["models", "criterion", "against", "profile", "estimator", "samples", "half_width", "random_lanes"],
+        &[
+            "models",
+            "criterion",
+            "against",
+            "profile",
+            "profiles",
+            "estimator",
+            "samples",
+            "half_width",
+            "random_lanes",
+        ],
         &[
             "dt",
             "points",
@@ -105,7 +116,11 @@ const FLAGS: [Group; 5] = [
             "threshold_units",
         ],
     ),
-    ("Output", &["out", "rows", "map", "worst", "plot", "format", "changed", "scripts"], &["plot_end", "keep_plan"]),
+    (
+        "Output",
+        &["out", "rows", "map", "worst", "plot", "sheet", "series", "format", "changed", "scripts"],
+        &["plot_end", "keep_plan"],
+    ),
     (
         "Run",
         &[
@@ -139,8 +154,12 @@ const OFTEN: [(&str, &[&str]); 4] = [
 ];
 
 /// Flags that this verb uses seldom.
-const SELDOM: [(&str, &[&str]); 3] =
-    [("sample", &["category", "worst"]), ("simulate", &["ahead_speed"]), ("xosc", &["ahead_speed", "variant"])];
+const SELDOM: [(&str, &[&str]); 4] = [
+    ("sample", &["category", "worst"]),
+    ("simulate", &["ahead_speed"]),
+    ("check", &["ahead_speed"]),
+    ("xosc", &["ahead_speed", "variant"]),
+];
 
 /// The command with its help laid out.
 pub(super) fn laid_out(command: Command) -> Command {

@@ -3,6 +3,7 @@
 
 mod backend_flags;
 mod case_flags;
+mod check;
 mod cluster;
 mod compare;
 mod config;
@@ -109,6 +110,7 @@ enum Verb {
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
+    Check(check::Check),
     Export(export::Export),
     Cluster(cluster::Cluster),
     Verify(Box<verify::Verify>),
@@ -208,6 +210,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(cli.common.verbosity()),
+        Verb::Check(verb) => verb.run(cli.common.verbosity()),
         Verb::Export(verb) => verb.run(),
         Verb::Cluster(verb) => verb.run(),
         Verb::Slurm(verb) => verb.run(),

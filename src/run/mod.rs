@@ -1,9 +1,10 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
-//! one another, [`grid`] sweeps maps.
+//! one another, [`grid`] sweeps maps, [`check`] judges single cases.
 //! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
 
+pub mod check;
 pub mod compare;
 pub mod grid;
 pub mod parts;

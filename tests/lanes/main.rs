@@ -5,6 +5,7 @@ mod common;
 
 mod conformance;
 mod domain_claims;
+mod hand_calculated;
 mod partial;
 mod sampled_lanes;
 mod score;

@@ -99,6 +99,8 @@ fn every_example_of_the_help_runs() {
                 let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name);
                 std::fs::copy(shipped, dir.join(name)).unwrap();
             }
+            let case = "category,ego_speed,speed,gap,lateral_speed\n";
+            std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nbootstrap_draws = 100\n").unwrap();
             if verb == "verify conformance" {
                 let Some(tables) = shared("golden/jrc") else { continue };

@@ -5,6 +5,7 @@ mod common;
 
 mod adding_a_model;
 mod book;
+mod check;
 mod command_line;
 mod configuration;
 mod help_examples;

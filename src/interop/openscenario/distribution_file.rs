@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 
 use super::distribution::{Distribution, MAX_POISSON, Range};
+use super::xml_at::At;
 use super::xml_tree::{Node, parse_tree, read_tree};
 use crate::run::grid::{GridAxis, MAX_VALUES};
-use crate::support::near_name;
 use crate::{Error, Place, Result};
 
 /// A file that was read.
@@ -311,137 +311,4 @@ fn distribution(at: At) -> Result<Distribution> {
         return Err(inner.wrong("no value of it is possible", help));
     }
     Ok(found)
-}
-
-/// An element and where it is.
-#[derive(Clone, Copy)]
-struct At<'a> {
-    node: &'a Node,
-    path: &'a Path,
-}
-
-impl<'a> At<'a> {
-    fn wrong(&self, problem: impl Into<String>, help: impl Into<String>) -> Error {
-        let place = Place::file(self.path).row(self.node.line).of(format!("element `{}`", self.node.name));
-        Error::input(place, problem, help)
-    }
-
-    /// What another check found, here.
-    fn because(&self, error: &Error) -> Error {
-        self.wrong(error.to_string(), error.help().unwrap_or_default())
-    }
-
-    fn all(self) -> impl Iterator<Item = At<'a>> {
-        self.node.children.iter().map(move |node| At { node, path: self.path })
-    }
-
-    /// Only these attributes may be there, besides those of namespaces; and no text.
-    fn attributes(&self, known: &[&str]) -> Result<()> {
-        let is_foreign = |key: &str| key == "xmlns" || key.starts_with("xmlns:") || key.starts_with("xsi:");
-        for (key, _) in self.node.attributes.iter().filter(|(key, _)| !is_foreign(key)) {
-            if !known.contains(&key.as_str()) {
-                let help = match known {
-                    [] => "leave it out: the element has no attributes".to_owned(),
-                    list => format!("it has {}{}", list.join(", "), nearest(key, list)),
-                };
-                return Err(self.wrong(format!("there is no attribute `{key}`"), help));
-            }
-        }
-        if !self.node.text.is_empty() {
-            return Err(self.wrong("text stands in it", "leave the text out: values are attributes"));
-        }
-        Ok(())
-    }
-
-    /// Only these elements may be inside.
-    fn children(&self, known: &[&str]) -> Result<()> {
-        match self.node.children.iter().find(|child| !known.contains(&child.name.as_str())) {
-            None => Ok(()),
-            Some(child) => {
-                let inside = format!("inside `{}`", self.node.name);
-                let help = match known {
-                    [] => format!("leave it out: nothing stands {inside}"),
-                    list => format!("{inside} stand {}{}", list.join(", "), nearest(&child.name, list)),
-                };
-                Err(At { node: child, path: self.path }.wrong("this element is not known here", help))
-            }
-        }
-    }
-
-    /// The only element of this name.
-    fn only(self, name: &str) -> Result<At<'a>> {
-        let found: Vec<At> = self.all().filter(|child| child.node.name == name).collect();
-        match found[..] {
-            [one] => Ok(one),
-            _ => Err(self.wrong(format!("it has {} elements `{name}`", found.len()), format!("give one `{name}`"))),
-        }
-    }
-
-    /// The elements of this name, and no others; at least one.
-    fn some(self, name: &str) -> Result<Vec<At<'a>>> {
-        self.children(&[name])?;
-        let found: Vec<At> = self.all().collect();
-        if found.is_empty() {
-            return Err(self.wrong(format!("it has no `{name}`"), format!("give at least one `{name}`")));
-        }
-        Ok(found)
-    }
-
-    /// The only element, of one of these names.
-    fn choice(self, names: &[&str]) -> Result<At<'a>> {
-        if let Some(child) =
-            self.all().find(|c| matches!(c.node.name.as_str(), "UserDefinedDistribution" | "LogNormalDistribution"))
-        {
-            let help = format!("what it means is not told here: write one of {}", names.join(", "));
-            return Err(child.wrong("this kind of distribution is not read", help));
-        }
-        self.children(names)?;
-        let found: Vec<At> = self.all().collect();
-        match found[..] {
-            [one] => Ok(one),
-            _ => Err(self
-                .wrong(format!("it has {} distributions", found.len()), format!("give one of {}", names.join(", ")))),
-        }
-    }
-
-    fn has(&self, name: &str) -> bool {
-        self.node.attributes.iter().any(|(key, _)| key == name)
-    }
-
-    fn text(&self, name: &str) -> Result<&'a str> {
-        let found = self.node.attributes.iter().find(|(key, _)| key == name);
-        let (_, value) = found
-            .ok_or_else(|| self.wrong(format!("the attribute `{name}` is missing"), format!("write {name}=\"…\"")))?;
-        if value.starts_with('$') {
-            let problem = format!("the attribute `{name}` is `{value}`");
-            return Err(self.wrong(problem, "parameters and expressions are not evaluated: write the value itself"));
-        }
-        Ok(value)
-    }
-
-    fn number(&self, name: &str) -> Result<f64> {
-        let text = self.text(name)?;
-        text.trim().parse::<f64>().ok().filter(|value| value.abs() <= 1e15).ok_or_else(|| {
-            let problem = format!("the attribute `{name}` is `{text}`");
-            self.wrong(problem, "write a number: every parameter of lanesweep is one")
-        })
-    }
-
-    /// `lowerLimit` to `upperLimit`.
-    fn range(&self) -> Result<Range> {
-        self.attributes(&["lowerLimit", "upperLimit"])?;
-        self.children(&[])?;
-        let range = Range { low: self.number("lowerLimit")?, high: self.number("upperLimit")? };
-        if range.low <= range.high {
-            return Ok(range);
-        }
-        let problem = format!("the lower limit {} is above the upper limit {}", range.low, range.high);
-        Err(self.wrong(problem, "give the smaller one as lowerLimit"))
-    }
-}
-
-/// `; did you mean …?` where a name is near one of a list.
-fn nearest(name: &str, list: &[&str]) -> String {
-    near_name::nearest(name, list.iter().copied(), 0.8)
-        .map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }

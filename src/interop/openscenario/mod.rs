@@ -1,7 +1,7 @@
 //! OpenSCENARIO: concrete scenarios out, distributions of parameters in.
 //!
 //! Here live what a played scenario holds ([`Concrete`]), its two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
-//! 1.7), and the reader of `ParameterValueDistribution` files. Here lives nothing about how lanes are chosen or run.
+//! 1.7), and the readers of such a scenario and of `ParameterValueDistribution` files. Here lives nothing about how lanes are chosen or run.
 //! Traces come from [`crate::engine`]; what is read goes to [`crate::run::grid`] and [`crate::engine`].
 
 mod concrete;
@@ -14,8 +14,10 @@ mod path;
 mod road;
 mod samples;
 mod scenario_file;
+mod scenario_reader;
 mod sizes;
 mod variations;
+mod xml_at;
 mod xml_tree;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle};
@@ -29,6 +31,7 @@ pub use path::{Vertex, paths};
 pub use road::{Road, road_file};
 pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
 pub use scenario_file::scenario_file;
+pub use scenario_reader::read_scenario;
 pub use sizes::{KnownSizes, sizes_of_case};
 pub use variations::{Variations, variations};
 

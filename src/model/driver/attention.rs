@@ -27,6 +27,10 @@ pub const DECELERATION: u32 = 4;
 /// Lateral movement per step from which on a vehicle moves, m: more than rounding.
 const MOVEMENT_M: f64 = 1e-9;
 
+/// Share by which a loss of speed exceeds the trigger: more than the rounding of speeds, so that a lead at the trigger does
+/// not exceed it.
+const ROUNDING: f64 = 1e-9;
+
 /// What the driver does where the lead never decelerates more than the trigger: the text of Annex 3 is silent, its charts
 /// contain such leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,7 +102,7 @@ impl AttentionRule<f64> {
             kind: DECELERATION,
             delay_steps: delay_steps(perception_s, dt_s),
             below_trigger: below as u32,
-            threshold: trigger_mps2 * dt_s,
+            threshold: trigger_mps2 * dt_s * (1.0 + ROUNDING),
         }
     }
 
@@ -221,6 +225,13 @@ mod tests {
         }
         let soft = |below| rule(below).attend_from(50, 1.8, |_| 0.0, braking(0.4));
         assert_eq!(soft(BelowTrigger::Never), [NEVER; 2]);
+        // Exactly the trigger, whatever the rounding of the speeds.
+        for dt_s in [0.1, 0.04, 0.01, 0.001] {
+            let rule = AttentionRule::after_deceleration(5.0, 0.4, BelowTrigger::Never, dt_s);
+            for v in [60.0 / 3.6, 20.0, 130.0 / 3.6] {
+                assert_eq!(rule.attend_from(50, 1.8, |_| 0.0, |i| v - f64::from(i) * (5.0 * dt_s)), [NEVER; 2]);
+            }
+        }
         assert_eq!(soft(BelowTrigger::DelayOnly), [3; 2]);
         assert_eq!(soft(BelowTrigger::AtOnce), [0; 2]);
         assert_eq!(rule(BelowTrigger::DelayOnly).attend_from(50, 1.8, |_| 0.0, |_| 20.0), [NEVER; 2]);

@@ -247,6 +247,13 @@ impl Point {
         self.0[parameter.quantity as usize] = Some(parameter.si(value));
     }
 
+    /// The same with another value of a quantity, in SI units.
+    #[must_use]
+    pub fn with(mut self, quantity: MapQuantity, si: f64) -> Point {
+        self.0[quantity as usize] = Some(si);
+        self
+    }
+
     /// The value of a quantity, where it has one.
     pub fn get(&self, quantity: MapQuantity) -> Option<f64> {
         self.0[quantity as usize]

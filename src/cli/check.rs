@@ -1,0 +1,202 @@
+//! `lanesweep check`: one concrete case against the regulation.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::Exit;
+use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::console::Verbosity;
+use super::format::FormatFlag;
+use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use crate::interop::cluster::quoted_word;
+use crate::interop::openscenario::read_scenario;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::report::case_sheet::CaseSheet;
+use crate::report::trace;
+use crate::run::check::{Check as Checked, Subject};
+use crate::scenario::Scenario;
+use crate::support::files::{make_folder, write_atomically};
+use crate::{Error, Place, Result};
+
+/// Profiles unless told otherwise; the first one decides.
+const PROFILES: [&str; 4] = ["un-r157", "jrc-2021", "paper", "paper-fit"];
+
+/// Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
+///
+/// The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns; flags
+/// win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under every profile.
+/// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. The
+/// sheet says so first, then by what margin, what the clauses say, and how far the case lies from the boundary along
+/// each of its numbers. Exit status: 0 preventable, 1 not preventable.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "Examples:\n  \
+                  lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
+                  --sheet case.html\n  \
+                  lanesweep check cases.csv --row 2\n  \
+                  lanesweep check scenarios.jsonl --scenario 01_cut_in_24_22_1 --thw 1.2")]
+pub struct Check {
+    /// TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// Row of a table, from 1 after the header
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    row: usize,
+    /// Scenario of a scenario file, by its id
+    ///
+    /// It starts with its observed gap, or with --gap or --thw.
+    #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row")]
+    scenario: Option<String>,
+    #[command(flatten)]
+    case: CaseFlags,
+    /// Profiles; the first decides [default: un-r157,jrc-2021,paper,paper-fit]
+    #[arg(long, alias = "profile", value_name = "LIST", value_delimiter = ',')]
+    profiles: Vec<String>,
+    /// Also write the sheet as a page to print
+    #[arg(long, value_name = "FILE.html")]
+    sheet: Option<PathBuf>,
+    /// Also write every step of every model under the first profile
+    #[arg(long, value_name = "FILE.csv")]
+    series: Option<PathBuf>,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
+    format: FormatFlag,
+}
+
+/// What is checked, and what a reader should know of it.
+struct Asked {
+    subject: Subject,
+    origin: String,
+    is_synthetic: bool,
+    incomplete: bool,
+}
+
+impl Check {
+    pub fn run(&self, _verbosity: Verbosity) -> Result<Exit> {
+        self.guard_outputs()?;
+        let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
+        let profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
+        let asked = self.asked(&profiles[0])?;
+        let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
+        let check = Checked { subject: asked.subject, profiles, models };
+        let judgements = check.run()?;
+        let sheet = CaseSheet {
+            subject: &check.subject,
+            origin: asked.origin,
+            is_synthetic: asked.is_synthetic,
+            profiles: &check.profiles,
+            judgements: &judgements,
+            command: command(),
+        };
+        if let Some(path) = &self.sheet {
+            write(path, sheet.html()?.as_bytes())?;
+        }
+        if let Some(path) = &self.series {
+            let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
+            write(path, trace::csv(&named.collect::<Vec<_>>()).as_bytes())?;
+        }
+        self.format.print(|| sheet.text(), || sheet.json())?;
+        Ok(match (judgements[0].is_preventable(), asked.incomplete) {
+            (false, _) => Exit::NotPreventable,
+            (true, true) => Exit::Incomplete,
+            (true, false) => Exit::Ok,
+        })
+    }
+
+    fn asked(&self, profile: &Profile) -> Result<Asked> {
+        let Some(path) = &self.file else {
+            return self.of_flags(CaseFlags::default(), profile, "a case of flags".to_owned());
+        };
+        let origin = path.display().to_string();
+        let ending = path.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
+        match (ending.to_str().unwrap_or_default(), &self.scenario) {
+            ("xosc", None) => self.of_scenario(read_scenario(path)?, origin, false),
+            ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
+            ("csv" | "parquet", None) => {
+                self.of_flags(from_table(path, self.row)?, profile, format!("{origin}, row {}", self.row))
+            }
+            ("jsonl" | "csv" | "parquet", Some(id)) => {
+                let (scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
+                let found = scenarios.iter().find(|scenario| scenario.id == *id).cloned();
+                let found = found.ok_or_else(|| unknown(path, id, &scenarios))?;
+                self.of_scenario(found, format!("{id} of {origin}"), incomplete)
+            }
+            ("jsonl", None) => {
+                let help = "name one: --scenario ID";
+                Err(Error::usage(Place::file(path), "a scenario file has many scenarios", help))
+            }
+            (_, Some(_)) => {
+                let help = "give a .jsonl, .csv or .parquet file of scenarios";
+                Err(Error::usage(Place::item("--scenario"), format!("{origin} has no scenarios"), help))
+            }
+            _ => {
+                let help = "give a .toml, .csv, .parquet, .jsonl or .xosc file";
+                Err(Error::usage(Place::file(path), "this kind of file holds no case", help))
+            }
+        }
+    }
+
+    fn of_flags(&self, file: CaseFlags, profile: &Profile, origin: String) -> Result<Asked> {
+        let flags = self.case.over(file);
+        if !flags.says_a_case() {
+            let help = "give a case (--category, --ego-speed, …) or a FILE";
+            return Err(Error::usage(Place::item("lanesweep check"), "there is nothing to check", help));
+        }
+        let plain = flags.plain_case(profile, self.plausibility.policy())?;
+        let subject = Subject::plain(&plain, flags.headway()?);
+        Ok(Asked { subject, origin, is_synthetic: false, incomplete: false })
+    }
+
+    fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<Asked> {
+        let headway = if self.case.says_a_start() { Some(self.case.headway()?) } else { None };
+        if self.case.says_more_than_a_start() {
+            return Err(Error::usage(
+                Place::item(origin),
+                "the scenario is a complete case: the other flags would be ignored",
+                "keep --gap or --thw, and leave out the other flags of a case",
+            ));
+        }
+        let is_synthetic = scenario.synthetic;
+        Ok(Asked { subject: Subject::recorded(scenario, headway)?, origin, is_synthetic, incomplete })
+    }
+
+    /// Outputs must have their kind's name and replace no input.
+    fn guard_outputs(&self) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
+        for (path, ending, flag) in [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")] {
+            let Some(path) = path else { continue };
+            if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {
+                let problem = format!("{} does not end in .{ending}", path.display());
+                return Err(Error::usage(Place::item(flag), problem, format!("give a name that ends in .{ending}")));
+            }
+            refuse_overwriting(path, &inputs, flag)?;
+        }
+        Ok(())
+    }
+}
+
+fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
+    let example = scenarios.first().map_or(String::new(), |scenario| format!(", for instance {}", scenario.id));
+    let problem = format!("it has no scenario `{id}`");
+    Error::usage(
+        Place::file(path),
+        problem,
+        format!("give the id of one of its {} scenarios{example}", scenarios.len()),
+    )
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+        make_folder(dir)?;
+    }
+    write_atomically(path, bytes)
+}
+
+/// What was typed, for whoever wants to repeat it.
+fn command() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
+    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
+}

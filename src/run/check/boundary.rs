@@ -1,0 +1,100 @@
+//! How far a case lies from the boundary of preventable cases: one number is changed, all others stay. A scan of evenly
+//! spaced values finds the nearest change on either side, bisection then finds the value. A change between two values
+//! of the scan and back is missed.
+
+use super::subject::Subject;
+use super::{REFERENCE_DRIVERS, collides};
+use crate::Result;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::grid::{MapParameter, MapQuantity, PARAMETERS};
+
+/// Values of a scan on each side.
+const SCANNED: u32 = 100;
+
+/// What is varied: quantity, unit, smallest and largest value, resolution, in that unit.
+const VARIED: [(&str, f64, f64, f64); 8] = [
+    ("gap_m", 0.0, 300.0, 0.01),
+    ("thw_s", 0.0, 10.0, 0.001),
+    ("ego_speed_kmh", 0.0, 250.0, 0.01),
+    ("other_speed_kmh", 0.0, 250.0, 0.01),
+    ("lateral_speed_mps", 0.05, 5.0, 0.001),
+    ("deceleration_mps2", 0.0, 15.0, 0.001),
+    ("ahead_gap_m", 0.0, 300.0, 0.01),
+    ("ahead_speed_kmh", 0.0, 250.0, 0.01),
+];
+
+/// Nearest values on both sides at which a verdict is another one; `None` where it stays to the end of the range.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Change {
+    /// Below the case's value.
+    pub below: Option<f64>,
+    /// Above it.
+    pub above: Option<f64>,
+}
+
+/// One parameter of the case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundary {
+    /// The parameter; all values are in its unit.
+    pub parameter: &'static MapParameter,
+    /// Value of the case.
+    pub value: f64,
+    /// Range that is searched.
+    pub range: (f64, f64),
+    /// Where a driver of Annex 3 ceases (or begins) to avoid the collision.
+    pub preventable: Change,
+    /// The same for every model, in the order of [`ModelId::ALL`].
+    pub models: Vec<Change>,
+}
+
+/// The boundaries along all numbers of a case.
+pub(super) fn boundaries(subject: &Subject, profile: &Profile) -> Result<Vec<Boundary>> {
+    let mut found = Vec::new();
+    for (key, least, most, resolution) in VARIED {
+        let Some(parameter) = PARAMETERS.iter().find(|parameter| parameter.key == key) else { continue };
+        let Some(si) = subject.point().get(parameter.quantity) else { continue };
+        // An acceleration has no place on the axis of decelerations.
+        if parameter.quantity == MapQuantity::Deceleration && si < 0.0 {
+            continue;
+        }
+        let value = si * parameter.per_si;
+        let verdicts = |value: f64| verdicts(subject, profile, parameter, value);
+        let side = |end: f64| -> Vec<(f64, Vec<bool>)> {
+            let step = (end - value) / f64::from(SCANNED);
+            // The first is the case itself; a value that makes no case ends the scan.
+            let values = (0..=SCANNED).map(|k| value + step * f64::from(k));
+            values.map_while(|value| Some((value, verdicts(value)?))).collect()
+        };
+        let (below, above) = (side(least.min(value)), side(most.max(value)));
+        let change = |of: &dyn Fn(&[bool]) -> bool| {
+            let nearest = |side: &[(f64, Vec<bool>)]| {
+                let at = (1..side.len()).find(|&at| of(&side[at].1) != of(&side[0].1))?;
+                let (mut same, mut other) = (side[at - 1].0, side[at].0);
+                while (other - same).abs() > resolution {
+                    let middle = (same + other) / 2.0;
+                    let changed = verdicts(middle).is_some_and(|v| of(&v) != of(&side[0].1));
+                    *(if changed { &mut other } else { &mut same }) = middle;
+                }
+                Some((other / resolution).round() * resolution)
+            };
+            Change { below: nearest(&below), above: nearest(&above) }
+        };
+        let position = |model: ModelId| ModelId::ALL.iter().position(|m| *m == model).unwrap_or(0);
+        found.push(Boundary {
+            parameter,
+            value,
+            range: (least.min(value), most.max(value)),
+            preventable: change(&|verdicts| REFERENCE_DRIVERS.iter().any(|&model| !verdicts[position(model)])),
+            models: ModelId::ALL.iter().map(|&model| change(&|verdicts| verdicts[position(model)])).collect(),
+        });
+    }
+    Ok(found)
+}
+
+/// Does each model collide with another value of one parameter?
+fn verdicts(subject: &Subject, profile: &Profile, parameter: &MapParameter, value: f64) -> Option<Vec<bool>> {
+    let point = subject.point().with(parameter.quantity, parameter.si(value));
+    let lane = subject.lane(profile, &point).ok()?;
+    Some(ModelId::ALL.map(|model| collides(&lane.run(profile, subject.category(), model))).to_vec())
+}

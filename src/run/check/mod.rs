@@ -1,0 +1,169 @@
+//! One concrete case against the regulation: every profile and model, the margins, the clauses, and how far the case
+//! lies from the boundary of preventable cases.
+//!
+//! Here lives what is computed, in f64. The case comes from [`crate::scenario`]; the sheet is made by
+//! [`crate::report`].
+
+mod boundary;
+mod clauses;
+mod perturbation;
+mod subject;
+
+use rayon::prelude::*;
+
+pub use boundary::{Boundary, Change};
+pub use clauses::{Reading, Relation};
+pub use subject::{Lane, Subject};
+
+use crate::engine::{EndReason, NO_STEP, Outcome, StepMark, Trace, check_time_step};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::grid::Point;
+use crate::{Place, Result};
+use perturbation::Perturbation;
+
+/// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
+pub const REFERENCE_DRIVERS: [ModelId; 2] = [ModelId::Cchdm, ModelId::Fsm];
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct Check {
+    /// The case.
+    pub subject: Subject,
+    /// Profiles, in order; the first one decides. At least one.
+    pub profiles: Vec<Profile>,
+    /// Models, in order. At least one.
+    pub models: Vec<ModelId>,
+}
+
+/// One driver model in the case.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The lane, step by step.
+    pub trace: Trace,
+    /// Perturbations under which the collision verdict is another one.
+    pub flips: Vec<&'static str>,
+}
+
+/// The case under one profile.
+#[derive(Debug, Clone)]
+pub struct Judgement {
+    /// Name of the profile.
+    pub profile: String,
+    /// One entry per model.
+    pub models: Vec<Judged>,
+    /// Drivers of Annex 3 that avoid the collision.
+    pub avoided_by: Vec<ModelId>,
+    /// Perturbations under which the case changes from preventable to not, or back.
+    pub flips: Vec<&'static str>,
+    /// What the clauses say of the case.
+    pub readings: Vec<Reading>,
+    /// Where along each parameter the case stops (or starts) to be preventable.
+    pub boundaries: Vec<Boundary>,
+}
+
+impl Judged {
+    /// Does the driver collide?
+    pub fn collides(&self) -> bool {
+        collides(&self.trace.outcome)
+    }
+
+    /// Time at which braking begins, s, coasting left out.
+    pub fn braking_s(&self, coasting_mps2: f64) -> Option<f64> {
+        let brakes = |step: &&crate::engine::TracedStep| step.a_ego_mps2 < -(coasting_mps2 + 1e-6);
+        let first = self.trace.steps.iter().find(brakes)?;
+        // The acceleration is that of the step before.
+        Some(self.trace.time_s(first.step.saturating_sub(1)))
+    }
+
+    /// Time of the first reaction, s.
+    pub fn reaction_s(&self) -> Option<f64> {
+        self.trace.step_of(StepMark::Reaction).map(|step| self.trace.time_s(step))
+    }
+
+    /// Closing speed at a contact, m/s.
+    pub fn impact_closing_mps(&self) -> Option<f64> {
+        let outcome = &self.trace.outcome;
+        (outcome.contact_step != NO_STEP).then_some(outcome.impact_closing_speed)
+    }
+
+    /// Did the run end in time?
+    pub fn is_capped(&self) -> bool {
+        self.trace.outcome.end == EndReason::Cap
+    }
+}
+
+impl Judgement {
+    /// Does a driver of Annex 3 avoid the collision?
+    pub fn is_preventable(&self) -> bool {
+        !self.avoided_by.is_empty()
+    }
+
+    /// Do all conditions of 5.2.5.2 hold, so that the system has to avoid the collision? `None` but for cut-ins.
+    pub fn is_demanded(&self) -> Option<bool> {
+        let mut of_clause = self.readings.iter().filter(|reading| reading.clause == clauses::LANE_INTRUSION).peekable();
+        of_clause.peek()?;
+        Some(of_clause.all(Reading::holds))
+    }
+}
+
+pub(super) fn collides(outcome: &Outcome<f64>) -> bool {
+    outcome.verdicts.failed(Criterion::Collision)
+}
+
+impl Check {
+    /// Runs every model under every profile.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a case that cannot be made, or a time step that is too long for it.
+    pub fn run(&self) -> Result<Vec<Judgement>> {
+        self.profiles.par_iter().map(|profile| self.under(profile)).collect()
+    }
+
+    fn under(&self, profile: &Profile) -> Result<Judgement> {
+        let lane = self.subject.lane(profile, self.subject.point())?;
+        profile.check_time_step(&self.models)?;
+        check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
+        let trace = |model| lane.trace(profile, self.subject.category(), model);
+        let changed = self.perturbed(profile)?;
+        let flips = |avoids: &dyn Fn(&[bool]) -> bool| {
+            let nominal = avoids(&changed[0].1);
+            let differs = |(_, verdicts): &&(&'static str, Vec<bool>)| avoids(verdicts) != nominal;
+            let mut names: Vec<&'static str> = changed.iter().filter(differs).map(|(name, _)| *name).collect();
+            names.dedup();
+            names
+        };
+        let position = |model: ModelId| ModelId::ALL.iter().position(|m| *m == model).unwrap_or(0);
+        let models = self
+            .models
+            .iter()
+            .map(|&model| Judged { trace: trace(model), flips: flips(&|verdicts| verdicts[position(model)]) });
+        let references = REFERENCE_DRIVERS.map(position);
+        let avoided_by = REFERENCE_DRIVERS.into_iter().filter(|&model| !changed[0].1[position(model)]).collect();
+        Ok(Judgement {
+            profile: profile.name.clone(),
+            models: models.collect(),
+            avoided_by,
+            flips: flips(&|verdicts| references.iter().any(|&at| !verdicts[at])),
+            readings: clauses::readings(profile, self.subject.category(), &trace),
+            boundaries: boundary::boundaries(&self.subject, profile)?,
+        })
+    }
+
+    /// Does each model collide, in the case and under each perturbation? The case itself comes first.
+    fn perturbed(&self, profile: &Profile) -> Result<Vec<(&'static str, Vec<bool>)>> {
+        let verdicts = |profile: &Profile, point: &Point| -> Result<Vec<bool>> {
+            let lane = self.subject.lane(profile, point)?;
+            Ok(ModelId::ALL.map(|model| collides(&lane.run(profile, self.subject.category(), model))).to_vec())
+        };
+        let mut all = vec![("", verdicts(profile, self.subject.point())?)];
+        for perturbation in Perturbation::all() {
+            let profile = &perturbation.profile(profile)?;
+            if let Some(point) = perturbation.point(self.subject.point()) {
+                all.push((perturbation.label(), verdicts(profile, &point)?));
+            }
+        }
+        Ok(all)
+    }
+}

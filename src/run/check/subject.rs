@@ -1,0 +1,153 @@
+//! The case that is checked, and its neighbours: the same case with one number changed.
+
+use crate::engine::{Constants, Headway, LaneCase, Outcome, Silent, Trace};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::grid::{MapQuantity, Point};
+use crate::scenario::parameterization::{TimeGrid, recorded_case};
+use crate::scenario::{Case, Category, PlainCase, Scenario, Speed, Tables};
+use crate::{Error, Place, Result};
+
+/// A concrete case.
+#[derive(Debug, Clone)]
+pub enum Subject {
+    /// Constant speeds, one deceleration, a lane change at constant lateral speed.
+    Plain(Category, Point),
+    /// A scenario whose other vehicles follow their series; the point has the ego's speed, the first speed of the
+    /// other vehicle and the initial gap.
+    Recorded(Box<Scenario>, Point),
+}
+
+/// A case as a lane runs it.
+pub struct Lane {
+    /// The record.
+    pub case: LaneCase<f64>,
+    /// Its series.
+    pub tables: Tables<f64>,
+    /// Where the ego starts.
+    pub headway: Headway,
+}
+
+impl Subject {
+    /// From plain numbers.
+    pub fn plain(case: &PlainCase, headway: Headway) -> Subject {
+        let start = match headway {
+            Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
+            Headway::GapM(gap_m) => (MapQuantity::Gap, gap_m),
+        };
+        let mut point = Point::default()
+            .with(MapQuantity::EgoSpeed, case.ego_speed_mps)
+            .with(MapQuantity::OtherSpeed, case.speed_mps)
+            .with(start.0, start.1)
+            .with(MapQuantity::Length, case.length_m)
+            .with(MapQuantity::Width, case.width_m);
+        if case.acceleration_mps2 != 0.0 {
+            point = point.with(MapQuantity::Deceleration, -case.acceleration_mps2);
+        }
+        if let Some(end_mps) = case.end_speed_mps {
+            point = point.with(MapQuantity::EndSpeed, end_mps);
+        }
+        if case.category != Category::Lvd {
+            point = point
+                .with(MapQuantity::LateralSpeed, case.lateral_speed_mps)
+                .with(MapQuantity::LateralDistance, case.lateral_distance_m);
+        }
+        if case.category == Category::CutOut {
+            point =
+                point.with(MapQuantity::AheadSpeed, case.ahead_speed_mps).with(MapQuantity::AheadGap, case.ahead_gap_m);
+        }
+        Subject::Plain(case.category, point)
+    }
+
+    /// From a recorded scenario; it starts as it was recorded unless a headway is given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where neither is known.
+    pub fn recorded(scenario: Scenario, headway: Option<Headway>) -> Result<Subject> {
+        let missing = || {
+            let problem = format!("scenario {} has no observed gap", scenario.id);
+            Error::usage(Place::item("gap, thw"), problem, "give option `gap` in metres or option `thw` in seconds")
+        };
+        let other_mps = scenario.target.v.first().copied().unwrap_or(0.0).max(0.0);
+        let ego_mps = if scenario.category == Category::Lvd { other_mps } else { scenario.ego.v0 };
+        let start = match headway {
+            Some(Headway::ThwS(thw_s)) => (MapQuantity::Thw, thw_s),
+            Some(Headway::GapM(gap_m)) => (MapQuantity::Gap, gap_m),
+            None => (MapQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
+        };
+        let point = Point::default()
+            .with(MapQuantity::EgoSpeed, ego_mps)
+            .with(MapQuantity::OtherSpeed, other_mps)
+            .with(start.0, start.1);
+        Ok(Subject::Recorded(Box::new(scenario), point))
+    }
+
+    /// Kind of scenario.
+    pub fn category(&self) -> Category {
+        match self {
+            Subject::Plain(category, _) => *category,
+            Subject::Recorded(scenario, _) => scenario.category,
+        }
+    }
+
+    /// The numbers of the case.
+    pub fn point(&self) -> &Point {
+        match self {
+            Subject::Plain(_, point) | Subject::Recorded(_, point) => point,
+        }
+    }
+
+    /// The case with the numbers of a point, ready to run.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where an end speed cannot be reached; [`Error::Input`] for a cut-out without a vehicle ahead.
+    pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
+        let case = match self {
+            Subject::Plain(category, _) => plain(*category, point, profile)?,
+            Subject::Recorded(scenario, recorded) => {
+                let mut case = recorded_case(scenario, TimeGrid::of(profile))?;
+                move_to(&mut case, recorded, point);
+                case
+            }
+        };
+        let headway = match (point.get(MapQuantity::Thw), point.get(MapQuantity::Gap)) {
+            (Some(thw_s), _) => Headway::ThwS(thw_s),
+            (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
+        };
+        let mut tables = Tables::default();
+        let case = LaneCase::encode(&case, profile, &mut tables);
+        Ok(Lane { case, tables, headway })
+    }
+}
+
+fn plain(category: Category, point: &Point, profile: &Profile) -> Result<Case> {
+    let mut case = point.plain_case(category, profile);
+    // A map has decelerations alone.
+    case.acceleration_mps2 = point.get(MapQuantity::Deceleration).map_or(0.0, |a| 0.0 - a);
+    case.case(profile.frame.time_cap_s)
+}
+
+/// Moves a recorded case to other initial speeds: series keep their shape.
+fn move_to(case: &mut Case, from: &Point, to: &Point) {
+    let change = |quantity| to.get(quantity).zip(from.get(quantity)).map_or(0.0, |(to, from)| to - from);
+    case.ego_speed_mps = (case.ego_speed_mps + change(MapQuantity::EgoSpeed)).max(0.0);
+    let by_mps = change(MapQuantity::OtherSpeed);
+    if let Speed::Sampled(series) = &mut case.principal.speed
+        && by_mps != 0.0
+    {
+        series.iter_mut().for_each(|v| *v = (*v + by_mps).max(0.0));
+    }
+}
+
+impl Lane {
+    /// Its outcome for a model.
+    pub fn run(&self, profile: &Profile, category: Category, model: ModelId) -> Outcome<f64> {
+        let constants = Constants::<f64>::resolve(profile, category);
+        constants.run(model, &self.case, &self.tables, self.headway.start(), &mut Silent)
+    }
+
+    /// The same with every step.
+    pub fn trace(&self, profile: &Profile, category: Category, model: ModelId) -> Trace {
+        Trace::record(profile, category, &self.case, &self.tables, self.headway, model)
+    }
+}

@@ -1,0 +1,162 @@
+//! `lanesweep check`: one case against the regulation, from every kind of file.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn check(args: &[&str]) -> (i32, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_lanesweep")).env("NO_COLOR", "1").args(args).output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+fn json(args: &[&str]) -> Value {
+    let (code, out, error) = check(&[args, &["--format", "json"]].concat());
+    assert!(code < 2, "{error}");
+    serde_json::from_str(&out).unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+const CUT_IN: [&str; 12] = [
+    "--category",
+    "cut-in",
+    "--ego-speed",
+    "108km/h",
+    "--speed",
+    "20",
+    "--gap",
+    "36",
+    "--lateral-speed",
+    "1",
+    "--profiles",
+    "un-r157,paper",
+];
+
+#[test]
+fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name);
+    std::fs::write(
+        of("case.toml"),
+        "category = \"cut-in\"\nego_speed = 30.0\nspeed = 20.0\ngap = 36.0\nlateral_speed = 1.0\n",
+    )
+    .unwrap();
+    std::fs::write(of("cases.csv"), "category,ego_speed,speed,gap,lateral_speed\ncut-in,9,9,9,1\ncut-in,30,20,36,1\n")
+        .unwrap();
+    let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
+    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--gap", "36", "--lateral-speed", "1"];
+    let (code, _, error) = check(&[&export[..], &[text(&of("xosc"))], &case].concat());
+    assert_eq!(code, 0, "{error}");
+    let file = std::fs::read_dir(of("xosc")).unwrap().map(|entry| entry.unwrap().path());
+    let file = file.into_iter().find(|path| path.extension().is_some_and(|e| e == "xosc")).unwrap();
+    let flags = json(&[&["check"], &CUT_IN[..]].concat());
+    let profiles = ["--profiles", "un-r157,paper"];
+    let toml = json(&[&["check", text(&of("case.toml"))], &profiles[..]].concat());
+    let row = json(&[&["check", text(&of("cases.csv")), "--row", "2"], &profiles[..]].concat());
+    let xosc = json(&[&["check", text(&file)], &profiles[..]].concat());
+    assert_eq!(flags["profiles"], toml["profiles"]);
+    assert_eq!(flags["profiles"], row["profiles"]);
+    for (ours, theirs) in flags["profiles"].as_array().unwrap().iter().zip(xosc["profiles"].as_array().unwrap()) {
+        assert_eq!(ours["avoided_by"], theirs["avoided_by"]);
+        for (a, b) in ours["models"].as_array().unwrap().iter().zip(theirs["models"].as_array().unwrap()) {
+            assert_eq!(
+                (&a["model"], &a["collision"], &a["t_react_s"]),
+                (&b["model"], &b["collision"], &b["t_react_s"])
+            );
+            let [a, b] = [a, b].map(|model| model["min_gap_m"].as_f64().unwrap());
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn the_exit_status_says_whether_the_case_is_preventable() {
+    let far = check(&[&["check"], &CUT_IN[..]].concat());
+    assert_eq!(far.0, 0, "{}", far.2);
+    assert!(
+        far.1.starts_with("cut-in: preventable: CCHDM and FSM avoid the collision (profile un-r157; robust)\n"),
+        "{}",
+        far.1
+    );
+    let near = ["--category", "cut-in", "--ego-speed", "30", "--speed", "10", "--gap", "20", "--lateral-speed", "2"];
+    let near = check(&[&["check"], &near[..]].concat());
+    assert_eq!(near.0, 1, "{}", near.2);
+    assert!(near.1.starts_with("cut-in: not preventable: CCHDM and FSM collide"), "{}", near.1);
+}
+
+#[test]
+fn a_mined_scenario_is_checked_by_its_id() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenarios = dir.path().join("scenarios.jsonl");
+    let recordings = dir.path().join("recordings");
+    let made = ["-q", "synth", text(&recordings), "--synth-recordings", "1", "--synth-duration", "120"];
+    for args in [&made[..], &["-q", "mine", text(&recordings), "--out", text(&scenarios)]] {
+        let (code, _, error) = check(args);
+        assert_eq!(code, 0, "{error}");
+    }
+    let lines = std::fs::read_to_string(&scenarios).unwrap();
+    let found = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let kept = found.filter(|scenario| scenario["kept"] == true);
+    let ids: Vec<String> = kept.map(|scenario| scenario["id"].as_str().unwrap().to_owned()).collect();
+    for id in ids.iter().take(6) {
+        let sheet = json(&["check", text(&scenarios), "--scenario", id]);
+        assert_eq!(sheet["synthetic"], true);
+        assert!(sheet["case"]["gap_m"].as_f64().is_some());
+    }
+    let closer = json(&["check", text(&scenarios), "--scenario", &ids[0], "--thw", "0.3"]);
+    assert_eq!(closer["case"]["thw_s"], 0.3);
+    let (code, _, error) = check(&["check", text(&scenarios), "--scenario", "nobody"]);
+    assert!(code == 2 && error.contains("it has no scenario `nobody`") && error.contains(&ids[0]), "{error}");
+    let (code, _, error) = check(&["check", text(&scenarios), "--scenario", &ids[0], "--speed", "10"]);
+    assert!(code == 2 && error.contains("a complete case"), "{error}");
+    let (code, _, error) = check(&["check", text(&scenarios)]);
+    assert!(code == 2 && error.contains("--scenario ID"), "{error}");
+}
+
+#[test]
+fn the_sheet_and_the_series_go_to_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let (sheet, series) = (dir.path().join("case.html"), dir.path().join("case.csv"));
+    let files = ["--sheet", text(&sheet), "--series", text(&series)];
+    let (code, out, error) = check(&[&["check"], &CUT_IN[..], &files].concat());
+    assert_eq!(code, 0, "{error}");
+    assert!(out.lines().count() < 60, "the series does not hide the answer");
+    let page = std::fs::read_to_string(&sheet).unwrap();
+    for part in ["the system has to avoid the collision", "TTC at lane intrusion", "<svg", "108 km", "Initial gap (m)"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(std::fs::read_to_string(&series).unwrap().starts_with("lane,t_s,"));
+    let (code, _, error) = check(&[&["check"], &CUT_IN[..], &["--sheet", "case.pdf"]].concat());
+    assert!(code == 2 && error.contains(".html"), "{error}");
+}
+
+#[test]
+fn what_holds_no_case_is_refused_with_what_to_give() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str, content: &str| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let foreign = of("a.xosc", "<OpenSCENARIO><FileHeader author=\"somebody\" description=\"x\"/></OpenSCENARIO>");
+    let broken = of("b.xosc", "<OpenSCENARIO>");
+    let empty = of("c.csv", "category\n");
+    let other = of("d.txt", "cut-in");
+    for (args, says) in [
+        (vec!["check"], "there is nothing to check"),
+        (vec!["check", text(&foreign)], "export xosc"),
+        (vec!["check", text(&broken)], "does not end"),
+        (vec!["check", text(&empty)], "there is no row 1"),
+        (vec!["check", text(&other)], "holds no case"),
+        (vec!["check", "--category", "cut-in", "--ego-speed", "fast"], "60km/h"),
+    ] {
+        let (code, _, error) = check(&args);
+        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!((2..=3).contains(&code) && error.contains(says), "{args:?}: {code} {error}");
+    }
+}
