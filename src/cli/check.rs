@@ -179,7 +179,10 @@ impl Check {
 }
 
 fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
-    let example = scenarios.first().map_or(String::new(), |scenario| format!(", for instance {}", scenario.id));
+    let example = scenarios
+        .iter()
+        .find(|scenario| scenario.kept)
+        .map_or(String::new(), |scenario| format!(", for instance {}", scenario.id));
     let problem = format!("it has no scenario `{id}`");
     Error::usage(
         Place::file(path),

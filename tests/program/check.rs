@@ -112,7 +112,7 @@ fn a_mined_scenario_is_checked_by_its_id() {
     let (code, _, error) = check(&["check", text(&scenarios), "--scenario", "nobody"]);
     assert!(code == 2 && error.contains("it has no scenario `nobody`") && error.contains(&ids[0]), "{error}");
     let (code, _, error) = check(&["check", text(&scenarios), "--scenario", &ids[0], "--speed", "10"]);
-    assert!(code == 2 && error.contains("a complete case"), "{error}");
+    assert!(code == 2 && error.contains("complete case"), "{error}");
     let (code, _, error) = check(&["check", text(&scenarios)]);
     assert!(code == 2 && error.contains("--scenario ID"), "{error}");
 }
