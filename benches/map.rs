@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::grid::presets;
+use lanesweep::run::grid::presets::{self, Presets};
 use lanesweep::run::grid::{GridMap, GridPlan};
 use lanesweep::scenario::Category;
 
@@ -21,7 +21,7 @@ fn main() {
     println!("part,repetition,seconds,simulations");
     let profile = Profile::load(presets::JRC_PROFILE).unwrap();
     let plans = || -> Vec<GridPlan> {
-        let presets = Category::ALL.into_iter().flat_map(|category| presets::jrc(category, &profile).unwrap());
+        let presets = Category::ALL.into_iter().flat_map(|category| Presets::Jrc.of(category, &profile).unwrap());
         presets.map(|preset| GridPlan::new(preset.grid, &profile, &preset.models).unwrap()).collect()
     };
     let planned = plans();

@@ -63,8 +63,22 @@ struct LaneState {
     v_closing: f32,
 }
 
+// The initial gap, m, at the ego's initial speed, m/s.
+fn start_gap(start: Start, v_ego: f32) -> f32 {
+    let by_value = select(start.value * v_ego, start.value, start.kind == 1u);
+    return select(by_value, min_following_gap(v_ego), start.kind == 2u);
+}
+
+// UN R157, 5.2.3.3.
+fn min_following_gap(v: f32) -> f32 {
+    let slow = 0.74285714286 + 0.12857142857 * v;
+    let line = 1.0 + 0.036 * v;
+    let thw = smaller(smaller(slow, line), 2.0);
+    return larger(thw * v, 2.0);
+}
+
 fn start_lane(lane: LaneCase, start: Start) -> LaneState {
-    let gap_start = select(start.value * lane.ego_speed, start.value, start.is_gap != 0u);
+    let gap_start = start_gap(start, lane.ego_speed);
     return LaneState(
         gap_start + lane.others[0].gap_offset,
         gap_start + lane.others[1].gap_offset,

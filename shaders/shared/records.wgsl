@@ -40,9 +40,9 @@ struct LaneCase {
     pair: u32,
 }
 
-// The headway of a lane: a time headway, s, or a gap, m.
+// The headway of a lane: a time headway, s, a gap, m, or the minimum following distance.
 struct Start {
-    is_gap: u32,
+    kind: u32,
     value: f32,
 }
 

@@ -168,10 +168,13 @@ fn models(list: &[String]) -> Result<Vec<ModelId>> {
 /// [`Error::Usage`] for one that is not above 0.
 pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let parse = |text: &str| {
+        if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
+            return Ok(Headway::MinFollowing);
+        }
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         value.map(Headway::ThwS).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
-            let help = format!("give seconds above 0, separated by commas, or {words}");
+            let help = format!("give seconds above 0, separated by commas, `r157`, or {words}");
             Error::usage(Place::item("--thw"), problem, help)
         })
     };

@@ -19,7 +19,7 @@ use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::{
     self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapParameter,
-    MapResult, PARAMETERS, presets,
+    MapResult, PARAMETERS, presets::Presets,
 };
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
@@ -35,8 +35,8 @@ const BYTES_OF_SHEETS: u64 = 3 << 20;
 
 /// Map outcomes over two parameters, and where two models or profiles differ
 ///
-/// Every cell is one concrete case. --preset jrc takes the grids of the JRC's evidence; --x, --y, --panel and --set
-/// make any other. Writes a sheet per grid and model (SVG), cells.csv, differences.csv and map.json; the shares go to
+/// Every cell is one concrete case. --preset takes the grids of the JRC's evidence (jrc) or of the regulation's Annex 3
+/// (r157, to 60 and to 130 km/h); --x, --y, --panel and --set make any other. Writes a sheet per grid and model (SVG), cells.csv, differences.csv and map.json; the shares go to
 /// stdout.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, after_long_help = after_long_help())]
@@ -44,7 +44,7 @@ pub struct Map {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(value_name = "CATEGORY")]
     category: String,
-    /// Predefined grids with their models: jrc
+    /// Predefined grids with their models: jrc, r157
     #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
     preset: Option<String>,
     /// OpenSCENARIO file with deterministic distributions
@@ -85,12 +85,17 @@ pub struct Map {
     /// Model or profile; maps where it and the models differ
     #[arg(long, value_name = "MODEL|PROFILE")]
     against: Option<String>,
-    /// paper, paper-fit, jrc-2021, un-r157 [default: paper; preset jrc: jrc-2021]
+    /// paper, paper-fit, jrc-2021, un-r157 [default: paper; of a preset: jrc-2021, un-r157]
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
     /// Time step [default: the profile's]
     #[arg(long, value_name = "s")]
     dt: Option<f64>,
+    /// Mark cells whose verdict changes with half the time step, 1 cm, 0.1 km/h
+    ///
+    /// They are undecided: each cell is simulated eight times, and sheets show them in their own colour.
+    #[arg(long)]
+    robust: bool,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
@@ -140,6 +145,7 @@ impl Map {
             models: self.models.named()?,
             criterion,
             against: self.against.as_deref().map(|text| against(text, self.dt)).transpose()?,
+            robust: self.robust,
         };
         let started = Instant::now();
         let against = options.against.clone();
@@ -183,19 +189,22 @@ impl Map {
     }
 
     fn profile(&self) -> Result<Profile> {
-        let otherwise = if self.preset.is_some() { presets::JRC_PROFILE } else { "paper" };
+        let preset = self.preset.as_deref().and_then(Presets::find);
+        let otherwise = preset.map_or("paper", Presets::profile);
         with_dt(Profile::load(self.profile.as_deref().unwrap_or(otherwise))?, self.dt)
     }
 
     /// The grids that the flags name.
     fn grids(&self, category: Category) -> Result<MapGrids> {
         match self.preset.as_deref() {
-            Some("jrc") => Ok(MapGrids::Jrc(category)),
-            Some(unknown) => {
-                let problem = format!("there is no preset `{unknown}`");
-                let help = format!("presets: {}", presets::NAMES.join(", "));
-                Err(Error::usage(Place::item("--preset"), problem, help))
-            }
+            Some(name) => match Presets::find(name) {
+                Some(presets) => Ok(MapGrids::Preset(presets, category)),
+                None => {
+                    let problem = format!("there is no preset `{name}`");
+                    let help = format!("presets: {}", Presets::ALL.map(Presets::name).join(", "));
+                    Err(Error::usage(Place::item("--preset"), problem, help))
+                }
+            },
             None => {
                 let parts = match &self.distribution {
                     Some(path) => self.of_distribution(path, category)?,
@@ -222,7 +231,7 @@ impl Map {
         let axis = |text: &Option<String>, flag: &str| {
             let text = text.as_deref().ok_or_else(|| {
                 let problem = "it is missing".to_owned();
-                Error::usage(Place::item(flag), problem, "give both --x and --y, or --preset jrc")
+                Error::usage(Place::item(flag), problem, "give both --x and --y, or --preset")
             })?;
             GridAxis::parse(category, text, flag)
         };

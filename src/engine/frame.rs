@@ -57,6 +57,32 @@ pub enum Start<R> {
     Headway(R),
     /// Gap, m.
     Gap(R),
+    /// Minimum following distance of UN R157, 5.2.3.3, at the ego's speed.
+    MinFollowing,
+}
+
+impl<R: Real> Start<R> {
+    /// The initial gap, m, at the ego's initial speed, m/s. Twin: `shaders/shared/frame.wgsl`.
+    #[inline(always)]
+    pub fn gap(self, ego_speed: R) -> R {
+        match self {
+            Start::Headway(thw) => thw * ego_speed,
+            Start::Gap(gap) => gap,
+            Start::MinFollowing => min_following_gap(ego_speed),
+        }
+    }
+}
+
+/// The table of 5.2.3.3 with linear interpolation: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 0.1 s more per 10 km/h, 1.6 s at
+/// 60 km/h, never below 2 m. Above 60 km/h the regulation refers to national rules; here the line goes on to 2.0 s at
+/// 100 km/h and stays.
+#[inline(always)]
+fn min_following_gap<R: Real>(v: R) -> R {
+    // From 7.2 to 10 km/h the table is steeper: 0.1 s in 2.8 km/h.
+    let slow = R::from_f64(0.74285714286) + R::from_f64(0.12857142857) * v;
+    let line = R::from_f64(1.0) + R::from_f64(0.036) * v;
+    let thw = slow.smaller(line).smaller(R::from_f64(2.0));
+    (thw * v).larger(R::from_f64(2.0))
 }
 
 /// What all lanes of one model have in common.
@@ -72,4 +98,23 @@ pub struct Simulation<'a, R, M> {
     pub model_index: usize,
     /// What is known of the other vehicles.
     pub scene: Scene,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Start;
+
+    /// Speed in km/h, distance in m, as 5.2.3.3 has them, to its one decimal.
+    #[test]
+    fn the_minimum_following_distance_is_that_of_the_table() {
+        for (kmh, metres) in
+            [(7.2, 2.0), (10.0, 3.1), (20.0, 6.7), (30.0, 10.8), (40.0, 15.6), (50.0, 20.8), (60.0, 26.7)]
+        {
+            let gap_m = Start::<f64>::MinFollowing.gap(kmh / 3.6);
+            assert!((gap_m - metres).abs() <= 0.051, "{kmh} km/h: {gap_m} m");
+            assert!((f64::from(Start::<f32>::MinFollowing.gap(kmh as f32 / 3.6)) - gap_m).abs() < 1e-5);
+        }
+        assert_eq!(Start::<f64>::MinFollowing.gap(1.0), 2.0, "never below 2 m");
+        assert_eq!(Start::<f64>::MinFollowing.gap(36.0), 72.0, "2 s from 100 km/h on: ours");
+    }
 }

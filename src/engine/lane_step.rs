@@ -139,10 +139,7 @@ impl<R: Real> LaneState<R> {
     /// Before the first step.
     #[inline(always)]
     pub fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
-        let gap_start = match start {
-            Start::Headway(thw) => thw * case.ego_speed,
-            Start::Gap(gap) => gap,
-        };
+        let gap_start = start.gap(case.ego_speed);
         LaneState {
             index: 0,
             v_ego: case.ego_speed,

@@ -20,6 +20,9 @@ use super::time_step::check_time_step;
 use super::units::Units;
 use super::version::Canonical;
 
+/// Text of [`Headway::MinFollowing`].
+const R157: &str = "r157";
+
 /// Headway of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -28,6 +31,9 @@ pub enum Headway {
     ThwS(f64),
     /// Initial gap, m, bumper to bumper.
     GapM(f64),
+    /// Minimum following distance of UN R157, 5.2.3.3, at the ego's initial speed: `r157`.
+    #[serde(rename = "r157")]
+    MinFollowing,
 }
 
 impl Headway {
@@ -36,8 +42,11 @@ impl Headway {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
     }
 
-    /// From its text, `1.2s` or `30m`; `2.0s`, as tables have it, is `2s`.
+    /// From its text, `1.2s`, `30m` or `r157`; `2.0s`, as tables have it, is `2s`.
     pub fn parse(text: &str) -> Option<Headway> {
+        if text == R157 {
+            return Some(Headway::MinFollowing);
+        }
         let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
         match text.strip_suffix('s') {
             Some(seconds) => number(seconds).map(Headway::ThwS),
@@ -50,6 +59,7 @@ impl Headway {
         match self {
             Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
             Headway::GapM(m) => Start::Gap(R::from_f64(m)),
+            Headway::MinFollowing => Start::MinFollowing,
         }
     }
 }
@@ -59,6 +69,7 @@ impl std::fmt::Display for Headway {
         match self {
             Headway::ThwS(s) => write!(f, "{s}s"),
             Headway::GapM(m) => write!(f, "{m}m"),
+            Headway::MinFollowing => f.write_str(R157),
         }
     }
 }

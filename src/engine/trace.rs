@@ -2,7 +2,6 @@
 
 use super::cpu::runner::LaneRunner;
 use super::drivers::Constants;
-use super::frame::Start;
 use super::lane::Step;
 use super::lane_case::LaneCase;
 use super::lane_step::Seen;
@@ -147,10 +146,7 @@ impl Trace {
         };
         let start = headway.start::<R>();
         let outcome = lane.run(model, case, tables, start, &mut each).widen();
-        let gap = match headway.start::<f64>() {
-            Start::Headway(thw) => thw * case.ego_speed.to_f64(),
-            Start::Gap(gap) => gap,
-        };
+        let gap = headway.start::<f64>().gap(case.ego_speed.to_f64());
         let nominal_gap_m = gap + case.others[0].gap_offset.to_f64();
         let shifted_gap_m = steps.first().filter(|_| profile.frame.start_shift).map(|first| first.others[0].gap_m);
         let ego_width_m = case.ego_width.to_f64();

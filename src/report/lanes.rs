@@ -69,7 +69,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
         let thw = match plan.headways[key.headway] {
             // 2 as `2.0`, like the golden lanes.
             Headway::ThwS(thw) => Cell::Decimal(thw),
-            Headway::GapM(_) => Cell::Null,
+            Headway::GapM(_) | Headway::MinFollowing => Cell::Null,
         };
         let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
         let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt)));
@@ -98,10 +98,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
 
 fn is_robust(constants: &Constants<f64>, plan: &LanePlan, key: &LaneKey) -> bool {
     let case = plan.case(key.block, key.unit, key.variant);
-    let gap = match plan.headways[key.headway].start::<f64>() {
-        Start::Headway(thw) => thw * case.ego_speed,
-        Start::Gap(gap) => gap,
-    };
+    let gap = plan.headways[key.headway].start::<f64>().gap(case.ego_speed);
     let run = |gap: f64| -> Outcome<f64> {
         constants.run(plan.models[key.model], &case, plan.tables(), Start::Gap(gap), &mut Silent)
     };

@@ -5,14 +5,15 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::html::PageFigure;
-use super::map_sheet::{MapSheet, agreements, outcomes};
+use super::map_sheet::{MapSheet, UNDECIDED, agreements, outcomes};
 use super::plot::Fill;
 use super::run_record::{DeviceRecord, SweepRecord};
 use super::tables::{aligned, table};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MapParameter, MappedGrid, count};
+use crate::run::check::REFERENCE_DRIVERS;
+use crate::run::grid::{Against, Agreement, CaseStyle, Grid, GridAxis, MapParameter, MappedGrid, Perturbation, count};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::csv_field;
@@ -61,12 +62,14 @@ struct Difference<'a> {
 }
 
 impl MapReport {
-    /// Number of simulations, those of the other profile included.
+    /// Number of simulations, those of the other profile and of perturbed cases included.
     pub fn simulations(&self) -> u64 {
         let of = |mapped: &MappedGrid| {
             mapped.plan.lane_count() + mapped.other.as_ref().map_or(0, |(_, plan, _)| plan.lane_count())
         };
-        self.grids.iter().map(of).sum()
+        let times =
+            |mapped: &MappedGrid| if mapped.map.has_undecided() { 1 + Perturbation::ALL.len() as u64 } else { 1 };
+        self.grids.iter().map(|mapped| of(mapped) * times(mapped)).sum()
     }
 
     /// Shares and differences as tables.
@@ -76,6 +79,10 @@ impl MapReport {
         let mut header = ["map", "model", "cells", "fail", "share %"].map(str::to_owned).to_vec();
         if any_known {
             header.extend(["known %", "difference"].map(str::to_owned));
+        }
+        let is_robust = self.is_robust();
+        if is_robust {
+            header.push("undecided %".to_owned());
         }
         let mut shares = table(header);
         for mapped in &self.grids {
@@ -90,6 +97,10 @@ impl MapReport {
                     row.push(known.map_or("-".to_owned(), |k| format!("{k:.1}")));
                     let mark = if mapped.is_chosen_to_match { "*" } else { "" };
                     row.push(known.map_or("-".to_owned(), |k| format!("{:+.2}{mark}", percent - k)));
+                }
+                if is_robust {
+                    let undecided = mapped.map.undecided(at, self.criterion);
+                    row.push(format!("{:.2}", 100.0 * undecided as f64 / cells as f64));
                 }
                 shares.add_row(row);
             }
@@ -106,14 +117,22 @@ impl MapReport {
                  confirms nothing.\n",
             );
         }
+        if is_robust {
+            text.push_str(
+                "Undecided: the verdict changes with half the time step, 1 cm of gap, or 0.1 km/h of a speed.\n",
+            );
+        }
         let differences = self.differences();
         if !differences.is_empty() {
             let header = ["map", "first", "second", "both pass", "both fail", "only first fails", "only second fails"];
-            let mut table = table(header.map(str::to_owned).to_vec());
+            let mut header = header.map(str::to_owned).to_vec();
+            header.extend(is_robust.then(|| "undecided".to_owned()));
+            let mut table = table(header);
             for difference in &differences {
                 let mut row = vec![difference.grid.name().to_owned(), difference.first.clone()];
                 row.push(difference.second.clone());
-                row.extend(count(&difference.cells).map(readable::count));
+                let kinds = if is_robust { Agreement::ALL.len() } else { Agreement::ALL.len() - 1 };
+                row.extend(count(&difference.cells)[..kinds].iter().map(|cells| readable::count(*cells)));
                 table.add_row(row);
             }
             text.push_str(&format!("\nDifferences in {criterion}\n{}", aligned(table, 3)));
@@ -129,9 +148,17 @@ impl MapReport {
         let mut figures = Vec::new();
         for mapped in &self.grids {
             for (at, model) in mapped.map.models.iter().enumerate() {
-                let cells = mapped.map.failed(at, self.criterion).into_iter().map(u8::from).collect();
+                let cells = (0..mapped.map.cell_count()).map(|cell| {
+                    let is_undecided = mapped.map.is_undecided(at, cell, self.criterion);
+                    if is_undecided {
+                        UNDECIDED
+                    } else {
+                        u8::from(mapped.map.verdicts(at, cell).failed(self.criterion))
+                    }
+                });
                 let what = format!("{}, {}", model.name(), self.criterion.label());
-                let svg = self.sheet(&mapped.plan.grid, what, outcomes(), cells);
+                let kinds = outcomes(mapped.map.has_undecided());
+                let svg = self.sheet(&mapped.plan.grid, what, kinds, cells.collect(), self.preventable(mapped));
                 let name = format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name()));
                 results.add(&name, svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&name, "cells.csv"]));
@@ -141,8 +168,8 @@ impl MapReport {
         for difference in &differences {
             let cells = difference.cells.iter().map(|kind| *kind as u8).collect();
             let what = format!("{} against {}, {}", difference.first, difference.second, self.criterion.label());
-            let kinds = agreements(&difference.first, &difference.second);
-            let svg = self.sheet(difference.grid, what, kinds, cells);
+            let kinds = agreements(&difference.first, &difference.second, self.is_robust());
+            let svg = self.sheet(difference.grid, what, kinds, cells, None);
             let name = format!(
                 "{}_{}_against_{}.svg",
                 difference.grid.name(),
@@ -162,7 +189,29 @@ impl MapReport {
         Ok(names)
     }
 
-    fn sheet(&self, grid: &Grid, what: String, kinds: Vec<(String, Fill)>, cells: Vec<u8>) -> String {
+    fn is_robust(&self) -> bool {
+        self.grids.iter().any(|mapped| mapped.map.has_undecided())
+    }
+
+    /// Cells in which a driver of Annex 3 avoids the collision; where both were swept, and collisions are mapped.
+    fn preventable(&self, mapped: &MappedGrid) -> Option<Vec<bool>> {
+        let models = &mapped.map.models;
+        let at: Vec<usize> =
+            REFERENCE_DRIVERS.iter().filter_map(|driver| models.iter().position(|model| model == driver)).collect();
+        let collides = |model: &usize, cell| mapped.map.verdicts(*model, cell).failed(Criterion::Collision);
+        let is_known = at.len() == REFERENCE_DRIVERS.len() && self.criterion == Criterion::Collision;
+        is_known
+            .then(|| (0..mapped.map.cell_count()).map(|cell| at.iter().any(|model| !collides(model, cell))).collect())
+    }
+
+    fn sheet(
+        &self,
+        grid: &Grid,
+        what: String,
+        kinds: Vec<(String, Fill)>,
+        cells: Vec<u8>,
+        preventable: Option<Vec<bool>>,
+    ) -> String {
         let fixed: Vec<String> =
             grid.fixed().iter().map(|(p, v)| format!("{}: {} {}.", p.label, readable::value(*v), p.unit)).collect();
         let mut notes = fixed;
@@ -178,6 +227,7 @@ impl MapReport {
             grid,
             kinds,
             cells,
+            preventable,
             notes,
         };
         sheet.figure().svg()
@@ -217,7 +267,9 @@ impl MapReport {
     /// One row per cell and model.
     fn write_cells(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut out = io::BufWriter::new(out);
-        write_header(&mut out, &self.grids, "initial_gap_m,model,collision,ttc,btn,capped,failed")?;
+        let is_robust = self.is_robust();
+        let columns = "initial_gap_m,model,collision,ttc,btn,capped,failed";
+        write_header(&mut out, &self.grids, &format!("{columns}{}", if is_robust { ",undecided" } else { "" }))?;
         for MappedGrid { plan, map, .. } in &self.grids {
             let profile = &plan.parts[0].plan.profile;
             for cell in 0..map.cell_count() {
@@ -227,7 +279,11 @@ impl MapReport {
                     let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(verdicts.failed(c)));
                     let (capped, failed) = (u8::from(verdicts.capped()), u8::from(verdicts.failed(self.criterion)));
                     let gap_m = plan.grid.gap_m(cell, model, profile);
-                    writeln!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
+                    write!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
+                    if is_robust {
+                        write!(out, ",{}", u8::from(map.is_undecided(at, cell, self.criterion)))?;
+                    }
+                    writeln!(out)?;
                 }
             }
         }
@@ -318,6 +374,9 @@ struct ShareRecord {
     model: &'static str,
     failures: u64,
     share: f64,
+    /// Cells whose verdict a perturbation changes, where perturbed cases were swept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    undecided: Option<u64>,
     known_percent: Option<f64>,
 }
 
@@ -332,11 +391,12 @@ struct DifferenceRecord {
     both_fail: u64,
     only_first_fails: u64,
     only_second_fails: u64,
+    undecided: u64,
 }
 
 impl DifferenceRecord {
     fn of(difference: &Difference) -> DifferenceRecord {
-        let [both_pass, both_fail, only_first_fails, only_second_fails] = count(&difference.cells);
+        let [both_pass, both_fail, only_first_fails, only_second_fails, undecided] = count(&difference.cells);
         DifferenceRecord {
             map: difference.grid.name().to_owned(),
             model: difference.model.name(),
@@ -346,6 +406,7 @@ impl DifferenceRecord {
             both_fail,
             only_first_fails,
             only_second_fails,
+            undecided,
         }
     }
 }
@@ -368,7 +429,8 @@ impl<'a> GridRecord<'a> {
         let share = |(at, model): (usize, &ModelId)| {
             let failures = map.failures(at, criterion);
             let share = failures as f64 / map.cell_count() as f64;
-            ShareRecord { model: model.name(), failures, share, known_percent: mapped.known_percent[at] }
+            let undecided = map.has_undecided().then(|| map.undecided(at, criterion));
+            ShareRecord { model: model.name(), failures, share, undecided, known_percent: mapped.known_percent[at] }
         };
         let others = mapped.other.iter().flat_map(|(_, plan, _)| &plan.parts);
         GridRecord {

@@ -19,23 +19,37 @@ pub struct MapSheet<'a> {
     pub kinds: Vec<(String, Fill)>,
     /// Kind of every cell, in the grid's order.
     pub cells: Vec<u8>,
+    /// Is each cell preventable? Its boundary is drawn where that is known.
+    pub preventable: Option<Vec<bool>>,
     /// Lines at the foot.
     pub notes: Vec<String>,
 }
 
-/// A cell in which nothing fails, and one in which it does.
-pub fn outcomes() -> Vec<(String, Fill)> {
-    vec![kind("pass", "#f7f1dc", Hatch::None), kind("fail", "#6f86ad", Hatch::None)]
+/// Kind of an undecided cell among the outcomes.
+pub const UNDECIDED: u8 = 2;
+/// Colour of the boundary of preventable cases.
+const BOUNDARY: &str = "#c40000";
+
+/// A cell in which nothing fails, one in which it does, and one whose verdict a perturbation changes.
+pub fn outcomes(with_undecided: bool) -> Vec<(String, Fill)> {
+    let kinds = [kind("pass", "#f7f1dc", Hatch::None), kind("fail", "#6f86ad", Hatch::None), undecided()];
+    kinds.into_iter().take(if with_undecided { 3 } else { 2 }).collect()
 }
 
-/// The four kinds of a difference, in the order of [`crate::run::grid::Agreement::ALL`].
-pub fn agreements(first: &str, second: &str) -> Vec<(String, Fill)> {
-    vec![
+fn undecided() -> (String, Fill) {
+    kind("undecided", "#e69f00", Hatch::None)
+}
+
+/// The kinds of a difference, in the order of [`crate::run::grid::Agreement::ALL`].
+pub fn agreements(first: &str, second: &str, with_undecided: bool) -> Vec<(String, Fill)> {
+    let kinds = [
         kind("both pass", "#f7f1dc", Hatch::None),
         kind("both fail", "#b9b9b9", Hatch::None),
         kind(format!("only {first} fails"), "#0072b2", Hatch::Rising),
         kind(format!("only {second} fails"), "#e08a00", Hatch::Falling),
-    ]
+        kind("undecided", "#ffffff", Hatch::Grey),
+    ];
+    kinds.into_iter().take(if with_undecided { 5 } else { 4 }).collect()
 }
 
 fn kind(name: impl Into<String>, colour: &str, hatch: Hatch) -> (String, Fill) {
@@ -50,7 +64,18 @@ impl MapSheet<'_> {
             title: self.title.clone(),
             subtitle: Some(self.subtitle.clone()),
             plots: (0..panels).map(|panel| self.plot(panel)).collect(),
-            caption: "Black lines: the boundary, between cells of different kinds.".to_owned(),
+            caption: match &self.preventable {
+                None => "Black lines: the boundary, between cells of different kinds.",
+                Some(cells) if cells.iter().all(|is_preventable| *is_preventable) => {
+                    "Black lines: the boundary, between cells of different kinds. Every case is preventable: CCHDM or FSM \
+                     avoids it."
+                }
+                Some(_) => {
+                    "Black lines: the boundary, between cells of different kinds. Red dashes: the boundary of preventable \
+                     cases, which CCHDM or FSM avoids."
+                }
+            }
+            .to_owned(),
             notes: ("Notes:", self.notes.clone()),
         }
     }
@@ -71,12 +96,19 @@ impl MapSheet<'_> {
         let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
         let attributes = "class=\"boundary\" stroke-linecap=\"square\"".to_owned();
         let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.8, dash: "", attributes };
+        let preventable = self.preventable.iter().map(|cells| {
+            let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
+            let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
+            let attributes = "class=\"preventable\"".to_owned();
+            Rule { runs: lines.collect(), colour: BOUNDARY, width_px: 2.2, dash: "5 3", attributes }
+        });
+        let layers = [cells.into(), rule.into()].into_iter().chain(preventable.map(Into::into));
         let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel),
             x: axis(self.grid.x().parameter.title(), &across),
             y: axis(self.grid.y().parameter.title(), &up),
-            layers: vec![cells.into(), rule.into()],
+            layers: layers.collect(),
             height: Height::OfWidth(if self.grid.panels().len() == 1 { 0.6 } else { 0.8 }),
             ..Plot::default()
         }

@@ -79,17 +79,19 @@ impl HeadwayFailures {
     /// Share of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
     pub fn figure(&self, scores: &CategoryScores, data: &str) -> Figure {
         let thw_s = |headway: &Headway| match headway {
-            Headway::ThwS(seconds) => *seconds,
-            Headway::GapM(metres) => *metres,
+            Headway::ThwS(seconds) => Some(*seconds),
+            Headway::GapM(metres) => Some(*metres),
+            // It is another one at every speed.
+            Headway::MinFollowing => None,
         };
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
         let panel = |(model, id): (usize, &ModelId)| {
             let series = |criterion: Criterion| {
                 let share = |(at, headway): (usize, &Headway)| {
                     let failed = self.count((0, at, model, criterion));
-                    (thw_s(headway), 100.0 * failed as f64 / scores.scenarios.max(1) as f64)
+                    Some((thw_s(headway)?, 100.0 * failed as f64 / scores.scenarios.max(1) as f64))
                 };
-                let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().map(share).collect();
+                let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().filter_map(share).collect();
                 values.sort_by(|a, b| a.0.total_cmp(&b.0));
                 Series::new(criterion.label(), &[Mark::Line, Mark::Points], values)
             };

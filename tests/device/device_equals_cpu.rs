@@ -6,8 +6,11 @@ use crate::common::device::software_device;
 use crate::common::lane_sets::{forms, random, small_study, thresholds};
 use lanesweep::engine::gpu::{Checks, GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{Comparison, compare, self_check};
-use lanesweep::engine::{Backend, Chunk, CpuBackend, LanePlan, Wanted, same_words};
+use lanesweep::engine::{Backend, Chunk, CpuBackend, Headway, LanePlan, Wanted, same_words};
+use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
+use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
+use lanesweep::scenario::Category;
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;
@@ -33,6 +36,30 @@ fn every_word_of_a_small_study_equals_the_cpus() {
     let comparison = compare("study", &plan, &gpu, |_| ()).unwrap();
     assert_equal("study", &comparison);
     assert_eq!(comparison.lanes(), plan.lane_count());
+}
+
+/// The regulation's distance between vehicles, at speeds of every part of its table.
+#[test]
+fn lanes_that_start_at_the_minimum_following_distance_are_equal() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let axis = |key, from, to, step| GridAxis::range(Category::CutIn, key, (from, to), step).unwrap();
+    let grid = Grid::new(GridParts {
+        name: "following".to_owned(),
+        category: Category::CutIn,
+        x: axis("ego_speed_kmh", 1.0, 130.0, 3.0),
+        y: axis("lateral_speed_mps", 0.3, 1.8, 0.5),
+        panel_axes: vec![axis("other_speed_kmh", 0.0, 40.0, 20.0)],
+        fixed: vec![(MapParameter::find(Category::CutIn, "gap_m", "test").unwrap(), 0.0)],
+        style: CaseStyle::Plain,
+        native_gap: false,
+        closing_only: false,
+        panel_rows: None,
+    })
+    .unwrap();
+    let profile = Profile::load("un-r157").unwrap();
+    let mut plan = GridPlan::new(grid, &profile, &ModelId::ALL).unwrap().parts.remove(0).plan;
+    plan.headways = vec![Headway::MinFollowing];
+    assert_equal("following", &compare("following", &plan, &gpu, |_| ()).unwrap());
 }
 
 #[test]

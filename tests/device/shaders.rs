@@ -53,7 +53,7 @@ fn records() -> Vec<Record> {
         record!("LaneCase", LaneCase<f32>, {
             others: [LaneOther<f32>; 2], ego_speed: f32, ego_width: f32, horizon: u32, pair: u32,
         }),
-        record!("Start", StartRecord, { is_gap: u32, value: f32 }),
+        record!("Start", StartRecord, { kind: u32, value: f32 }),
         record!("Launch", Launch, {
             lanes: u32, headways: u32, variants: u32, first_case: u32, first_word: u32, first_outcome: u32,
             first_cell_word: u32, done_word: u32, wanted: u32, lanes_per_group: u32, ttc_threshold_s: f32, marks_contacts_from: f32,

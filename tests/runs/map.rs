@@ -10,9 +10,10 @@ use lanesweep::engine::{Constants, CpuBackend, Executor, Headway, LaneCase, Sile
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::grid::presets;
+use lanesweep::run::grid::presets::{self, Presets};
 use lanesweep::run::grid::{
-    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, MapParameter, MapQuantity, boundary, count,
+    Agreement, CaseStyle, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions, MapParameter,
+    MapQuantity, boundary, count,
 };
 use lanesweep::scenario::{Category, Tables};
 use proptest::prelude::*;
@@ -218,7 +219,7 @@ fn a_cell_is_what_simulate_says_of_the_same_numbers() {
 #[test]
 fn the_presets_have_the_size_of_the_evidence() {
     let jrc = profile("jrc-2021");
-    let presets: Vec<_> = Category::ALL.into_iter().flat_map(|c| presets::jrc(c, &jrc).unwrap()).collect();
+    let presets: Vec<_> = Category::ALL.into_iter().flat_map(|c| Presets::Jrc.of(c, &jrc).unwrap()).collect();
     let cells: Vec<usize> = presets.iter().map(|p| p.grid.cell_count()).collect();
     assert_eq!(cells, [15_930, 14_040, 6_762, 209]);
     // Of the models of the evidence: one that is added is mapped besides.
@@ -262,7 +263,7 @@ fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
 fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
     let jrc = profile("jrc-2021");
     let mut compared = 0;
-    for preset in [Category::CutIn, Category::Lvd].into_iter().flat_map(|c| presets::jrc(c, &jrc).unwrap()) {
+    for preset in [Category::CutIn, Category::Lvd].into_iter().flat_map(|c| Presets::Jrc.of(c, &jrc).unwrap()) {
         let plan = |grid: Grid| GridPlan::new(grid, &jrc, &preset.models).unwrap();
         let map = |grid: Grid| swept(&plan(grid));
         let nominal = map(preset.grid.clone());
@@ -310,7 +311,7 @@ fn shares_of_a_preset_vary_smoothly_with_the_time_step() {
                     let models = preset.models.iter().enumerate();
                     models.map(|(at, m)| (format!("{} {}", preset.grid.name(), m.name()), share(at))).collect()
                 };
-                presets::jrc(category, &profile).unwrap().into_iter().flat_map(|p| -> Vec<_> { of(p) }).collect()
+                Presets::Jrc.of(category, &profile).unwrap().into_iter().flat_map(|p| -> Vec<_> { of(p) }).collect()
             };
             let known = shares(0.1);
             for dt_s in [0.02, 0.04, 0.045, 0.07] {
@@ -350,7 +351,7 @@ fn a_map_in_which_every_lane_ends_at_the_cap_is_an_error_that_says_what_to_check
     assert!(sweep(at_lateral_speed("lateral_speed_mps=1"), &short).unwrap_err().to_string().contains("0.2 s"));
     // CCHDM avoids every collision with a decelerating leader, in runs that all go on to the cap.
     let jrc = profile("jrc-2021");
-    let lvd = presets::jrc(Category::Lvd, &jrc).unwrap().remove(0);
+    let lvd = Presets::Jrc.of(Category::Lvd, &jrc).unwrap().remove(0);
     let plan = GridPlan::new(lvd.grid, &jrc, &[ModelId::Cchdm]).unwrap();
     assert_eq!(swept(&plan).failures(0, Criterion::Collision), 0);
 }
@@ -367,13 +368,14 @@ fn a_difference_is_what_the_two_maps_say_and_turns_round_with_them() {
         .map(|name| swept(&GridPlan::new(grid.clone(), &profile(name), &[ModelId::Cchdm, ModelId::Fsm]).unwrap()));
     for ((first, at), (second, of)) in [((&a, 0), (&a, 1)), ((&a, 0), (&b, 0)), ((&b, 1), (&a, 1))] {
         for criterion in Criterion::ALL {
-            let [pass, fail, only_first, only_second] = count(&first.difference(at, (second, of), criterion));
-            assert_eq!(pass + fail + only_first + only_second, grid.cell_count() as u64);
+            let [pass, fail, only_first, only_second, undecided] =
+                count(&first.difference(at, (second, of), criterion));
+            assert_eq!((pass + fail + only_first + only_second, undecided), (grid.cell_count() as u64, 0));
             assert_eq!(fail + only_first, first.failures(at, criterion));
             assert_eq!(fail + only_second, second.failures(of, criterion));
             assert_eq!(
                 count(&second.difference(of, (first, at), criterion)),
-                [pass, fail, only_second, only_first],
+                [pass, fail, only_second, only_first, 0],
                 "the other way round"
             );
         }
@@ -512,4 +514,74 @@ fn what_makes_no_map_is_answered_with_what_would() {
         assert!(said.contains(words), "{flags:?}: {said}");
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// The preset of Annex 3 with perturbed cases: undecided cells lie at the boundary, and a perturbation explains each.
+#[test]
+fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_keeps_its_own() {
+    let options = MapOptions {
+        grids: MapGrids::Preset(Presets::R157, Category::CutIn),
+        models: Some(vec![ModelId::Fsm]),
+        criterion: Criterion::Collision,
+        against: None,
+        robust: true,
+    };
+    let map = Map::plan(options, &profile("un-r157")).unwrap();
+    let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic()), |_| ()).unwrap();
+    for mapped in &result.grids {
+        let (grid, map) = (&mapped.plan.grid, &mapped.map);
+        let failed = |cell| map.verdicts(0, cell).failed(Criterion::Collision);
+        let is_undecided = |cell| map.is_undecided(0, cell, Criterion::Collision);
+        let (mut undecided, mut isolated) = (0, 0);
+        for cell in 0..map.cell_count() {
+            let (panel, i, j) = grid.places(cell);
+            let beside = |di: i64, dj: i64| {
+                let (i, j) = (i as i64 + di, j as i64 + dj);
+                let inside = (0..grid.x().len() as i64).contains(&i) && (0..grid.y().len() as i64).contains(&j);
+                inside.then(|| grid.cell(panel, i as usize, j as usize))
+            };
+            let around = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)];
+            let touches =
+                around.iter().filter_map(|(di, dj)| beside(*di, *dj)).any(|other| failed(other) != failed(cell));
+            if is_undecided(cell) {
+                undecided += 1;
+                isolated += u32::from(!touches);
+            }
+        }
+        assert!(undecided > 0 && map.undecided(0, Criterion::Collision) == undecided);
+        assert!(isolated * 10 <= undecided as u32, "{isolated} of {undecided} lie away from the boundary");
+        assert!(undecided * 100 < map.cell_count() as u64, "{undecided}");
+    }
+}
+
+/// What the sheet of one case says, the map says of its cell.
+#[test]
+fn a_cell_is_undecided_where_the_single_case_is() {
+    use lanesweep::run::check::{Check, Subject};
+    let grid = Grid::new(GridParts {
+        fixed: vec![value(Category::CutIn, "other_speed_kmh", 30.0), value(Category::CutIn, "ego_speed_kmh", 60.0)],
+        panel_axes: Vec::new(),
+        ..parts(Category::CutIn, "gap_m=8..20/0.25", "lateral_speed_mps=0.5..1.5/0.25")
+    })
+    .unwrap();
+    let profile = profile("un-r157");
+    let options = MapOptions {
+        grids: MapGrids::Own(grid.clone()),
+        models: Some(vec![ModelId::Cchdm]),
+        criterion: Criterion::Collision,
+        against: None,
+        robust: true,
+    };
+    let map = Map::plan(options, &profile).unwrap();
+    let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic()), |_| ()).unwrap();
+    let map = &result.grids[0].map;
+    for cell in 0..map.cell_count() {
+        let point = grid.point(cell);
+        let gap_m = point.get(MapQuantity::Gap).unwrap();
+        let subject = Subject::plain(&point.plain_case(Category::CutIn, &profile), Headway::GapM(gap_m));
+        let check = Check { subject, profiles: vec![profile.clone()], models: vec![ModelId::Cchdm] };
+        let flips = &check.run().unwrap()[0].models[0].flips;
+        assert_eq!(!flips.is_empty(), map.is_undecided(0, cell, Criterion::Collision), "cell {cell}: {flips:?}");
+    }
+    assert!(map.undecided(0, Criterion::Collision) > 0);
 }

@@ -34,8 +34,8 @@ unsafe impl Pod for LaneCase<f32> {}
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StartRecord {
-    /// 1 where the value is a gap.
-    pub is_gap: u32,
+    /// 0: a time headway; 1: a gap; 2: the minimum following distance, which has no value.
+    pub kind: u32,
     /// s or m.
     pub value: f32,
 }
@@ -43,8 +43,9 @@ pub struct StartRecord {
 impl From<Start<f32>> for StartRecord {
     fn from(start: Start<f32>) -> Self {
         match start {
-            Start::Headway(value) => StartRecord { is_gap: 0, value },
-            Start::Gap(value) => StartRecord { is_gap: 1, value },
+            Start::Headway(value) => StartRecord { kind: 0, value },
+            Start::Gap(value) => StartRecord { kind: 1, value },
+            Start::MinFollowing => StartRecord { kind: 2, value: 0.0 },
         }
     }
 }

@@ -5,7 +5,7 @@ use super::decision::{HEADWAYS, Threshold};
 use super::draw::{CaseRandom, Purpose};
 use super::series::{LateralStart, TINY, ThresholdSeries, rounded};
 use super::solve::{hit, next_other, turn};
-use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP, Start};
+use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP};
 use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::model::driver::{DriverModel, MODELS, View};
 use crate::model::flag::Flag;
@@ -376,10 +376,7 @@ impl ThresholdCases {
     /// The offset to the headway that gives the lane this first gap.
     fn gap_offset(&self, s: &FirstStep, block: usize) -> Option<f32> {
         let frame = &self.constants[block].frames[0];
-        let start = match HEADWAYS[s.start].start::<f32>() {
-            Start::Headway(time) => time * s.v_ego,
-            Start::Gap(gap) => gap,
-        };
+        let start = HEADWAYS[s.start].start::<f32>().gap(s.v_ego);
         let shift = (s.v_other - s.v_ego) * frame.dt;
         let first = |offset: f32| if frame.start_shift { start + offset + shift } else { start + offset };
         let guess = f64::from(s.gap) - f64::from(first(0.0));

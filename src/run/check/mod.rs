@@ -6,7 +6,6 @@
 
 mod boundary;
 mod clauses;
-mod perturbation;
 mod subject;
 
 use rayon::prelude::*;
@@ -19,9 +18,8 @@ use crate::engine::{EndReason, NO_STEP, Outcome, StepMark, Trace, check_time_ste
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::Point;
+use crate::run::grid::{Perturbation, Point};
 use crate::{Place, Result};
-use perturbation::Perturbation;
 
 /// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
 pub const REFERENCE_DRIVERS: [ModelId; 2] = [ModelId::Cchdm, ModelId::Fsm];
@@ -158,11 +156,9 @@ impl Check {
             Ok(ModelId::ALL.map(|model| collides(&lane.run(profile, self.subject.category(), model))).to_vec())
         };
         let mut all = vec![("", verdicts(profile, self.subject.point())?)];
-        for perturbation in Perturbation::all() {
-            let profile = &perturbation.profile(profile)?;
-            if let Some(point) = perturbation.point(self.subject.point()) {
-                all.push((perturbation.label(), verdicts(profile, &point)?));
-            }
+        for perturbation in Perturbation::ALL {
+            let point = perturbation.of_point(*self.subject.point());
+            all.push((perturbation.label(), verdicts(&perturbation.profile(profile)?, &point)?));
         }
         Ok(all)
     }

@@ -31,10 +31,7 @@ pub struct Lane {
 impl Subject {
     /// From plain numbers.
     pub fn plain(case: &PlainCase, headway: Headway) -> Subject {
-        let start = match headway {
-            Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
-            Headway::GapM(gap_m) => (MapQuantity::Gap, gap_m),
-        };
+        let start = start(headway, case.ego_speed_mps);
         let mut point = Point::default()
             .with(MapQuantity::EgoSpeed, case.ego_speed_mps)
             .with(MapQuantity::OtherSpeed, case.speed_mps)
@@ -71,8 +68,7 @@ impl Subject {
         let other_mps = scenario.target.v.first().copied().unwrap_or(0.0).max(0.0);
         let ego_mps = if scenario.category == Category::Lvd { other_mps } else { scenario.ego.v0 };
         let start = match headway {
-            Some(Headway::ThwS(thw_s)) => (MapQuantity::Thw, thw_s),
-            Some(Headway::GapM(gap_m)) => (MapQuantity::Gap, gap_m),
+            Some(headway) => start(headway, ego_mps),
             None => (MapQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
         };
         let point = Point::default()
@@ -117,6 +113,14 @@ impl Subject {
         let mut tables = Tables::default();
         let case = LaneCase::encode(&case, profile, &mut tables);
         Ok(Lane { case, tables, headway })
+    }
+}
+
+/// What a headway sets; the regulation's distance is a gap.
+fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
+    match headway {
+        Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
+        Headway::GapM(_) | Headway::MinFollowing => (MapQuantity::Gap, headway.start().gap(ego_mps)),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::{Error, Place, Result};
 use super::axis::GridAxis;
 use super::jrc_case::{self, Front};
 use super::parameter::{MapParameter, MapQuantity, Point};
+use super::robustness::Perturbation;
 
 /// Cells of a grid at most.
 pub const MAX_CELLS: usize = 1_000_000;
@@ -40,6 +41,7 @@ pub struct Grid {
     fixed: Vec<(&'static MapParameter, f64)>,
     style: CaseStyle,
     native_gap: bool,
+    perturbation: Option<Perturbation>,
 }
 
 /// What a grid is made of.
@@ -94,7 +96,7 @@ impl Grid {
             let help = format!("use longer steps or fewer panels: {MAX_CELLS} cells at most");
             return Err(Error::usage(Place::item(name), problem, help));
         }
-        let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap };
+        let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap, perturbation: None };
         if closing_only {
             grid.leave_out_receding()?;
         }
@@ -200,7 +202,12 @@ impl Grid {
         let mut point = self.panel_point(&self.panels[panel]);
         point.set(self.y.parameter, self.y.values[j]);
         point.set(self.x.parameter, self.x.values[i]);
-        point
+        self.perturbation.map_or(point, |perturbation| perturbation.of_speeds(point))
+    }
+
+    /// The same cells, each case changed a little.
+    pub(super) fn perturbed(&self, perturbation: Perturbation) -> Grid {
+        Grid { perturbation: Some(perturbation), ..self.clone() }
     }
 
     fn panel_point(&self, panel: &[f64]) -> Point {
@@ -267,12 +274,13 @@ impl Grid {
         point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0)
     }
 
-    /// What a cell's run-up adds to its gap, m.
-    pub(super) fn run_up_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
+    /// What a cell's run-up and a perturbation add to its gap, m.
+    pub(super) fn added_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
         let point = self.point(cell);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
-        jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s)
+        let of_run_up = jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s);
+        of_run_up + self.perturbation.map_or(0.0, Perturbation::gap_m)
     }
 }
 

@@ -15,6 +15,8 @@ pub struct GridMap {
     pub models: Vec<ModelId>,
     /// Per model, per cell.
     verdicts: Vec<Vec<Verdicts>>,
+    /// Per model and criterion, the cells whose verdict a perturbation changes; empty where none was swept.
+    undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
 
 /// Two verdicts on one cell.
@@ -28,12 +30,14 @@ pub enum Agreement {
     OnlyFirst,
     /// The second fails alone.
     OnlySecond,
+    /// They differ, but one of them is undecided.
+    Undecided,
 }
 
 impl Agreement {
     /// All, in the order of tables.
-    pub const ALL: [Agreement; 4] =
-        [Agreement::BothPass, Agreement::BothFail, Agreement::OnlyFirst, Agreement::OnlySecond];
+    pub const ALL: [Agreement; 5] =
+        [Agreement::BothPass, Agreement::BothFail, Agreement::OnlyFirst, Agreement::OnlySecond, Agreement::Undecided];
 
     /// From the two.
     pub fn of(first_fails: bool, second_fails: bool) -> Agreement {
@@ -45,13 +49,14 @@ impl Agreement {
         }
     }
 
-    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`.
+    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`, `undecided`.
     pub fn key(self) -> &'static str {
         match self {
             Agreement::BothPass => "both_pass",
             Agreement::BothFail => "both_fail",
             Agreement::OnlyFirst => "only_first",
             Agreement::OnlySecond => "only_second",
+            Agreement::Undecided => "undecided",
         }
     }
 }
@@ -85,9 +90,38 @@ impl GridMap {
             })?;
             summary.add(&swept);
         }
-        let map = GridMap { models: plan.models.clone(), verdicts };
+        let map = GridMap { models: plan.models.clone(), verdicts, undecided: Vec::new() };
         map.check_ends(plan)?;
         Ok((map, summary))
+    }
+
+    /// Marks the cells whose verdict is another one in a perturbed sweep of the same grid.
+    pub fn mark_undecided(&mut self, perturbed: &GridMap) {
+        let cells = self.cell_count();
+        self.undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));
+        for (model, of_model) in self.undecided.iter_mut().enumerate() {
+            for (criterion, marks) in Criterion::ALL.into_iter().zip(of_model) {
+                for (cell, mark) in marks.iter_mut().enumerate() {
+                    let [ours, theirs] = [&*self.verdicts, &*perturbed.verdicts].map(|of| of[model][cell]);
+                    *mark |= ours.failed(criterion) != theirs.failed(criterion);
+                }
+            }
+        }
+    }
+
+    /// Were perturbed grids swept too?
+    pub fn has_undecided(&self) -> bool {
+        !self.undecided.is_empty()
+    }
+
+    /// Does a perturbation change the verdict of a model's cell? `false` where none was swept.
+    pub fn is_undecided(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
+        self.undecided.get(model).is_some_and(|of_model| of_model[criterion as usize][cell])
+    }
+
+    /// Cells whose verdict a perturbation changes.
+    pub fn undecided(&self, model: usize, criterion: Criterion) -> u64 {
+        (0..self.cell_count()).filter(|&cell| self.is_undecided(model, cell, criterion)).count() as u64
     }
 
     /// Some lane must end before the time cap; under a profile whose runs all go on to it, another vehicle must come
@@ -132,8 +166,18 @@ impl GridMap {
 
     /// Where two models' verdicts agree and differ, cell by cell; the second may be of another map of the same grid.
     pub fn difference(&self, first: usize, (other, second): (&GridMap, usize), criterion: Criterion) -> Vec<Agreement> {
-        let pairs = self.verdicts[first].iter().zip(&other.verdicts[second]);
-        pairs.map(|(a, b)| Agreement::of(a.failed(criterion), b.failed(criterion))).collect()
+        let agreement = |cell: usize| {
+            let found = Agreement::of(
+                self.verdicts[first][cell].failed(criterion),
+                other.verdicts[second][cell].failed(criterion),
+            );
+            let is_undecided = self.is_undecided(first, cell, criterion) || other.is_undecided(second, cell, criterion);
+            match found {
+                Agreement::OnlyFirst | Agreement::OnlySecond if is_undecided => Agreement::Undecided,
+                found => found,
+            }
+        };
+        (0..self.cell_count()).map(agreement).collect()
     }
 }
 
@@ -144,8 +188,8 @@ fn meets(plan: &LanePlan) -> bool {
     keys.map(|key| runner.run(&key)).any(|outcome| outcome.min_gap < f32::INFINITY)
 }
 
-/// Counts of the four agreements, in the order of [`Agreement::ALL`].
-pub fn count(cells: &[Agreement]) -> [u64; 4] {
+/// Counts of the agreements, in the order of [`Agreement::ALL`].
+pub fn count(cells: &[Agreement]) -> [u64; 5] {
     Agreement::ALL.map(|kind| cells.iter().filter(|c| **c == kind).count() as u64)
 }
 

@@ -12,6 +12,7 @@ mod map;
 mod parameter;
 mod plan;
 pub mod presets;
+mod robustness;
 mod run;
 
 pub use axis::{GridAxis, MAX_VALUES};
@@ -20,6 +21,7 @@ pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, boundary, count, runs};
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
+pub use robustness::Perturbation;
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};

@@ -12,6 +12,7 @@ use super::axis::GridAxis;
 use super::grid::Grid;
 use super::jrc_case;
 use super::parameter::{MapParameter, MapQuantity};
+use super::robustness::Perturbation;
 
 /// Name of the only variant.
 const VARIANT: &str = "cell";
@@ -84,6 +85,14 @@ impl GridPlan {
         Ok(GridPlan { grid, models: models.to_vec(), parts })
     }
 
+    /// The same cells, each case or its time step changed a little.
+    ///
+    /// # Errors
+    /// As [`GridPlan::new`].
+    pub fn perturbed(&self, profile: &Profile, perturbation: Perturbation) -> Result<GridPlan> {
+        GridPlan::new(self.grid.perturbed(perturbation), &perturbation.profile(profile)?, &self.models)
+    }
+
     /// Number of lanes.
     pub fn lane_count(&self) -> u64 {
         self.parts.iter().map(|part| part.plan.lane_count()).sum()
@@ -115,7 +124,7 @@ impl GridPart {
             let of_cell = layout == Layout::Cells && fixed.is_none();
             let gap_m = if of_cell { models.first().map_or(0.0, |m| grid.gap_m(cell, *m, profile)) } else { 0.0 };
             for other in &mut case.others {
-                other.gap_offset += gap_m + grid.run_up_gap_m(cell, dt_s);
+                other.gap_offset += gap_m + grid.added_gap_m(cell, dt_s);
             }
             source.cases.push(case);
             let varies = |parameter: &MapParameter| layout == Layout::Cells || !is_distance(parameter);

@@ -1,6 +1,7 @@
-//! The grids of the JRC's evidence, and the shares of crashes that are known of them.
+//! Predefined grids: the JRC's evidence with the shares of crashes that are known of it, and the critical scenarios of the
+//! regulation's annex.
 //!
-//! The cut-in grids are the JRC's. Its public simulator has no grid for the other two categories; theirs are ours:
+//! The JRC's cut-in grids are the JRC's. Its public simulator has no grid for the other two categories; theirs are ours:
 //! the leader's decelerations were chosen to give the known share of RSS, and the cut-outs complete the size of the evidence,
 //! 140,793 simulations: 4 models × 29,970 cut-ins, 3 × 209 decelerations, 3 × 6,762 cut-outs. No share of Reg157 is
 //! known of the latter two: it is left out there unless it is asked for.
@@ -33,17 +34,61 @@ impl Preset {
     }
 }
 
-/// Names of the presets.
-pub const NAMES: [&str; 1] = ["jrc"];
+/// Predefined grids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Presets {
+    /// The JRC's evidence for the regulation.
+    Jrc,
+    /// The critical scenarios of the regulation's Annex 3.
+    R157,
+}
+
 /// The profile of the JRC's simulator.
 pub const JRC_PROFILE: &str = "jrc-2021";
+
+impl Presets {
+    /// All, in the order of messages.
+    pub const ALL: [Presets; 2] = [Presets::Jrc, Presets::R157];
+
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Presets::Jrc => "jrc",
+            Presets::R157 => "r157",
+        }
+    }
+
+    /// From its name.
+    pub fn find(name: &str) -> Option<Presets> {
+        Presets::ALL.into_iter().find(|presets| presets.name() == name)
+    }
+
+    /// Name of the profile that it is swept with unless told otherwise.
+    pub fn profile(self) -> &'static str {
+        match self {
+            Presets::Jrc => JRC_PROFILE,
+            Presets::R157 => "un-r157",
+        }
+    }
+
+    /// The grids of a category, as a profile makes their cases.
+    ///
+    /// # Errors
+    /// None on the grids as they stand.
+    pub fn of(self, category: Category, profile: &Profile) -> Result<Vec<Preset>> {
+        match self {
+            Presets::Jrc => jrc(category, profile),
+            Presets::R157 => r157(category),
+        }
+    }
+}
 
 /// The JRC's grids of a category. Cases are made as its simulator makes them where the profile starts its runs as it
 /// does (`start_shift`), and as [`CaseStyle::Plain`] otherwise.
 ///
 /// # Errors
 /// None on the grids as they stand.
-pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
+fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
     use ModelId::{Cchdm, Fsm, Reg157, Rss};
     let is_jrc = profile.frame.start_shift;
     let style = match (is_jrc, category) {
@@ -104,6 +149,67 @@ pub fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
             let panel_axes = vec![range("ego_speed_kmh", (60.0, 120.0), 10.0)?];
             let grid = Grid::new(GridParts { panel_axes, fixed, ..parts("cut_out", x, y) })?;
             Ok(vec![Preset { grid, models: following, known_percent: Vec::new(), is_chosen_to_match: false }])
+        }
+    }
+}
+
+/// The critical scenarios of Annex 3 (guidance on traffic disturbances, data sheets), in two ranges of speed: to 60 km/h
+/// (00 series of amendments) and to 130 km/h (01 series).
+///
+/// The regulation gives what varies and what is held: cut-in, the initial gap and the lateral speed for pairs of speeds;
+/// cut-out, both vehicles at one speed, 2 s of headway, a stationary vehicle ahead, its distance and the lateral speed;
+/// deceleration, 2 s of headway and up to 1 g. The steps and the ends of gaps and lateral speeds are ours (1.8 m/s is the
+/// annex's example).
+fn r157(category: Category) -> Result<Vec<Preset>> {
+    let range = |key, ends, step| GridAxis::range(category, key, ends, step);
+    let fixed = |values: &[(&str, f64)]| -> Result<Vec<(&'static MapParameter, f64)>> {
+        values.iter().map(|(key, value)| Ok((MapParameter::find(category, key, "preset")?, *value))).collect()
+    };
+    let grid = |name: &str, x: GridAxis, y: GridAxis, panel_axes, values: &[(&str, f64)]| -> Result<Preset> {
+        let grid = Grid::new(GridParts {
+            name: name.to_owned(),
+            category,
+            x,
+            y,
+            closing_only: category == Category::CutIn,
+            panel_axes,
+            fixed: fixed(values)?,
+            style: CaseStyle::Plain,
+            native_gap: false,
+            panel_rows: None,
+        })?;
+        let models = ModelId::ALL.to_vec();
+        Ok(Preset { grid, models, known_percent: Vec::new(), is_chosen_to_match: false })
+    };
+    let lateral = || range("lateral_speed_mps", (0.1, 1.8), 0.1);
+    let ego = |from, to, step| range("ego_speed_kmh", (from, to), step);
+    match category {
+        Category::CutIn => {
+            let panels = |ego, from, to, step| -> Result<Vec<GridAxis>> {
+                Ok(vec![ego, range("other_speed_kmh", (from, to), step)?])
+            };
+            let low = panels(ego(20.0, 60.0, 10.0)?, 10.0, 50.0, 10.0)?;
+            let high = panels(ego(70.0, 130.0, 20.0)?, 10.0, 110.0, 20.0)?;
+            Ok(vec![
+                grid("cut_in_to_60", range("gap_m", (1.0, 60.0), 1.0)?, lateral()?, low, &[])?,
+                grid("cut_in_to_130", range("gap_m", (2.0, 120.0), 2.0)?, lateral()?, high, &[])?,
+            ])
+        }
+        Category::CutOut => {
+            let held = [("thw_s", 2.0), ("ahead_speed_kmh", 0.0)];
+            let across = |to| range("ahead_gap_m", (2.0, to), 2.0);
+            Ok(vec![
+                grid("cut_out_to_60", across(60.0)?, lateral()?, vec![ego(10.0, 60.0, 10.0)?], &held)?,
+                grid("cut_out_to_130", across(120.0)?, lateral()?, vec![ego(70.0, 130.0, 20.0)?], &held)?,
+            ])
+        }
+        Category::Lvd => {
+            let across = || range("deceleration_mps2", (0.2, 10.0), 0.2);
+            let held = [("thw_s", 2.0)];
+            Ok(vec![
+                grid("lvd_to_60", across()?, ego(10.0, 60.0, 2.0)?, Vec::new(), &held)?,
+                grid("lvd_to_130", across()?, ego(62.0, 130.0, 4.0)?, Vec::new(), &held)?,
+            ])
         }
     }
 }

@@ -3,7 +3,8 @@
 use super::grid::Grid;
 use super::map::GridMap;
 use super::plan::GridPlan;
-use super::presets::{self, Preset};
+use super::presets::{self, Preset, Presets};
+use super::robustness::Perturbation;
 use crate::engine::{Executor, LanePlan, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -14,8 +15,8 @@ use crate::{Error, Place, Result};
 /// Which cells are mapped.
 #[derive(Debug, Clone)]
 pub enum MapGrids {
-    /// The grids of the JRC's evidence for a category, with models of their own.
-    Jrc(Category),
+    /// Predefined grids of a category, with models of their own.
+    Preset(Presets, Category),
     /// One grid.
     Own(Grid),
 }
@@ -40,6 +41,8 @@ pub struct MapOptions {
     pub criterion: Criterion,
     /// What the maps are compared with.
     pub against: Option<Against>,
+    /// Also sweep every grid with each [`Perturbation`]: cells whose verdict changes are undecided.
+    pub robust: bool,
 }
 
 /// Planned maps.
@@ -49,15 +52,16 @@ pub struct MapOptions {
 /// use lanesweep::model::criterion::Criterion;
 /// use lanesweep::model::driver::ModelId;
 /// use lanesweep::model::profile::Profile;
-/// use lanesweep::run::grid::{Map, MapGrids, MapOptions};
+/// use lanesweep::run::grid::{Map, MapGrids, MapOptions, presets::Presets};
 /// use lanesweep::scenario::Category;
 ///
 /// # fn main() -> lanesweep::Result<()> {
 /// let options = MapOptions {
-///     grids: MapGrids::Jrc(Category::Lvd),
+///     grids: MapGrids::Preset(Presets::Jrc, Category::Lvd),
 ///     models: Some(vec![ModelId::Rss]),
 ///     criterion: Criterion::Collision,
 ///     against: None,
+///     robust: false,
 /// };
 /// let map = Map::plan(options, &Profile::load("jrc-2021")?)?;
 /// assert_eq!(map.lane_count(), 209);
@@ -75,6 +79,10 @@ struct PlannedGrid {
     known_percent: Vec<Option<f64>>,
     is_chosen_to_match: bool,
     other: Option<(String, GridPlan)>,
+    /// The same cells, perturbed.
+    perturbed: Vec<GridPlan>,
+    /// Those of the other profile.
+    other_perturbed: Vec<GridPlan>,
 }
 
 /// A swept grid with what is known of it.
@@ -103,7 +111,7 @@ impl MapOptions {
     /// The grids under a profile, with their models.
     fn presets(&self, profile: &Profile) -> Result<Vec<Preset>> {
         let mut presets = match &self.grids {
-            MapGrids::Jrc(category) => presets::jrc(*category, profile)?,
+            MapGrids::Preset(presets, category) => presets.of(*category, profile)?,
             MapGrids::Own(grid) => vec![Preset {
                 grid: grid.clone(),
                 models: ModelId::ALL.to_vec(),
@@ -141,7 +149,7 @@ impl Map {
             let problem = format!("`{name}` runs anyway: there is nothing to compare");
             return Err(Error::usage(Place::option("against"), problem, "name another model or profile"));
         }
-        let is_published = matches!(options.grids, MapGrids::Jrc(_))
+        let is_published = matches!(options.grids, MapGrids::Preset(Presets::Jrc, _))
             && options.criterion == Criterion::Collision
             && *profile == Profile::load(presets::JRC_PROFILE)?;
         let others = match &options.against {
@@ -160,10 +168,20 @@ impl Map {
                 None => None,
             };
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
+            let perturbed = |plan: &GridPlan, profile: &Profile| {
+                let all = Perturbation::ALL.iter().filter(|_| options.robust);
+                all.map(|perturbation| plan.perturbed(profile, *perturbation)).collect::<Result<Vec<_>>>()
+            };
+            let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
             grids.push(PlannedGrid {
                 known_percent: preset.models.iter().map(known).collect(),
                 is_chosen_to_match: preset.is_chosen_to_match && is_published,
-                plan: GridPlan::new(preset.grid, profile, &preset.models)?,
+                perturbed: perturbed(&plan, profile)?,
+                other_perturbed: match (&other, &others) {
+                    (Some((_, plan)), Some((profile, _))) => perturbed(plan, profile)?,
+                    _ => Vec::new(),
+                },
+                plan,
                 other,
             });
         }
@@ -174,7 +192,9 @@ impl Map {
     pub fn plans(&self) -> impl Iterator<Item = (Option<&str>, &GridPlan)> {
         self.grids.iter().flat_map(|grid| {
             let other = grid.other.iter().map(|(name, plan)| (Some(name.as_str()), plan));
-            std::iter::once((None, &grid.plan)).chain(other)
+            let perturbed = grid.perturbed.iter().map(|plan| (Some("a perturbation"), plan));
+            let of_other = grid.other_perturbed.iter().map(|plan| (Some("a perturbation"), plan));
+            std::iter::once((None, &grid.plan)).chain(other).chain(perturbed).chain(of_other)
         })
     }
 
@@ -199,17 +219,24 @@ impl Map {
     /// As [`GridMap::sweep`].
     pub fn run(self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<MapResult> {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        let mut swept = |plan: &GridPlan| -> Result<GridMap> {
-            let (map, of_map) = GridMap::sweep(plan, executor)?;
-            summary.add(&of_map);
+        let mut swept = |plan: &GridPlan, perturbed: &[GridPlan]| -> Result<GridMap> {
+            let mut sweep = |plan: &GridPlan| -> Result<GridMap> {
+                let (map, of_map) = GridMap::sweep(plan, executor)?;
+                summary.add(&of_map);
+                Ok(map)
+            };
+            let mut map = sweep(plan)?;
+            for plan in perturbed {
+                map.mark_undecided(&sweep(plan)?);
+            }
             Ok(map)
         };
         let mut grids = Vec::new();
-        for PlannedGrid { plan, known_percent, is_chosen_to_match, other } in self.grids {
-            let map = swept(&plan)?;
+        for PlannedGrid { plan, known_percent, is_chosen_to_match, other, perturbed, other_perturbed } in self.grids {
+            let map = swept(&plan, &perturbed)?;
             let other = match other {
                 Some((name, plan)) => {
-                    let map = swept(&plan)?;
+                    let map = swept(&plan, &other_perturbed)?;
                     Some((name, plan, map))
                 }
                 None => None,

@@ -122,6 +122,7 @@ impl StudyHead {
         }
         let number = |headway: &Headway| match *headway {
             Headway::ThwS(number) | Headway::GapM(number) => number,
+            Headway::MinFollowing => 0.0,
         };
         if !self.headways.iter().all(|headway| (0.0..1e6).contains(&number(headway))) {
             return wrong("a headway is out of range (0 to 1e6)");

@@ -1,0 +1,105 @@
+//! Robust verdicts: does a verdict survive half the time step, a centimetre of gap, a tenth of a kilometre per hour? A case
+//! whose verdict does not is *undecided*: rounding decides it, or a measurement would have to be better than it is.
+
+use super::parameter::{MapQuantity, Point};
+use crate::Result;
+use crate::model::profile::Profile;
+
+/// Change of the initial gap, m.
+pub const GAP_M: f64 = 0.01;
+/// Change of a speed, m/s: 0.1 km/h.
+pub const SPEED_MPS: f64 = 0.1 / 3.6;
+
+/// A small change of a case or of how it is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Perturbation {
+    /// Half the time step.
+    HalfStep,
+    /// One centimetre of initial gap more.
+    GapMore,
+    /// One centimetre less.
+    GapLess,
+    /// The ego is 0.1 km/h faster.
+    EgoFaster,
+    /// The ego is 0.1 km/h slower.
+    EgoSlower,
+    /// The other vehicle is 0.1 km/h faster.
+    OtherFaster,
+    /// The other vehicle is 0.1 km/h slower.
+    OtherSlower,
+}
+
+impl Perturbation {
+    /// All, in the order of messages.
+    pub const ALL: [Perturbation; 7] = [
+        Perturbation::HalfStep,
+        Perturbation::GapMore,
+        Perturbation::GapLess,
+        Perturbation::EgoFaster,
+        Perturbation::EgoSlower,
+        Perturbation::OtherFaster,
+        Perturbation::OtherSlower,
+    ];
+
+    /// What it is, in words.
+    pub fn label(self) -> &'static str {
+        match self {
+            Perturbation::HalfStep => "half the time step",
+            Perturbation::GapMore => "gap + 1 cm",
+            Perturbation::GapLess => "gap - 1 cm",
+            Perturbation::EgoFaster => "ego + 0.1 km/h",
+            Perturbation::EgoSlower => "ego - 0.1 km/h",
+            Perturbation::OtherFaster => "other + 0.1 km/h",
+            Perturbation::OtherSlower => "other - 0.1 km/h",
+        }
+    }
+
+    /// What is added to the initial gap, m.
+    pub fn gap_m(self) -> f64 {
+        match self {
+            Perturbation::GapMore => GAP_M,
+            Perturbation::GapLess => -GAP_M,
+            _ => 0.0,
+        }
+    }
+
+    /// The profile that the changed case runs under.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for a time step that is too short.
+    pub fn profile(self, profile: &Profile) -> Result<Profile> {
+        match self {
+            Perturbation::HalfStep => profile.clone().with_dt(profile.frame.dt_s / 2.0),
+            _ => Ok(profile.clone()),
+        }
+    }
+
+    /// The same point with other speeds; a vehicle without a speed of its own has the ego's.
+    pub fn of_speeds(self, mut point: Point) -> Point {
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        let (quantity, by_mps) = match self {
+            Perturbation::EgoFaster => (MapQuantity::EgoSpeed, SPEED_MPS),
+            Perturbation::EgoSlower => (MapQuantity::EgoSpeed, -SPEED_MPS),
+            Perturbation::OtherFaster => (MapQuantity::OtherSpeed, SPEED_MPS),
+            Perturbation::OtherSlower => (MapQuantity::OtherSpeed, -SPEED_MPS),
+            _ => return point,
+        };
+        let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
+        point = point.with(MapQuantity::OtherSpeed, other_mps);
+        let speed_mps = point.get(quantity).unwrap_or(0.0) + by_mps;
+        point.with(quantity, speed_mps.max(0.0))
+    }
+
+    /// The same point with another gap or other speeds; a time headway becomes longer or shorter by the centimetre.
+    pub fn of_point(self, point: Point) -> Point {
+        let point = self.of_speeds(point);
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        match (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw)) {
+            (Some(gap_m), _) => point.with(MapQuantity::Gap, (gap_m + self.gap_m()).max(0.0)),
+            (None, Some(thw_s)) if ego_mps > 0.0 => {
+                point.with(MapQuantity::Thw, (thw_s + self.gap_m() / ego_mps).max(0.0))
+            }
+            _ => point,
+        }
+    }
+}
