@@ -9,7 +9,6 @@ use super::case_flags::{CaseFlags, from_table, from_toml};
 use super::console::Verbosity;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
-use crate::interop::cluster::quoted_word;
 use crate::interop::openscenario::read_scenario;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -89,7 +88,7 @@ impl Check {
             is_synthetic: asked.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
-            command: command(),
+            command: super::justify::command(),
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
@@ -196,10 +195,4 @@ fn write(path: &Path, bytes: &[u8]) -> Result<()> {
         make_folder(dir)?;
     }
     write_atomically(path, bytes)
-}
-
-/// What was typed, for whoever wants to repeat it.
-fn command() -> String {
-    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
-    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }

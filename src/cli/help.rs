@@ -5,7 +5,7 @@ use clap::{Arg, ArgAction, Command};
 
 /// Verbs by what people want.
 const VERBS: [(&str, &[&str]); 5] = [
-    ("Study a data set", &["study", "mine", "compare"]),
+    ("Study a data set", &["study", "mine", "compare", "justify"]),
     ("Probabilities", &["fit", "sample"]),
     ("Single cases and grids", &["check", "simulate", "map", "export"]),
     ("More machines", &["cluster"]),
@@ -50,6 +50,7 @@ const FLAGS: [Group; 5] = [
             "category",
             "categories",
             "parameterizations",
+            "parameterization",
             "with_thw",
             "preset",
             "x",

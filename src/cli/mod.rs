@@ -21,6 +21,7 @@ mod export_worst;
 mod fit;
 mod format;
 mod help;
+mod justify;
 mod lists;
 mod map;
 mod merge;
@@ -107,6 +108,7 @@ enum Verb {
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
     Compare(Box<compare::Compare>),
+    Justify(Box<justify::Justify>),
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
@@ -207,6 +209,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Merge(verb) => verb.run(),
         Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Justify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(cli.common.verbosity()),

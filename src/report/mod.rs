@@ -8,6 +8,7 @@ pub mod compare;
 pub mod convergence;
 pub mod csv;
 pub mod density;
+pub mod dossier;
 pub mod failure_map;
 pub mod forest;
 pub mod html;

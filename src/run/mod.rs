@@ -1,12 +1,13 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
-//! one another, [`grid`] sweeps maps, [`check`] judges single cases.
+//! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
 //! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
 
 pub mod check;
 pub mod compare;
 pub mod grid;
+pub mod justify;
 pub mod parts;
 #[cfg(test)]
 mod plan_mutations;

@@ -28,9 +28,11 @@ pub const ESTIMATE_RECORD: &str = "estimate.json";
 pub const MAP_RECORD: &str = "map.json";
 /// Record of a comparison.
 pub const COMPARE_RECORD: &str = "compare.json";
+/// Record of a dossier.
+pub const DOSSIER_RECORD: &str = "dossier.json";
 
 /// Records of runs that write files of the same names, such as `report.html`: a folder holds one of them.
-const RECORDS: [&str; 4] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD];
+const RECORDS: [&str; 5] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, DOSSIER_RECORD];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";

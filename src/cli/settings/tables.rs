@@ -33,6 +33,8 @@ pub struct Settings {
     pub sample: SampleSettings,
     /// `lanesweep compare`.
     pub compare: CompareSettings,
+    /// `lanesweep justify`: when a parameterization is appropriate.
+    pub justify: crate::run::justify::Rules,
 }
 
 impl Settings {
@@ -44,7 +46,8 @@ impl Settings {
         self.generator.validate()?;
         self.mining.validate()?;
         self.parameterization.validate()?;
-        self.score.validate()
+        self.score.validate()?;
+        self.justify.validate()
     }
 }
 

@@ -7,11 +7,13 @@
 mod functions;
 mod jrc;
 mod lanes;
+mod shipped;
 mod table;
 mod tally;
 
 pub use functions::compare_functions;
 pub use jrc::compare_jrc;
 pub use lanes::{LaneComparison, compare_lanes};
+pub use shipped::check_shipped_tables;
 pub use table::{Row, Table, TableKind};
 pub use tally::{Deviation, Tally};

@@ -34,8 +34,15 @@ pub struct Row<'a> {
 impl Table {
     /// Reads a whole table; it must have a header and at least one row.
     pub fn read(path: &Path) -> Result<Table> {
-        let text = input_file::read_text(path, input_file::MAX_TABLE_BYTES)?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        Table::parse(&input_file::read_text(path, input_file::MAX_TABLE_BYTES)?, path)
+    }
+
+    /// The same from its text; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Table::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Table> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let broken = |e: csv::Error| {
             let mut place = Place::file(path);

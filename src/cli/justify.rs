@@ -1,0 +1,177 @@
+//! `lanesweep justify`: is a parameterization appropriate for one driver model, kind of scenario and criterion?
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::backend_flags::BackendFlags;
+use super::configured::Configured;
+use super::console::Verbosity;
+use super::format::FormatFlag;
+use super::source::{self, PlausibilityFlag, Source};
+use super::synth::GeneratorFlags;
+use super::{Exit, ProfileFlags, fit, lists};
+use crate::interop::cluster::quoted_word;
+use crate::interop::conformance::check_shipped_tables;
+use crate::model::driver::ModelId;
+use crate::report::dossier::DossierReport;
+use crate::run::compare::CompareOptions;
+use crate::run::justify::{JustifyOptions, justify};
+use crate::run::study::StudyOptions;
+use crate::scenario::Category;
+use crate::scenario::parameterization::Parameterization;
+use crate::stats::density::Driven;
+use crate::stats::estimate::Enough;
+use crate::support::files::check_folder;
+use crate::support::run_dir::{DOSSIER_RECORD, OutputDir};
+use crate::traffic::mining::counts_text;
+use crate::{Error, Place, Result};
+
+/// Is a parameterization appropriate for this driver model, scenario type and criterion?
+///
+/// Replays the recorded scenarios (S) as recorded and as parameterized (S'), fits a density, and concludes by the rules of
+/// [justify] in the configuration: appropriate, not appropriate, or undecided and how much more data would decide. The
+/// dossier (report.html) names the failures that are hidden, shows the worst of them, gives the risk ratio, the coverage
+/// and the alternatives. Without data it runs on generated recordings.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+#[command(after_help = "Examples:\n  \
+                  lanesweep justify --parameterization 2 --models FSM\n  \
+                  lanesweep justify recordings --parameterization iii --models CCHDM --criterion ttc --out dossier\n  \
+                  lanesweep justify --scenarios scenarios.jsonl --parameterization 6 --models Reg157")]
+pub struct Justify {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    dir: Option<PathBuf>,
+    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
+    #[arg(long, value_name = "FILE")]
+    scenarios: Option<PathBuf>,
+    /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
+    #[arg(long, value_name = "KEY")]
+    parameterization: String,
+    /// Driver model: Reg157, CCHDM, RSS, FSM
+    #[arg(long, alias = "model", value_name = "NAME")]
+    models: String,
+    #[command(flatten)]
+    criterion: lists::CriterionFlag,
+    /// Time headways; paper is 2.0, 1.8, … 0.2
+    #[arg(long, value_name = "s,s,…|paper|r157", default_value = "paper")]
+    thw: String,
+    /// Folder for report.html, dossier.json and hidden.csv
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier")]
+    out: PathBuf,
+    #[command(flatten)]
+    format: FormatFlag,
+    #[command(flatten)]
+    backend: BackendFlags,
+    #[command(flatten)]
+    profile: ProfileFlags,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
+    #[command(flatten)]
+    generator: GeneratorFlags,
+}
+
+impl Justify {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+        let started = Instant::now();
+        let config = &configured.settings;
+        let id = parameterization(&self.parameterization)?;
+        let model = ModelId::parse(self.models.trim()).ok_or_else(|| {
+            let problem = format!("`{}` is not one driver model", self.models);
+            Error::usage(Place::item("--models"), problem, format!("use one of {}", ModelId::names()))
+        })?;
+        let criterion = self.criterion.get()?;
+        let headways = lists::paper_or_headways(&self.thw)?;
+        let profile = self.profile.load()?;
+        let source = match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(self.generator.options(configured)?),
+        };
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
+        for name in ["report.html", DOSSIER_RECORD, "hidden.csv", "hidden.svg"] {
+            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
+        }
+        check_folder(&self.out)?;
+        let opened = self.backend.open()?;
+        tracing::info!("{}", source.describe(false));
+        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
+        tracing::info!("{}", counts_text(&collection.scenarios));
+        let facts = fit::facts(&source, &collection, Driven { hours: None, kilometres: None })?;
+        let options = JustifyOptions {
+            compare: CompareOptions {
+                study: StudyOptions {
+                    categories: vec![id.category],
+                    models: vec![model],
+                    headways,
+                    parameterization: config.parameterization.clone(),
+                },
+                parameterizations: vec![id],
+                samples: config.compare.samples,
+                seed: config.compare.seed,
+                enough: Enough {
+                    failures: config.score.least_failures.into(),
+                    margin: config.compare.margin,
+                    ..Enough::default()
+                },
+            },
+            criterion,
+            score: config.score.clone(),
+            rules: config.justify.clone(),
+        };
+        let folder = OutputDir::open(&self.out, DOSSIER_RECORD)?;
+        let executor = opened.executor().with_recheck(config.compare.seed);
+        let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;
+        for error in &dossier.left_out {
+            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
+        }
+        let conformance = check_shipped_tables()?;
+        let report = DossierReport {
+            dossier: &dossier,
+            rules: &options.rules,
+            margin: options.compare.enough.margin,
+            confidence: options.score.confidence,
+            data: facts.data.clone(),
+            is_synthetic: facts.synthetic,
+            scenarios_sha256: facts.scenarios_sha256.clone(),
+            profile: &profile,
+            conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
+            command: command(),
+            host: opened.host(dossier.summary.rechecked_lanes, started),
+        };
+        let mut results = folder.results()?;
+        results.add("report.html", report.html()?.as_bytes())?;
+        results.add("hidden.csv", &report.hidden_csv()?)?;
+        if let Some(svg) = report.example() {
+            results.add("hidden.svg", svg.as_bytes())?;
+        }
+        let files = results.names();
+        results.publish(report.json(&files)?.as_bytes())?;
+        self.format.print(|| report.text(), || report.json(&files))?;
+        tracing::info!("results written to {}", self.out.display());
+        let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
+        Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
+    }
+}
+
+/// A parameterization by its key; the keys of the categories differ.
+fn parameterization(key: &str) -> Result<Parameterization> {
+    let found = Category::ALL.into_iter().find_map(|category| Parameterization::find(category, key.trim()));
+    found.ok_or_else(|| {
+        let keys = Category::ALL.into_iter().flat_map(Parameterization::of).map(|id| id.key.to_string());
+        let help = format!("use one of {}", keys.collect::<Vec<_>>().join(", "));
+        Error::usage(Place::item("--parameterization"), format!("there is no parameterization `{key}`"), help)
+    })
+}
+
+fn named(tally: &crate::interop::conformance::Tally) -> String {
+    tally.model.map_or_else(|| tally.label.clone(), |model| format!("{}, {}", tally.label, model.name()))
+}
+
+/// What was typed, for whoever wants to repeat it.
+pub(super) fn command() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
+    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
+}

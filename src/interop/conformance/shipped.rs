@@ -1,0 +1,19 @@
+//! The tables of the JRC's simulator that ship with the program: a build checks itself.
+
+use std::path::Path;
+
+use super::{Table, Tally, compare_functions, compare_jrc};
+use crate::Result;
+use crate::model::profile::Profile;
+
+/// Compares this build with the tables of leader decelerations and of model functions under `jrc-2021`.
+///
+/// # Errors
+/// None for tables that fit: they are part of the program.
+pub fn check_shipped_tables() -> Result<Vec<Tally>> {
+    let table = |name: &str, text| Table::parse(text, Path::new(name));
+    let jrc = Profile::load("jrc-2021")?;
+    let mut all = compare_jrc(&table("lvd.csv", include_str!("../../../tests/golden/lvd.csv"))?, &jrc)?;
+    all.extend(compare_functions(&table("functions.csv", include_str!("../../../tests/golden/functions.csv"))?, &jrc)?);
+    Ok(all)
+}

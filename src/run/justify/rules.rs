@@ -1,0 +1,196 @@
+//! The rules by which a parameterization is appropriate, not appropriate or undecided.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Coverage;
+use super::scores::{Scored, Share};
+use crate::run::sampling::ComparedCell;
+use crate::run::score::ScoreOptions;
+use crate::stats::estimate::{Ratio, RatioVerdict};
+use crate::{Error, Place, Result};
+
+/// Limits; a quantity passes where its whole interval does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rules {
+    /// Least recall: failures of S that S' has too (0.9). A hidden failure is the error that an assessment must not make.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub min_recall: f64,
+    /// Least precision: failures of S' that S has too (0.8). False alarms cost effort, not safety.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub min_precision: f64,
+    /// Least share of kept scenarios that are points of the parameter space (0.95).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub min_coverage: f64,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Rules { min_recall: 0.9, min_precision: 0.8, min_coverage: 0.95 }
+    }
+}
+
+/// What a rule, or all of them, say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Conclusion {
+    /// Every rule holds.
+    Appropriate,
+    /// A rule does not hold.
+    NotAppropriate,
+    /// The data does not decide.
+    Undecided,
+}
+
+/// What would decide an undecided rule, at the same rates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Need {
+    /// So many times as many scenarios as now.
+    pub times: f64,
+}
+
+/// What a rule finds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Quantity.
+    pub quantity: &'static str,
+    /// Its value.
+    pub value: Option<f64>,
+    /// Its interval.
+    pub interval: Option<(f64, f64)>,
+    /// The rule in words.
+    pub rule: String,
+    /// What it says.
+    pub conclusion: Conclusion,
+    /// What would decide it.
+    pub need: Option<Need>,
+}
+
+impl Conclusion {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Conclusion::Appropriate => "appropriate",
+            Conclusion::NotAppropriate => "not appropriate",
+            Conclusion::Undecided => "undecided",
+        }
+    }
+
+    /// Of several rules: the worst.
+    pub fn of(findings: &[Finding]) -> Conclusion {
+        let any = |conclusion| findings.iter().any(|finding| finding.conclusion == conclusion);
+        if any(Conclusion::NotAppropriate) {
+            Conclusion::NotAppropriate
+        } else if any(Conclusion::Undecided) {
+            Conclusion::Undecided
+        } else {
+            Conclusion::Appropriate
+        }
+    }
+}
+
+impl Rules {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the key.
+    pub fn validate(&self) -> Result<()> {
+        let limits = [
+            ("justify.min_recall", self.min_recall),
+            ("justify.min_precision", self.min_precision),
+            ("justify.min_coverage", self.min_coverage),
+        ];
+        match limits.iter().find(|(_, limit)| !(0.0..=1.0).contains(limit)) {
+            None => Ok(()),
+            Some((key, limit)) => {
+                Err(Error::usage(Place::item(*key), format!("{limit} is out of range"), "use a number from 0 to 1"))
+            }
+        }
+    }
+
+    /// Recall and precision.
+    pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
+        let counts = &scored.counts;
+        let share = |quantity, share: Share, limit: f64, failures: u64| {
+            let (conclusion, need) = judge(share, limit, failures, options);
+            let rule = format!("at least {limit}");
+            Finding { quantity, value: share.value, interval: share.interval, rule, conclusion, need }
+        };
+        vec![
+            share("recall", scored.recall, self.min_recall, counts.tp + counts.fn_),
+            share("precision", scored.precision, self.min_precision, counts.tp + counts.fp),
+        ]
+    }
+
+    /// Risk ratio of the density, and coverage; undecided where there is no density.
+    pub(super) fn of_density(
+        &self,
+        compared: Option<&ComparedCell>,
+        coverage: Option<&Coverage>,
+        margin: f64,
+    ) -> Vec<Finding> {
+        let ratio = compared.map(|cell| cell.sampled.ratio);
+        let risk = Finding {
+            quantity: "risk ratio P/S",
+            value: ratio.and_then(|r| r.ratio),
+            interval: ratio.and_then(|r| r.low.zip(r.high)),
+            rule: format!("interval within {:.2} to {margin}", 1.0 / margin),
+            conclusion: match ratio.map(|r| r.verdict) {
+                Some(RatioVerdict::Agrees) => Conclusion::Appropriate,
+                Some(RatioVerdict::TooHigh | RatioVerdict::TooLow) => Conclusion::NotAppropriate,
+                Some(RatioVerdict::Undecided) | None => Conclusion::Undecided,
+            },
+            need: ratio.and_then(|ratio| self::need_of_ratio(&ratio, margin)),
+        };
+        let share = coverage.filter(|c| c.kept > 0).map(|c| c.points as f64 / c.kept as f64);
+        let covered = Finding {
+            quantity: "coverage",
+            value: share,
+            interval: None,
+            rule: format!("at least {}", self.min_coverage),
+            conclusion: match share {
+                Some(share) if share >= self.min_coverage => Conclusion::Appropriate,
+                Some(_) => Conclusion::NotAppropriate,
+                None => Conclusion::Undecided,
+            },
+            need: None,
+        };
+        vec![risk, covered]
+    }
+}
+
+/// A share passes where its whole interval lies at or above the limit, and fails where it lies below.
+fn judge(share: Share, limit: f64, failures: u64, options: &ScoreOptions) -> (Conclusion, Option<Need>) {
+    let least = u64::from(options.least_failures.max(1));
+    let Some((value, (low, high))) = share.value.zip(share.interval) else {
+        // Without any failure nothing tells how many scenarios would have one.
+        let times = least as f64 / failures as f64;
+        return (Conclusion::Undecided, (failures > 0).then_some(Need { times: times.max(2.0) }));
+    };
+    if low >= limit {
+        (Conclusion::Appropriate, None)
+    } else if high < limit {
+        (Conclusion::NotAppropriate, None)
+    } else {
+        // The width of an interval falls with the square root of the number of scenarios.
+        let (distance, half_width) =
+            if value >= limit { (value - limit, value - low) } else { (limit - value, high - value) };
+        let times = (half_width / distance).powi(2);
+        (Conclusion::Undecided, times.is_finite().then_some(Need { times: times.max(1.1) }))
+    }
+}
+
+/// What would decide an undecided ratio: its logarithm is nearly normal, so its interval narrows like that of a share.
+fn need_of_ratio(ratio: &Ratio, margin: f64) -> Option<Need> {
+    let (value, (low, high)) = ratio.ratio.zip(ratio.low.zip(ratio.high))?;
+    if ratio.verdict != RatioVerdict::Undecided || value <= 0.0 || low <= 0.0 {
+        return None;
+    }
+    let log = value.ln();
+    // To the limit of agreement from within it, else to 1.
+    let distance = if log.abs() < margin.ln() { margin.ln() - log.abs() } else { log.abs() };
+    let half_width = if log > 0.0 { (high / value).ln() } else { (value / low).ln() };
+    let times = (half_width / distance).powi(2);
+    times.is_finite().then_some(Need { times: times.max(1.1) })
+}

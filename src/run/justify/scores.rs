@@ -1,0 +1,149 @@
+//! Labels of S' against those of S, lane by lane: recall, precision and F1 with intervals over scenarios, and the same by
+//! groups.
+
+use crate::engine::Confusion;
+use crate::run::score::{ScoreOptions, f1, f1_interval, precision, recall};
+use crate::stats::estimate::{Clusters, cluster_rate};
+
+/// A share with its interval; `None` where it is 0/0, no interval with too few failures.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Share {
+    /// The share.
+    pub value: Option<f64>,
+    /// Its interval over scenarios.
+    pub interval: Option<(f64, f64)>,
+}
+
+/// Scores of a parameterization.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scored {
+    /// Counts over lanes.
+    pub counts: Confusion,
+    /// Scenarios in which S fails from some headway.
+    pub failing_scenarios: u64,
+    /// Failures of S that S' has too.
+    pub recall: Share,
+    /// Failures of S' that S has too.
+    pub precision: Share,
+    /// Both in one number.
+    pub f1: Share,
+}
+
+/// Scores of a part of the lanes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// What the lanes are grouped by.
+    pub by: &'static str,
+    /// Which group.
+    pub name: String,
+    /// Its scores.
+    pub scored: Scored,
+}
+
+/// Verdicts of S and of every S'.
+pub(super) struct Labels<'a> {
+    pub units: usize,
+    pub headways: usize,
+    /// Unit, variant, headway.
+    pub failed: &'a dyn Fn(usize, usize, usize) -> bool,
+}
+
+impl Labels<'_> {
+    pub fn score(&self, variant: usize, options: &ScoreOptions) -> Scored {
+        self.score_of(variant, options, &|_, _| true)
+    }
+
+    /// Scores of the lanes (unit, headway) of which `holds` is true.
+    fn score_of(&self, variant: usize, options: &ScoreOptions, holds: &dyn Fn(usize, usize) -> bool) -> Scored {
+        let of_unit = |unit: usize| {
+            let mut counts = Confusion::<u32>::default();
+            for headway in (0..self.headways).filter(|&headway| holds(unit, headway)) {
+                let [s, parameterized] = [0, variant].map(|variant| (self.failed)(unit, variant, headway));
+                match (s, parameterized) {
+                    (true, true) => counts.tp += 1,
+                    (true, false) => counts.fn_ += 1,
+                    (false, true) => counts.fp += 1,
+                    (false, false) => counts.tn += 1,
+                }
+            }
+            counts
+        };
+        let units: Vec<Confusion<u32>> = (0..self.units).map(of_unit).collect();
+        let sum = |of: fn(&Confusion<u32>) -> u32| units.iter().map(|c| u64::from(of(c))).sum::<u64>();
+        let counts = Confusion { tp: sum(|c| c.tp), fn_: sum(|c| c.fn_), fp: sum(|c| c.fp), tn: sum(|c| c.tn) };
+        // The interval of a share of failures counts scenarios as clusters.
+        let share = |value, of: fn(&Confusion<u32>) -> u32| {
+            let clusters = units.iter().map(|c| (u64::from(of(c)), u64::from(c.tp))).filter(|(runs, _)| *runs > 0);
+            let (runs, agreed): (Vec<u64>, Vec<u64>) = clusters.unzip();
+            let is_enough = runs.iter().sum::<u64>() >= u64::from(options.least_failures.max(1)) && runs.len() > 1;
+            let interval = is_enough.then(|| {
+                let interval = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
+                (interval.low, interval.high)
+            });
+            Share { value, interval }
+        };
+        let f1_interval = f1_interval(units.iter(), options).map(|interval| (interval.low, interval.high));
+        Scored {
+            counts,
+            failing_scenarios: units.iter().filter(|c| c.tp + c.fn_ > 0).count() as u64,
+            recall: share(recall(&counts), |c| c.tp + c.fn_),
+            precision: share(precision(&counts), |c| c.tp + c.fp),
+            f1: Share { value: f1(&counts), interval: f1_interval },
+        }
+    }
+
+    /// By headway, by thirds of the ego's speed, and by thirds of the severity of the failures of S.
+    pub fn groups(
+        &self,
+        variant: usize,
+        headways: &[String],
+        ego_mps: &dyn Fn(usize) -> f64,
+        severity: &dyn Fn(usize, usize) -> f64,
+        options: &ScoreOptions,
+    ) -> Vec<Group> {
+        let mut groups = Vec::new();
+        for (at, name) in headways.iter().enumerate() {
+            let scored = self.score_of(variant, options, &|_, headway| headway == at);
+            groups.push(Group { by: "headway", name: name.clone(), scored });
+        }
+        let speeds: Vec<f64> = (0..self.units).map(ego_mps).collect();
+        let limits = thirds(speeds.clone());
+        for third in 0..3 {
+            let scored = self.score_of(variant, options, &|unit, _| third_of(speeds[unit], limits) == third);
+            let name = interval_name(third, limits.map(|mps| mps * 3.6), "km/h");
+            groups.push(Group { by: "ego speed", name, scored });
+        }
+        let lanes = (0..self.units).flat_map(|unit| (0..self.headways).map(move |headway| (unit, headway)));
+        let failing: Vec<(usize, usize)> = lanes.filter(|&(unit, headway)| (self.failed)(unit, 0, headway)).collect();
+        let severities: std::collections::HashMap<(usize, usize), f64> =
+            failing.iter().map(|&(unit, headway)| ((unit, headway), severity(unit, headway))).collect();
+        let limits = thirds(severities.values().copied().collect());
+        for (third, name) in ["least severe third", "middle third", "most severe third"].into_iter().enumerate() {
+            let holds = |unit, headway| {
+                severities.get(&(unit, headway)).is_some_and(|severity| third_of(*severity, limits) == third)
+            };
+            let scored = self.score_of(variant, options, &holds);
+            groups.push(Group { by: "severity of S", name: name.to_owned(), scored });
+        }
+        groups
+    }
+}
+
+/// Limits between the lower, middle and upper third of some values.
+fn thirds(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    let at = |share: usize| values.get(values.len() * share / 3).copied().unwrap_or(0.0);
+    [at(1), at(2)]
+}
+
+fn third_of(value: f64, [low, high]: [f64; 2]) -> usize {
+    usize::from(value >= low) + usize::from(value >= high && high > low)
+}
+
+fn interval_name(third: usize, [low, high]: [f64; 2], unit: &str) -> String {
+    match third {
+        0 => format!("below {low:.0} {unit}"),
+        1 => format!("{low:.0} to {high:.0} {unit}"),
+        _ => format!("from {high:.0} {unit} on"),
+    }
+}
