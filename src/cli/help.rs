@@ -89,6 +89,7 @@ const FLAGS: [Group; 5] = [
             "models",
             "criterion",
             "against",
+            "robust",
             "profile",
             "profiles",
             "estimator",

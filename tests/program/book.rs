@@ -262,7 +262,7 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 }
 
 /// Figures of the book: file, the command that draws it, and where.
-const FIGURES: [(&str, &str, &str); 3] = [
+const FIGURES: [(&str, &str, &str); 4] = [
     ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
     (
         "case.svg",
@@ -274,6 +274,7 @@ const FIGURES: [(&str, &str, &str); 3] = [
         "map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM --out OUT",
         "lvd_cchdm_against_fsm.svg",
     ),
+    ("cut_in_to_60_cchdm.svg", "map cut-in --preset r157 --robust --out OUT", "cut_in_to_60_cchdm.svg"),
 ];
 
 /// `LANESWEEP_RENEW_FIGURES=1` draws them anew.

@@ -6,6 +6,7 @@ mod common;
 mod compare;
 mod faults;
 mod interrupted;
+mod justify;
 mod kills;
 mod map;
 mod nothing_is_lost;
