@@ -9,6 +9,7 @@ pub mod convergence;
 pub mod csv;
 pub mod density;
 pub mod dossier;
+mod dossier_page;
 pub mod failure_map;
 pub mod forest;
 pub mod html;

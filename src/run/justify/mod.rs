@@ -161,14 +161,14 @@ pub fn justify(
     let groups = labels.groups(variant, &headways, &ego_mps, &severity, &options.score);
     let mut hidden = Vec::new();
     for unit in 0..labels.units {
-        for headway in 0..labels.headways {
+        for (headway, name) in headways.iter().enumerate() {
             if failed(unit, 0, headway) && !failed(unit, variant, headway) {
                 let lane = key(unit, variant, headway);
                 hidden.push(Hidden {
                     lane,
                     key: plan.key_text(&lane),
                     scenario: block.units.name(unit as u64).into_owned(),
-                    headway: headways[headway].clone(),
+                    headway: name.clone(),
                     recorded: runner.run(&key(unit, 0, headway)).widen(),
                     parameterized: runner.run(&lane).widen(),
                 });

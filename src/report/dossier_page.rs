@@ -1,0 +1,194 @@
+//! The dossier's page: its chapters.
+
+use super::dossier::{DossierReport, SHOWN, owned, page_table, program, share};
+use super::html::{Page, PageFigure, Section};
+use crate::support::readable::{count, value};
+use crate::{Error, Result};
+
+impl DossierReport<'_> {
+    /// The dossier as a page.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] where the template does not fit: a defect of this program.
+    pub fn html(&self) -> Result<String> {
+        let mut warnings = Vec::new();
+        if self.is_synthetic {
+            warnings.push("SYNTHETIC DATA: nothing on this page is a statement about real traffic.".to_owned());
+        }
+        let page = Page {
+            title: format!("Is {} appropriate?", self.dossier.parameterization.name()),
+            program: program(),
+            lead: format!("{}. {}", self.answer(), self.data),
+            warnings,
+            sections: vec![
+                self.conclusion_section(),
+                self.hidden_section(),
+                Section {
+                    intro: "Thirds of the scenarios by the ego's speed, and of the failures of S by severity: closing speed at \
+                            the contact, else the shortfall of TTC or the excess of BTN. Precision has no meaning within \
+                            failures of S."
+                        .to_owned(),
+                    tables: vec![page_table("Scores by group, [interval over scenarios]", 2, self.groups())],
+                    ..Section::new("groups", "By headway, speed and severity")
+                },
+                self.risk_section(),
+                self.cost_section(),
+                Section {
+                    intro: "Every parameterization of this kind of scenario on the same data, by the rules for recall and \
+                            precision alone."
+                        .to_owned(),
+                    tables: vec![page_table("Alternatives, [interval over scenarios]", 2, self.alternatives())],
+                    ..Section::new("alternatives", "The alternatives")
+                },
+                self.credibility_section(),
+                self.reproduction_section()?,
+            ],
+        };
+        page.html()
+    }
+
+    fn conclusion_section(&self) -> Section {
+        let share = |limit: f64| format!("{limit}: the whole interval at or above it passes, the whole below it fails");
+        let (margin, lower) = (self.margin, value(1.0 / self.margin));
+        Section {
+            intro: self.need().unwrap_or_default(),
+            tables: vec![page_table("What each rule finds; the worst decides", 3, self.findings())],
+            facts: vec![
+                ("recall, limit".to_owned(), share(self.rules.min_recall)),
+                ("precision, limit".to_owned(), share(self.rules.min_precision)),
+                (
+                    "risk ratio, limits".to_owned(),
+                    format!("{lower} to {margin}: the whole interval between them passes"),
+                ),
+                ("coverage, limit".to_owned(), format!("{} of the kept scenarios", self.rules.min_coverage)),
+                ("statistical significance".to_owned(), format!("intervals of {} %", value(100.0 * self.confidence))),
+                ("where to change them".to_owned(), "[justify], [score] and [compare] of the configuration".to_owned()),
+            ],
+            ..Section::new("conclusion", "Conclusion")
+        }
+    }
+
+    fn hidden_section(&self) -> Section {
+        let counts = &self.dossier.scored.counts;
+        let failures = counts.tp + counts.fn_;
+        let intro = match (failures, counts.fn_) {
+            (0, _) => "S never fails: there is nothing to hide, and nothing to conclude from.".to_owned(),
+            (_, 0) => format!("None of {} failures of S is hidden.", count(failures)),
+            (_, hidden) => format!(
+                "{} of {} failures of S are hidden: S fails, S' passes. The most severe {} stand here, all in hidden.csv. Recall \
+                 {}, precision {}, F1 {}.",
+                count(hidden),
+                count(failures),
+                count((SHOWN as u64).min(hidden)),
+                share(&self.dossier.scored.recall),
+                share(&self.dossier.scored.precision),
+                share(&self.dossier.scored.f1)
+            ),
+        };
+        let mut section = Section { intro, ..Section::new("hidden", "Failures that are hidden") };
+        if counts.fn_ > 0 {
+            section.tables.push(page_table("Hidden failures, the most severe first", 1, self.hidden(SHOWN)));
+        }
+        section.figures.extend(self.example().map(|svg| PageFigure::new(&svg, &["hidden.svg"])));
+        section
+    }
+
+    fn risk_section(&self) -> Section {
+        let mut section = Section::new("risk", "Risk");
+        match (self.risk(), &self.dossier.no_density) {
+            (Some(risk), _) => {
+                section.intro =
+                    "Rates of failure of the recorded scenarios (S), of their parameterized replays (S') and of a \
+                                 density fitted on their parameters (P)."
+                        .to_owned();
+                section.tables.push(page_table("Rates and risk ratios", 1, risk));
+            }
+            (None, Some(error)) => section.intro = format!("There is no density: {error}."),
+            (None, None) => section.intro = "There is no density.".to_owned(),
+        }
+        section
+    }
+
+    fn cost_section(&self) -> Section {
+        let d = self.dossier.parameterization.parameter_count() as f64;
+        let n = self.dossier.coverage.as_ref().map_or(self.dossier.scenarios, |coverage| coverage.points) as f64;
+        let needed = n.powf((4.0 + d) / 5.0);
+        let mut facts = vec![
+            ("parameters".to_owned(), format!("{d}")),
+            ("points of the density".to_owned(), count(n as u64)),
+            (
+                "cost of the dimension".to_owned(),
+                format!(
+                    "the squared error of a kernel density falls as n^(-4/(4+d)) (Silverman 1986, 4.3): as many as {} points \
+                     would give {} parameters the accuracy that one parameter has at {}",
+                    value(needed),
+                    d,
+                    count(n as u64)
+                ),
+            ),
+        ];
+        if let Some(coverage) = &self.dossier.coverage {
+            facts.push((
+                "coverage".to_owned(),
+                format!(
+                    "{} found, {} passed the filters, {} are points of the parameter space",
+                    count(coverage.found),
+                    count(coverage.kept),
+                    count(coverage.points)
+                ),
+            ));
+            let percent = value(100.0 * coverage.valid_share);
+            facts.push(("share of the density inside its valid region".to_owned(), format!("{percent} %")));
+            facts.push((
+                "representativeness".to_owned(),
+                coverage.representativeness.map_or("too few scenarios to split".to_owned(), |(metric, train_test)| {
+                    let (metric, reached) = (value(metric), value(train_test));
+                    format!("M = {metric}; as many recorded scenarios reach {reached} (smaller is better)")
+                }),
+            ));
+        }
+        Section { facts, ..Section::new("coverage", "Parameters and coverage") }
+    }
+
+    fn credibility_section(&self) -> Section {
+        let rows = self.conformance.iter().map(|(what, rows, passes)| {
+            vec![what.clone(), if *passes { "passes" } else { "FAILS" }.to_owned(), count(*rows)]
+        });
+        let table = (owned(&["table", "in this build", "rows"]), rows.collect());
+        let recheck = format!(
+            "{} lanes were computed again on the CPU with every step, and were equal to the bit",
+            count(self.host.rechecked_lanes)
+        );
+        Section {
+            intro: "Tables of the JRC's public simulator that ship with the program, under jrc-2021, computed in this run. \
+                    `lanesweep verify conformance` takes more tables."
+                .to_owned(),
+            tables: vec![page_table("Conformance", 2, table)],
+            facts: vec![
+                ("exactness".to_owned(), recheck),
+                ("not covered".to_owned(), "perception faults, vehicle dynamics beyond a deceleration with a jerk limit".to_owned()),
+            ],
+            ..Section::new("credibility", "Credibility of the simulation")
+        }
+    }
+
+    fn reproduction_section(&self) -> Result<Section> {
+        let profile = serde_json::to_string_pretty(self.profile)
+            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
+        let density = self.dossier.density_sha256.clone().unwrap_or_else(|| "–".to_owned());
+        Ok(Section {
+            facts: vec![
+                ("command".to_owned(), self.command.clone()),
+                ("program".to_owned(), format!("{}, engine {}", program(), crate::engine::ENGINE_VERSION)),
+                ("data".to_owned(), self.data.clone()),
+                ("SHA-256 of the scenarios".to_owned(), self.scenarios_sha256.clone()),
+                ("SHA-256 of the plan".to_owned(), self.dossier.plan_sha256.clone()),
+                ("SHA-256 of the density".to_owned(), density),
+                ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),
+            ],
+            host: vec![("computed by".to_owned(), self.host.backend.clone())],
+            details: vec![(format!("Profile {}", self.profile.name), profile)],
+            ..Section::new("reproduction", "Reproduction")
+        })
+    }
+}
