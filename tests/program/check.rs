@@ -36,6 +36,17 @@ const CUT_IN: [&str; 12] = [
     "un-r157,paper",
 ];
 
+/// The case of [`CUT_IN`] as `export xosc` writes it.
+fn exported(dir: &Path) -> String {
+    let out = dir.join("xosc");
+    let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
+    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--gap", "36", "--lateral-speed", "1"];
+    let (code, _, error) = check(&[&export[..], &[text(&out)], &case].concat());
+    assert_eq!(code, 0, "{error}");
+    let mut files = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+    std::fs::read_to_string(files.find(|path| path.extension().is_some_and(|e| e == "xosc")).unwrap()).unwrap()
+}
+
 #[test]
 fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
     let dir = tempfile::tempdir().unwrap();
@@ -47,12 +58,8 @@ fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
     .unwrap();
     std::fs::write(of("cases.csv"), "category,ego_speed,speed,gap,lateral_speed\ncut-in,9,9,9,1\ncut-in,30,20,36,1\n")
         .unwrap();
-    let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
-    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--gap", "36", "--lateral-speed", "1"];
-    let (code, _, error) = check(&[&export[..], &[text(&of("xosc"))], &case].concat());
-    assert_eq!(code, 0, "{error}");
-    let file = std::fs::read_dir(of("xosc")).unwrap().map(|entry| entry.unwrap().path());
-    let file = file.into_iter().find(|path| path.extension().is_some_and(|e| e == "xosc")).unwrap();
+    let file = of("exported.xosc");
+    std::fs::write(&file, exported(dir.path())).unwrap();
     let flags = json(&[&["check"], &CUT_IN[..]].concat());
     let profiles = ["--profiles", "un-r157,paper"];
     let toml = json(&[&["check", text(&of("case.toml"))], &profiles[..]].concat());
@@ -147,10 +154,13 @@ fn what_holds_no_case_is_refused_with_what_to_give() {
     let broken = of("b.xosc", "<OpenSCENARIO>");
     let empty = of("c.csv", "category\n");
     let other = of("d.txt", "cut-in");
+    let whole = exported(dir.path());
+    let gap = of("e.xosc", &whole.replacen("<Vertex time=\"0.04\"", "<Vertex time=\"0.05\"", 1));
     for (args, says) in [
         (vec!["check"], "there is nothing to check"),
         (vec!["check", text(&foreign)], "export xosc"),
         (vec!["check", text(&broken)], "does not end"),
+        (vec!["check", text(&gap)], "after 1 steps of 0.04 s"),
         (vec!["check", text(&empty)], "there is no row 1"),
         (vec!["check", text(&other)], "holds no case"),
         (vec!["check", "--category", "cut-in", "--ego-speed", "fast"], "60km/h"),

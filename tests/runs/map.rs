@@ -585,3 +585,57 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     }
     assert!(map.undecided(0, Criterion::Collision) > 0);
 }
+
+/// How many verdicts of the JRC's grids differ from `jrc-2021`, while the options of `un-r157` become those of `jrc-2021`
+/// one after another. The table of docs/src/methods/profiles.md: run it with `--ignored --nocapture`.
+#[test]
+#[ignore = "thirteen sweeps of three grids take a minute"]
+fn named_options_explain_every_cell_between_the_readings() {
+    let (mut reading, jrc) = (profile("un-r157"), profile("jrc-2021"));
+    let collisions = |profile: &Profile| -> Vec<Vec<bool>> {
+        let maps = Category::ALL.map(|category| {
+            let presets = Presets::Jrc.of(category, profile).unwrap();
+            let of = |preset: presets::Preset| {
+                let map = swept(&GridPlan::new(preset.grid, profile, &ModelId::ALL).unwrap());
+                (0..ModelId::ALL.len()).flat_map(|model| map.failed(model, Criterion::Collision)).collect::<Vec<_>>()
+            };
+            presets.into_iter().flat_map(of).collect()
+        });
+        maps.to_vec()
+    };
+    let goal = collisions(&jrc);
+    let mut row = |what: &str, profile: &Profile| -> usize {
+        let differing: Vec<usize> = collisions(profile)
+            .iter()
+            .zip(&goal)
+            .map(|(ours, theirs)| ours.iter().zip(theirs).filter(|(a, b)| a != b).count())
+            .collect();
+        println!("| {what} | {} | {} | {} |", differing[0], differing[1], differing[2]);
+        differing.iter().sum()
+    };
+    let total: usize = goal.iter().map(Vec::len).sum();
+    println!(
+        "verdicts: {} of {total}",
+        goal.iter().map(|cells| cells.len().to_string()).collect::<Vec<_>>().join(", ")
+    );
+    row("`un-r157`", &reading);
+    macro_rules! step {
+        ($what:literal, $($table:ident.$key:ident)+) => {{
+            $(reading.$table.$key = jrc.$table.$key.clone();)+
+            row($what, &reading)
+        }};
+    }
+    step!("`reg157.margin_steps`, `margin_s`", reg157.margin_s reg157.margin_steps);
+    step!("`reg157.visible_lateral_movement_s`", reg157.visible_lateral_movement_s);
+    step!("`reg157.always_unsafe`", reg157.always_unsafe);
+    step!("`cchdm.perception_time_s`", cchdm.perception_time_s);
+    step!("`cchdm.wandering_m`, `lateral_gate_m`", cchdm.wandering_m cchdm.lateral_gate_m);
+    step!("`cchdm.cut_out_headway_s`, `always_unsafe`", cchdm.cut_out_headway_s cchdm.always_unsafe);
+    step!("`cchdm.lead_deceleration_trigger_mps2`", cchdm.lead_deceleration_trigger_mps2);
+    step!("`fsm.cfs_step`", fsm.cfs_step);
+    step!("`frame.cut_out_target`", frame.cut_out_target);
+    step!("`frame.dt_s`", frame.dt_s);
+    step!("`frame.end_when_settled`, `time_cap_s`", frame.end_when_settled frame.time_cap_s);
+    step!("`frame.start_shift` (with it the JRC's cases and starts)", frame.start_shift);
+    assert_eq!(step!("`criteria.gate`", criteria.gate), 0, "nothing else tells the readings apart");
+}

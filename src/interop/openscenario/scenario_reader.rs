@@ -41,7 +41,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario> {
     let category = category.ok_or_else(|| header.wrong("its description names no kind of scenario", OURS))?;
     let dt_s = property("dt_s")?.parse::<f64>().ok().filter(|dt| *dt > 0.0 && *dt <= 1.0);
     let dt_s = dt_s.ok_or_else(|| properties.wrong("lanesweep.dt_s is not a time step", OURS))?;
-    let vehicles = |name| vehicle(root, name);
+    let vehicles = |name| vehicle(root, name, dt_s);
     let (ego, target) = (vehicles("Ego")?, vehicles("Other")?);
     let ahead = if category == Category::CutOut { Some(vehicles("Ahead")?) } else { None };
     let gap =
@@ -89,7 +89,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario> {
 }
 
 /// A vehicle's size, start and path.
-fn vehicle(root: At, name: &str) -> Result<Read> {
+fn vehicle(root: At, name: &str, dt_s: f64) -> Result<Read> {
     let of = |child: &At, key: &str| child.text(key).is_ok_and(|value| value == name);
     let entities = root.only("Entities")?;
     let entity = entities.all().find(|child| of(child, "name"));
@@ -107,6 +107,11 @@ fn vehicle(root: At, name: &str) -> Result<Read> {
             continue;
         }
         for vertex in below(group, "Vertex") {
+            let expected_s = path.len() as f64 * dt_s;
+            if (vertex.number("time")? - expected_s).abs() > 1e-6 {
+                let problem = format!("the time is {}, after {} steps of {dt_s} s", vertex.text("time")?, path.len());
+                return Err(vertex.wrong(problem, "every step needs its vertex: export the scenario again"));
+            }
             path.push(position(vertex.only("Position")?.only("WorldPosition")?)?);
         }
     }

@@ -28,7 +28,8 @@ const DEEPEST: usize = 32;
 /// Elements at most.
 const MAX_ELEMENTS: usize = 500_000;
 
-const NOT_XML: &str = "write a ParameterValueDistribution file of ASAM OpenSCENARIO XML 1.1 to 1.3";
+const NOT_XML: &str =
+    "give a whole file of ASAM OpenSCENARIO XML 1.1 to 1.3: a ParameterValueDistribution, or one of `export xosc`";
 
 /// The root element of a file.
 ///
