@@ -60,6 +60,11 @@ impl DossierReport<'_> {
                     "risk ratio, limits".to_owned(),
                     format!("{lower} to {margin}: the whole interval between them passes"),
                 ),
+                (
+                    "least data".to_owned(),
+                    "as many failing scenarios as score.least_failures; with fewer, recall and precision are undecided"
+                        .to_owned(),
+                ),
                 ("coverage, limit".to_owned(), format!("{} of the kept scenarios", self.rules.min_coverage)),
                 ("statistical significance".to_owned(), format!("intervals of {} %", value(100.0 * self.confidence))),
                 ("where to change them".to_owned(), "[justify], [score] and [compare] of the configuration".to_owned()),

@@ -11,6 +11,9 @@ use crate::{Error, Result};
 const TEMPLATE: &str = include_str!("templates/report.html");
 const STYLE: &str = include_str!("templates/style.css");
 
+/// Narrower figures, such as a column of a paper, do not fill the page.
+const NARROW_PX: f64 = 700.0;
+
 /// A table; the first `texts` columns hold words, the others numbers.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct PageTable {
@@ -118,9 +121,11 @@ fn inline(svg: &str) -> String {
         value.split_once('"').map(|(value, _)| value.to_owned())
     };
     let (Some(width), Some(height)) = (size("width"), size("height")) else { return svg.to_owned() };
-    let tag = tag
-        .replacen(&format!(" width=\"{width}\""), &format!(" viewBox=\"0 0 {width} {height}\" role=\"img\""), 1)
-        .replacen(&format!(" height=\"{height}\""), "", 1);
+    let narrow = width.parse::<f64>().ok().filter(|width| *width < NARROW_PX);
+    let limit = narrow.map_or(String::new(), |width| format!(" style=\"max-width:{:.0}px\"", 1.3 * width));
+    let view_box = format!(" viewBox=\"0 0 {width} {height}\" role=\"img\"{limit}");
+    let tag =
+        tag.replacen(&format!(" width=\"{width}\""), &view_box, 1).replacen(&format!(" height=\"{height}\""), "", 1);
     format!("{tag}>{}", rest.trim_end())
 }
 

@@ -587,9 +587,8 @@ fn a_cell_is_undecided_where_the_single_case_is() {
 }
 
 /// How many verdicts of the JRC's grids differ from `jrc-2021`, while the options of `un-r157` become those of `jrc-2021`
-/// one after another. The table of docs/src/methods/profiles.md: run it with `--ignored --nocapture`.
+/// one after another. The table of docs/src/methods/profiles.md: run it with `--nocapture`.
 #[test]
-#[ignore = "thirteen sweeps of three grids take a minute"]
 fn named_options_explain_every_cell_between_the_readings() {
     let (mut reading, jrc) = (profile("un-r157"), profile("jrc-2021"));
     let collisions = |profile: &Profile| -> Vec<Vec<bool>> {

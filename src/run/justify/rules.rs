@@ -111,16 +111,22 @@ impl Rules {
 
     /// Recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
-        let counts = &scored.counts;
-        let share = |quantity, share: Share, limit: f64, failures: u64| {
-            let (conclusion, need) = judge(share, limit, failures, options);
+        let least = u64::from(options.least_failures.max(1));
+        let failing = scored.failing_scenarios;
+        let share = |quantity, share: Share, limit: f64| {
+            // Few scenarios say little, however many headways fail in each.
+            let (conclusion, need) = match share.value.zip(share.interval) {
+                Some((value, interval)) if failing >= least => judge(value, interval, limit),
+                _ => {
+                    // Without any failure nothing tells how many scenarios would have one.
+                    let times = least as f64 / failing as f64;
+                    (Conclusion::Undecided, (failing > 0).then_some(Need { times: times.max(1.1) }))
+                }
+            };
             let rule = format!("at least {limit}");
             Finding { quantity, value: share.value, interval: share.interval, rule, conclusion, need }
         };
-        vec![
-            share("recall", scored.recall, self.min_recall, counts.tp + counts.fn_),
-            share("precision", scored.precision, self.min_precision, counts.tp + counts.fp),
-        ]
+        vec![share("recall", scored.recall, self.min_recall), share("precision", scored.precision, self.min_precision)]
     }
 
     /// Risk ratio of the density, and coverage; undecided where there is no density.
@@ -161,13 +167,7 @@ impl Rules {
 }
 
 /// A share passes where its whole interval lies at or above the limit, and fails where it lies below.
-fn judge(share: Share, limit: f64, failures: u64, options: &ScoreOptions) -> (Conclusion, Option<Need>) {
-    let least = u64::from(options.least_failures.max(1));
-    let Some((value, (low, high))) = share.value.zip(share.interval) else {
-        // Without any failure nothing tells how many scenarios would have one.
-        let times = least as f64 / failures as f64;
-        return (Conclusion::Undecided, (failures > 0).then_some(Need { times: times.max(2.0) }));
-    };
+fn judge(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Option<Need>) {
     if low >= limit {
         (Conclusion::Appropriate, None)
     } else if high < limit {
