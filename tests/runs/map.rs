@@ -603,7 +603,7 @@ fn named_options_explain_every_cell_between_the_readings() {
         maps.to_vec()
     };
     let goal = collisions(&jrc);
-    let mut row = |what: &str, profile: &Profile| -> usize {
+    let row = |what: &str, profile: &Profile| -> usize {
         let differing: Vec<usize> = collisions(profile)
             .iter()
             .zip(&goal)
