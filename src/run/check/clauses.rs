@@ -161,7 +161,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         let peak = pairs().max_by(|a, b| a.1.total_cmp(&b.1));
         let trigger_mps2 = constants.lead_deceleration_trigger_mps2;
         let first_s = pairs().find(|(_, a)| *a > trigger_mps2 + 1e-9).map(|(step, _)| step.time_s);
-        let then = "perceived after 0.4 s, braking 0.75 s later";
+        let then = "perceived after the risk perception time";
         let peak_mps2 = peak.map(|(_, a)| a);
         return vec![reading(
             "largest deceleration of the leader",

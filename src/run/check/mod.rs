@@ -14,7 +14,7 @@ pub use boundary::{Boundary, Change};
 pub use clauses::{Reading, Relation};
 pub use subject::{Lane, Subject};
 
-use crate::engine::{EndReason, NO_STEP, Outcome, StepMark, Trace, check_time_step};
+use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -84,11 +84,6 @@ impl Judged {
     pub fn impact_closing_mps(&self) -> Option<f64> {
         let outcome = &self.trace.outcome;
         (outcome.contact_step != NO_STEP).then_some(outcome.impact_closing_speed)
-    }
-
-    /// Did the run end in time?
-    pub fn is_capped(&self) -> bool {
-        self.trace.outcome.end == EndReason::Cap
     }
 }
 
