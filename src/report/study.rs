@@ -12,7 +12,7 @@ use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{CategoryScores, ClaimResult, ScoreTable, f1, published_failures, published_lvd_f1};
+use crate::run::score::{CategoryScores, ClaimResult, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
@@ -165,7 +165,7 @@ impl StudyReport {
             "claims": records(&csv::claims(&self.claims, "")?)?,
         });
         if self.published {
-            value["published"] = published();
+            value["published"] = published(&self.scores);
         }
         if let Some(comparison) = &self.comparison {
             value["reference"] = records(comparison.csv().as_bytes())?;
@@ -175,7 +175,7 @@ impl StudyReport {
 }
 
 /// The paper's numbers, of highD.
-fn published() -> Value {
+fn published(scores: &ScoreTable) -> Value {
     let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
     let failures = Category::ALL.into_iter().flat_map(|category| {
         cells().filter_map(move |(model, criterion)| {
@@ -196,5 +196,11 @@ fn published() -> Value {
             }))
         })
     });
-    serde_json::json!({"data": "highD", "failures": failures.collect::<Vec<_>>(), "f1": f1.collect::<Vec<_>>()})
+    let misfit = Misfit::of(scores).map(|misfit| {
+        serde_json::json!({
+            "shares": misfit.shares, "share_rms_points": misfit.share_rms_points,
+            "f1_values": misfit.f1_values, "f1_mean": misfit.f1_mean, "f1_largest": misfit.f1_largest,
+        })
+    });
+    serde_json::json!({"data": "highD", "misfit": misfit, "failures": failures.collect::<Vec<_>>(), "f1": f1.collect::<Vec<_>>()})
 }

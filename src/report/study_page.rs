@@ -6,7 +6,7 @@ use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
 use crate::model::criterion::Criterion;
-use crate::run::score::{CategoryScores, ClaimVerdict, precision, recall};
+use crate::run::score::{CategoryScores, ClaimVerdict, Misfit, precision, recall};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
@@ -96,12 +96,18 @@ impl StudyReport {
     fn failures(&self) -> Section {
         let mut header = vec!["scenario", "model", "collision", "TTC", "BTN", "simulations", "at the time cap"];
         if self.published {
-            header.push("published (of)");
+            header.extend(tables::PUBLISHED_COLUMNS);
         }
         let rows = tables::failure_rows(&self.scores, self.published);
         Section {
-            intro: "How often each driver model fails each criterion when the scenarios are replayed as recorded (S)."
-                .to_owned(),
+            intro: [
+                "How often each driver model fails each criterion when the scenarios are replayed as recorded (S).",
+            ]
+            .into_iter()
+            .map(str::to_owned)
+            .chain(Misfit::of(&self.scores).filter(|_| self.published).map(|misfit| misfit.sentence()))
+            .collect::<Vec<_>>()
+            .join(" "),
             tables: vec![table("Failed simulations of S", &header, 2, rows)],
             ..Section::new("failures", "Failures of the recorded scenarios")
         }

@@ -6,7 +6,8 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
-    BootstrapInterval, CategoryScores, ClaimResult, ClaimRow, ScoreTable, f1, published_failures, published_lvd_f1,
+    BootstrapInterval, CategoryScores, ClaimResult, ClaimRow, Misfit, PublishedFailures, ScoreTable, f1,
+    published_failures, published_lvd_f1,
 };
 use crate::support::readable;
 
@@ -29,20 +30,25 @@ pub(super) fn aligned(mut table: Table, texts: usize) -> String {
     format!("{table}\n")
 }
 
-/// Failures of S per category, model and criterion, as in the paper's table; the published counts beside
-/// them where asked.
+/// Failures of S per category, model and criterion, as in the paper's table; where asked, the shares beside the
+/// published ones, with the misfit.
 pub fn failures(scores: &ScoreTable, published: bool) -> String {
     let mut header: Vec<String> = ["scenario", "model"].map(str::to_owned).to_vec();
     header.extend(["collision", "TTC", "BTN", "simulations", "capped"].map(str::to_owned));
     if published {
-        header.push("published (of)".to_owned());
+        header.extend(PUBLISHED_COLUMNS.map(str::to_owned));
     }
     let mut table = table(header);
     for row in failure_rows(scores, published) {
         table.add_row(row);
     }
-    format!("Failures of the recorded scenarios (S)\n{}", aligned(table, 2))
+    let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), WIDTH) + "\n");
+    let misfit = misfit.unwrap_or_default();
+    format!("Failures of the recorded scenarios (S)\n{}{misfit}", aligned(table, 2))
 }
+
+/// Columns of [`failures`] with the published numbers: collision, TTC and BTN.
+pub(super) const PUBLISHED_COLUMNS: [&str; 2] = ["share, %", "published, %"];
 
 /// The rows of [`failures`].
 pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<String>> {
@@ -54,11 +60,13 @@ pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<Stri
             row.extend(Criterion::ALL.map(|c| readable::count(count(c))));
             row.extend([category.simulations, category.capped[at]].map(readable::count));
             if published {
-                let theirs = |c| published_failures(category.category, model, c);
-                let counts: Vec<_> = Criterion::ALL.into_iter().filter_map(theirs).collect();
-                let failures: Vec<String> = counts.iter().map(|p| readable::count(p.failures)).collect();
-                let of = counts.first().map(|p| format!("{} ({})", failures.join(" "), readable::count(p.simulations)));
-                row.push(of.unwrap_or_else(|| "-".to_owned()));
+                let ours = |c| 100.0 * count(c) as f64 / category.simulations as f64;
+                let theirs = |c| published_failures(category.category, model, c).map(PublishedFailures::percent);
+                let shares = |percent: &dyn Fn(Criterion) -> Option<f64>| {
+                    let text = |c| percent(c).map_or_else(|| "-".to_owned(), |percent| format!("{percent:.1}"));
+                    Criterion::ALL.map(text).join("  ")
+                };
+                row.extend([shares(&|c| Some(ours(c))), shares(&theirs)]);
             }
             rows.push(row);
         }

@@ -13,6 +13,6 @@ mod table;
 
 pub use bootstrap::{BootstrapInterval, ScoreOptions};
 pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, judge_claims, paper_claims};
-pub use published::{PublishedFailures, published_failures, published_lvd_f1};
+pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
 pub use table::{CategoryScores, ScoreCell, ScoreTable, f1, f1_interval, precision, recall, score};

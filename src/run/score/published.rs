@@ -1,6 +1,8 @@
-//! The paper's published numbers (arXiv 2409.01117, table of failures and figure of LVD results), for
-//! `--published`. They belong to highD: other data must agree in shape, not in these numbers.
+//! The paper's published numbers (arXiv 2409.01117, table of failures and figure of LVD results), and how far a study is
+//! from them. They belong to highD. The synthetic recordings are calibrated to the failures, not to F1; other data must
+//! agree in shape, not in these numbers.
 
+use super::table::{ScoreTable, f1};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
@@ -12,6 +14,13 @@ pub struct PublishedFailures {
     pub simulations: u64,
     /// Failures.
     pub failures: u64,
+}
+
+impl PublishedFailures {
+    /// Failures of 100 simulations.
+    pub fn percent(self) -> f64 {
+        100.0 * self.failures as f64 / self.simulations as f64
+    }
 }
 
 const SIMULATIONS: [u64; 3] = [3620, 8190, 4820];
@@ -61,4 +70,65 @@ pub fn published_failures(category: Category, model: ModelId, criterion: Criteri
 pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> Option<f64> {
     let at = LVD_VARIANTS.iter().position(|v| *v == variant)?;
     Some(LVD_F1[row_of(model)? * 3 + criterion.index()][at])
+}
+
+/// How far a study is from the published numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Shares of failures of S that are published and were simulated, at most 36.
+    pub shares: usize,
+    /// Root mean square difference of these shares, percentage points.
+    pub share_rms_points: f64,
+    /// F1 of LVD parameterizations that are published and defined here, at most 60.
+    pub f1_values: usize,
+    /// Mean absolute difference of these F1; 0 without any.
+    pub f1_mean: f64,
+    /// Largest absolute difference of these F1.
+    pub f1_largest: f64,
+}
+
+impl Misfit {
+    /// `None` where no share of the study is published.
+    pub fn of(scores: &ScoreTable) -> Option<Misfit> {
+        let (mut squares, mut differences) = (Vec::new(), Vec::new());
+        for category in &scores.categories {
+            for cell in &category.cells {
+                let variant = &category.variants[cell.variant];
+                let theirs = published_failures(category.category, cell.model, cell.criterion);
+                if let (0, Some(theirs)) = (cell.variant, theirs) {
+                    let ours = 100.0 * cell.counts.tp as f64 / category.simulations as f64;
+                    squares.push((ours - theirs.percent()).powi(2));
+                } else if let (Category::Lvd, Some(theirs), Some(ours)) =
+                    (category.category, published_lvd_f1(variant, cell.model, cell.criterion), f1(&cell.counts))
+                {
+                    differences.push((ours - theirs).abs());
+                }
+            }
+        }
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        (!squares.is_empty()).then(|| Misfit {
+            shares: squares.len(),
+            share_rms_points: mean(&squares).sqrt(),
+            f1_values: differences.len(),
+            f1_mean: mean(&differences),
+            f1_largest: differences.iter().copied().fold(0.0, f64::max),
+        })
+    }
+
+    /// The misfit in one sentence.
+    pub fn sentence(&self) -> String {
+        let f1 = if self.f1_values == 0 {
+            String::new()
+        } else {
+            format!(
+                "; F1 of {} LVD cells: mean absolute difference {:.2}, largest {:.2}",
+                self.f1_values, self.f1_mean, self.f1_largest
+            )
+        };
+        format!(
+            "Difference to the published numbers of highD: {} shares of failures, root mean square {:.1} percentage \
+             points{f1}.",
+            self.shares, self.share_rms_points
+        )
+    }
 }

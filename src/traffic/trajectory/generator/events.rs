@@ -6,7 +6,7 @@
 
 use super::braking::Braking;
 use super::hazards::{DECISION_S, Hazards};
-use super::lane_change::{Way, acceptance, motive_per_s};
+use super::lane_change::{Way, acceptance, motive};
 use super::lateral::LaneChangeMotion;
 use super::traffic::{Traffic, centre_of};
 use super::vehicle::draw_line;
@@ -14,9 +14,9 @@ use crate::traffic::trajectory::VehicleClass;
 
 /// Distance before the view at which the raised rates begin, so that changes are in progress at its edge.
 const RAISED_BEFORE_M: f64 = 120.0;
-/// Rate of scheduled hard braking of a vehicle with a follower, 1/s, at rate factor 1. Calibrated to the published
-/// 482 decelerations above 2 m/s² in 109,986 data sets.
-const BRAKING_PER_S: f64 = 0.0012;
+/// Rate of lane changes with full motive and accepted gaps, 1/s. Calibrated to the published 0.24 line crossings per
+/// vehicle and kilometre at rate factor 1.
+const LANE_CHANGES_PER_S: f64 = 0.265;
 /// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
 /// Minimum speed at which braking is scheduled, m/s.
@@ -50,9 +50,9 @@ impl Traffic {
         }
         let follower = self.view(place, own.lane).behind;
         if follower.is_some_and(|f| f.gap_m < FOLLOWER_WITHIN_S * f.speed_mps)
-            && self.decisions.chance(BRAKING_PER_S * factor * DECISION_S)
+            && self.decisions.chance(self.setting.behaviour.brakings_per_s * factor * DECISION_S)
         {
-            let braking = Braking::draw(&mut self.decisions);
+            let braking = Braking::draw(&self.setting.behaviour, &mut self.decisions);
             self.vehicles[self.order[place]].braking = Some(braking);
         }
     }
@@ -77,8 +77,8 @@ impl Traffic {
                 continue;
             }
             let there = self.view(place, to);
-            let rate = motive_per_s(way, own.speed_mps, &own.driver, here, there.ahead);
-            let accepted = acceptance(own.speed_mps, there);
+            let rate = LANE_CHANGES_PER_S * motive(way, own.speed_mps, &own.driver, here, there.ahead);
+            let accepted = acceptance(own.speed_mps, there, &self.setting.behaviour);
             if self.decisions.chance(rate * factor * accepted * DECISION_S) {
                 self.start_lane_change(i, to);
                 return;
@@ -90,7 +90,9 @@ impl Traffic {
         let width = self.setting.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
-        let change = LaneChangeMotion::draw(own.lane, to, own.line_m, target_m, &mut self.decisions);
+        let acceleration_mps2 = self.setting.behaviour.change_acceleration_mps2;
+        let way_m = (own.line_m, target_m);
+        let change = LaneChangeMotion::draw((own.lane, to), way_m, acceleration_mps2, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);

@@ -18,6 +18,9 @@ pub(super) struct DriverParameters {
     pub acceleration_mps2: f64,
     /// Comfortable deceleration b, m/s².
     pub comfortable_mps2: f64,
+    /// How much harder than needed the driver brakes where the gap is too short, as a fraction of the comfortable
+    /// deceleration. 1 is the published model.
+    pub overreaction: f64,
 }
 
 /// The vehicle ahead as the driver perceives it.
@@ -67,7 +70,8 @@ pub(super) fn following_acceleration(
         idm
     } else {
         let b = driver.comfortable_mps2;
-        (1.0 - COOLNESS) * idm + COOLNESS * (heuristic + b * libm::tanh((idm - heuristic) / b))
+        let surplus = driver.overreaction * b * libm::tanh((idm - heuristic) / b);
+        (1.0 - COOLNESS) * idm + COOLNESS * (heuristic + surplus)
     };
 
     // Lower bound: the braking that avoids contact.
@@ -101,6 +105,7 @@ mod tests {
             standstill_gap_m: 3.4,
             acceleration_mps2: 0.55,
             comfortable_mps2: 1.5,
+            overreaction: 1.0,
         }
     }
 

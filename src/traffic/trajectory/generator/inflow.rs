@@ -23,6 +23,8 @@ pub(super) struct LaneDemand {
     truck_share: f64,
     /// Mean desired speed of cars in this lane, m/s.
     car_speed_mps: f64,
+    /// Of its drivers.
+    overreaction: f64,
 }
 
 /// The demand of every lane of a carriageway, leftmost first. `flow_level`, `truck_level` and `speed_level` (about 1)
@@ -49,6 +51,7 @@ pub(super) fn demand(
                 mean_headway_s: 3600.0 / lane_vehph,
                 truck_share: (truck_share * trucks[lane] / flow[lane]).min(0.95),
                 car_speed_mps: speeds[lane] * speed_level,
+                overreaction: options.behaviour.overreaction,
             }
         })
         .collect()
@@ -80,11 +83,12 @@ impl Inflow {
     }
 
     /// The next vehicle, if it is due and has space behind the last one of its lane (`last`: rear bumper and speed),
-    /// at `entrance_m`.
+    /// at `entrance_m`, not faster than `limit_mps`.
     pub fn arrive(
         &mut self,
         now_s: f64,
         entrance_m: f64,
+        limit_mps: f64,
         last: Option<(f64, f64)>,
         stream: &mut TrafficRandom,
     ) -> Option<Vehicle> {
@@ -92,7 +96,7 @@ impl Inflow {
             return None;
         }
         let driver = self.next.driver;
-        let mut speed_mps = driver.desired_speed_mps;
+        let mut speed_mps = driver.desired_speed_mps.min(limit_mps);
         if let Some((rear_m, last_mps)) = last {
             let gap_m = rear_m - entrance_m - 0.5 * self.next.length_m;
             let spare_m = gap_m - driver.standstill_gap_m - 0.8 * driver.time_headway_s * last_mps;
@@ -126,7 +130,7 @@ impl Inflow {
 
 fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) -> Vehicle {
     let class = if stream.chance(demand.truck_share) { VehicleClass::Truck } else { VehicleClass::Car };
-    let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, stream);
+    let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, demand.overreaction, stream);
     vehicle.place(lane, centre_m, lane_width_m, stream);
     vehicle
 }

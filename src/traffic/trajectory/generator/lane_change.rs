@@ -1,10 +1,8 @@
 //! The decision to change lanes: a motive (a rate per second) times the acceptance of the gaps.
 
+use super::behaviour::Behaviour;
 use super::idm::DriverParameters;
 
-/// Rate of a change with full motive and accepted gaps, 1/s. Calibrated to the published 0.24 line crossings per
-/// vehicle and kilometre at rate factor 1.
-const FULL_MOTIVE_PER_S: f64 = 0.265;
 /// The motive to change to a faster lane increases up to this gain in speed, m/s.
 const FULL_GAIN_MPS: f64 = 3.0;
 /// Strength of keeping right, as a fraction of the full motive.
@@ -23,9 +21,6 @@ const LAG_HALF_S: f64 = 0.48;
 const HURRY_S: f64 = 1.0;
 /// Factor on the acceptance without urgency.
 const NO_HURRY: f64 = 0.35;
-/// Braking of the new follower that reduces acceptance by a factor e, m/s². Calibrated to the slow cut-ins
-/// (published: 362 of 2,992 below 0.95 of the ego's speed).
-const LAG_BRAKING_MPS2: f64 = 0.10;
 /// Minimum time to collision with the new neighbours at the start of a change, s.
 const MIN_TTC_S: f64 = 3.5;
 /// Minimum gap to the new neighbours at the start, m.
@@ -80,8 +75,8 @@ fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neigh
     leader.speed_mps + (desired - leader.speed_mps) * freedom
 }
 
-/// Rate of the motive, 1/s, at rate factor 1.
-pub(super) fn motive_per_s(
+/// The motive, 0 to a little above 1: times the rate of lane changes, their hazard before the gaps are looked at.
+pub(super) fn motive(
     way: Way,
     speed_mps: f64,
     driver: &DriverParameters,
@@ -95,11 +90,11 @@ pub(super) fn motive_per_s(
         Way::Right => 0.0,
     };
     let no_reason = if gain < -GRAVE_LOSS_MPS { NO_REASON_AT_A_LOSS } else { NO_REASON };
-    FULL_MOTIVE_PER_S * (share + no_reason)
+    share + no_reason
 }
 
 /// Probability of accepting the gaps of the lane to enter.
-pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
+pub(super) fn acceptance(speed_mps: f64, there: LaneView, behaviour: &Behaviour) -> f64 {
     let soft_step = |value: f64, half: f64| {
         let squared = (value / half) * (value / half);
         squared * squared / (1.0 + squared * squared)
@@ -119,7 +114,9 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView) -> f64 {
         accepted *= NO_HURRY + (1.0 - NO_HURRY) * (1.0 - soft_step(lag_s, HURRY_S));
         if closing_mps > 0.0 {
             let braking = closing_mps * closing_mps / (2.0 * lag.gap_m);
-            accepted *= libm::exp(-braking / LAG_BRAKING_MPS2);
+            let willing = |tolerated_mps2: f64| libm::exp(-braking / tolerated_mps2);
+            accepted *= (1.0 - behaviour.bold_share) * willing(behaviour.follower_braking_mps2)
+                + behaviour.bold_share * willing(behaviour.bold_follower_braking_mps2);
         }
     }
     if let Some(lead) = there.ahead {
@@ -152,17 +149,18 @@ mod tests {
             standstill_gap_m: 3.4,
             acceleration_mps2: 0.55,
             comfortable_mps2: 1.5,
+            overreaction: 1.0,
         }
     }
 
     #[test]
     fn a_slow_leader_is_the_reason_to_pull_out_and_a_free_lane_the_one_to_return() {
         let truck = Some(Neighbour { gap_m: 35.0, speed_mps: 23.0 });
-        let out = motive_per_s(Way::Left, 24.0, &driver(), truck, None);
-        let without = motive_per_s(Way::Left, 24.0, &driver(), None, None);
+        let out = motive(Way::Left, 24.0, &driver(), truck, None);
+        let without = motive(Way::Left, 24.0, &driver(), None, None);
         assert!(out > 5.0 * without);
-        let back = motive_per_s(Way::Right, 33.0, &driver(), None, None);
-        let behind_truck = motive_per_s(Way::Right, 33.0, &driver(), None, truck);
+        let back = motive(Way::Right, 33.0, &driver(), None, None);
+        let behind_truck = motive(Way::Right, 33.0, &driver(), None, truck);
         assert!(back > 5.0 * behind_truck);
     }
 
@@ -170,7 +168,7 @@ mod tests {
     fn a_gap_that_just_fits_is_taken_sooner_than_a_tight_or_a_wide_one() {
         let at = |headway_s: f64| {
             let behind = Some(Neighbour { gap_m: 30.0 * headway_s, speed_mps: 30.0 });
-            acceptance(30.0, LaneView { behind, ahead: None })
+            acceptance(30.0, LaneView { behind, ahead: None }, &Behaviour::default())
         };
         assert!(at(0.8) > 3.0 * at(0.4));
         assert!(at(0.8) > 1.5 * at(2.5));
@@ -179,9 +177,10 @@ mod tests {
     #[test]
     fn nobody_moves_into_a_vehicle_or_before_one_that_closes_fast() {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
-        assert_eq!(acceptance(25.0, view(-2.0, 25.0)), 0.0);
-        assert_eq!(acceptance(25.0, view(20.0, 34.0)), 0.0);
-        assert!(acceptance(25.0, view(40.0, 25.0)) > 0.4);
-        assert!(acceptance(25.0, view(40.0, 31.0)) < acceptance(25.0, view(40.0, 28.0)));
+        let accepts = |view| acceptance(25.0, view, &Behaviour::default());
+        assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
+        assert_eq!(accepts(view(20.0, 34.0)), 0.0);
+        assert!(accepts(view(40.0, 25.0)) > 0.4);
+        assert!(accepts(view(40.0, 31.0)) < accepts(view(40.0, 28.0)));
     }
 }

@@ -8,6 +8,8 @@ const DURATION_S: [f64; 2] = [2.9, 7.3];
 const DURATION_MEDIAN_S: f64 = 5.0;
 /// Standard deviation of the duration's logarithm.
 const DURATION_SIGMA: f64 = 0.28;
+/// Standard deviation of the acceleration during a change, as a fraction of its mean.
+const ACCELERATION_SPREAD: f64 = 0.6;
 /// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
 /// duration earlier or later.
 const ASYMMETRY_SD: f64 = 0.7;
@@ -26,23 +28,29 @@ pub(super) struct LaneChangeMotion {
     pub elapsed_s: f64,
     /// Duration T, s.
     pub duration_s: f64,
+    /// Acceleration where there is room, m/s².
+    pub acceleration_mps2: Option<f64>,
     from_m: f64,
     to_m: f64,
     asymmetry: f64,
 }
 
 impl LaneChangeMotion {
-    /// Draws duration and shape of a change between two lateral positions.
+    /// Draws duration, shape and acceleration of a change between two lanes and two lateral positions.
     pub fn draw(
-        from_lane: usize,
-        to_lane: usize,
-        from_m: f64,
-        to_m: f64,
+        lanes: (usize, usize),
+        way_m: (f64, f64),
+        mean_acceleration_mps2: f64,
         stream: &mut TrafficRandom,
     ) -> LaneChangeMotion {
         let duration_s = stream.lognormal_within(DURATION_MEDIAN_S, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
-        LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, from_m, to_m, asymmetry }
+        let spread_mps2 = ACCELERATION_SPREAD * mean_acceleration_mps2;
+        let accelerates = mean_acceleration_mps2 > 0.0;
+        let acceleration_mps2 =
+            accelerates.then(|| stream.normal_within(mean_acceleration_mps2, spread_mps2, -1.0, 4.0));
+        let ((from_lane, to_lane), (from_m, to_m)) = (lanes, way_m);
+        LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, acceleration_mps2, from_m, to_m, asymmetry }
     }
 
     /// Elapsed fraction of the duration, 0 to 1.
@@ -100,7 +108,7 @@ mod tests {
     fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
         let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
-            let mut change = LaneChangeMotion::draw(1, 0, -5.6, -1.9, &mut stream);
+            let mut change = LaneChangeMotion::draw((1, 0), (-5.6, -1.9), 0.5, &mut stream);
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::error::{Error, Place, Result};
+use super::behaviour::{Behaviour, check_ranges};
+use crate::support::error::Result;
 
 /// Options of the generator. `lanesweep study` without data uses the default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +35,8 @@ pub struct GeneratorOptions {
     /// default is raised, so that a few minutes have enough scenarios. The shape of an event does not depend on it.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
+    /// How scenarios arise.
+    pub behaviour: Behaviour,
 }
 
 impl Default for GeneratorOptions {
@@ -47,6 +50,7 @@ impl Default for GeneratorOptions {
             flow_vehph: 3350.0,
             truck_share: 0.2,
             event_rate_factor: 8.0,
+            behaviour: Behaviour::default(),
         }
     }
 }
@@ -63,17 +67,8 @@ impl GeneratorOptions {
             ("truck_share", self.truck_share, 0.0, 0.5),
             ("event_rate_factor", self.event_rate_factor, 0.0, 20.0),
         ];
-        for (name, value, low, high) in ranges {
-            // Written so that NaN fails too.
-            if !(value >= low && value <= high) {
-                return Err(Error::usage(
-                    Place::item(format!("generator.{name}")),
-                    format!("{value} is outside {low} to {high}"),
-                    format!("choose a value from {low} to {high}"),
-                ));
-            }
-        }
-        Ok(())
+        check_ranges("generator", &ranges)?;
+        self.behaviour.validate()
     }
 
     /// The notice of every output made from these recordings.

@@ -2,12 +2,14 @@
 //! arrive upstream, follow, change lanes, brake and leave downstream. All decisions and accelerations of
 //! a step read the state at its start; then every vehicle moves.
 
+use super::behaviour::Behaviour;
 use super::hazards::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
+use super::waves::Waves;
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
 /// vehicles would be sorted by speed before they enter the view.
@@ -29,6 +31,15 @@ const RELAXATION_S: f64 = 15.0;
 const TOLERATED_HEADWAY_S: f64 = 0.25;
 /// Fraction of the headway that a driver keeps before leaving the leader's lane.
 const LEAVING_HEADWAY: f64 = 0.5;
+/// Time in which drivers adapt to the speed that a wave allows, s.
+const ADAPTATION_S: f64 = 1.0;
+/// Speed at which the road fills before the recording, m/s: slower than most trucks, and in dense traffic.
+const FILLING_MPS: f64 = 21.0;
+const FILLING_DENSE_MPS: f64 = 5.0;
+/// Room ahead in which drivers accelerate during a lane change: length, time headway and time to collision.
+const ROOM_M: f64 = 3.0;
+const ROOM_HEADWAY_S: f64 = 0.3;
+const ROOM_TTC_S: f64 = 6.0;
 
 /// Dimensions of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +54,8 @@ pub(super) struct RoadSetup {
     pub steps_per_sample: usize,
     /// Multiplies the rates of lane changes and hard brakings in the camera's view.
     pub event_rate_factor: f64,
+    /// Of drivers and traffic where scenarios arise.
+    pub behaviour: Behaviour,
 }
 
 /// One carriageway.
@@ -65,11 +78,13 @@ pub(super) struct Traffic {
     lag: f64,
     perception: f64,
     relaxation: f64,
+    /// Of dense traffic.
+    waves: Option<Waves>,
 }
 
 impl Traffic {
     /// An empty road. `key` is (seed, recording, carriageway).
-    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
+    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, waves: Option<Waves>, key: (u64, usize, usize)) -> Traffic {
         let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
@@ -98,6 +113,7 @@ impl Traffic {
             relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
             hazards_in_view: Hazards::raised(setting.event_rate_factor),
             setting,
+            waves,
         }
     }
 
@@ -105,7 +121,8 @@ impl Traffic {
     /// order of arrival.
     pub fn run(mut self, samples: usize) -> Vec<Vehicle> {
         // Warm-up: the slowest trucks pass the whole road once.
-        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / 21.0;
+        let filling_mps = if self.waves.is_some() { FILLING_DENSE_MPS } else { FILLING_MPS };
+        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / filling_mps;
         let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;
         let steps = warm_up + (samples.max(1) - 1) * self.setting.steps_per_sample + 1;
         for step in 0..steps {
@@ -121,12 +138,19 @@ impl Traffic {
         self.vehicles
     }
 
+    /// Speed that the waves of dense traffic allow now, m/s; without limit where traffic is not dense.
+    fn limit_mps(&self, lane: usize, s_m: f64) -> f64 {
+        let now_s = self.step as f64 * self.setting.step_s;
+        self.waves.as_ref().map_or(f64::INFINITY, |waves| waves.limit_mps(lane, s_m, now_s))
+    }
+
     fn inject(&mut self) {
         let now_s = self.step as f64 * self.setting.step_s;
         for lane in 0..self.lanes {
             let last = self.order.iter().rev().find(|&&i| self.vehicles[i].is_in(lane));
             let last = last.map(|&i| (self.vehicles[i].rear_m(), self.vehicles[i].speed_mps));
-            if let Some(vehicle) = self.inflows[lane].arrive(now_s, -UPSTREAM_M, last, &mut self.arrivals) {
+            let limit_mps = self.limit_mps(lane, -UPSTREAM_M);
+            if let Some(vehicle) = self.inflows[lane].arrive(now_s, -UPSTREAM_M, limit_mps, last, &mut self.arrivals) {
                 self.order.push(self.vehicles.len());
                 self.vehicles.push(vehicle);
             }
@@ -167,6 +191,9 @@ impl Traffic {
             let own = &self.vehicles[i];
             let target_lane = own.change.map_or(own.lane, |change| change.to_lane);
             let leader = last_in[target_lane];
+            let mut driver = own.driver;
+            let limit_mps = self.limit_mps(target_lane, own.s_m);
+            driver.desired_speed_mps = driver.desired_speed_mps.min(limit_mps);
             let view_of = |k: usize, perceived_mps2: f64| {
                 let v = &self.vehicles[k];
                 LeaderView {
@@ -190,18 +217,38 @@ impl Traffic {
                 perceived += (leader_now - perceived) * self.perception;
             }
 
+            // During a lane change the driver keeps less.
+            let kept_s =
+                if own.change.is_some() { self.setting.behaviour.change_headway_share * headway_s } else { headway_s };
             let mut command = leader.map_or_else(
-                || free_acceleration(own.speed_mps, &own.driver),
-                |k| following_acceleration(own.speed_mps, headway_s, view_of(k, perceived), &own.driver),
+                || free_acceleration(own.speed_mps, &driver),
+                |k| following_acceleration(own.speed_mps, kept_s, view_of(k, perceived), &driver),
             );
+            if own.speed_mps > limit_mps {
+                let adaptation_mps2 = (own.speed_mps - limit_mps) / ADAPTATION_S;
+                command = command.min(-adaptation_mps2.min(2.0 * driver.comfortable_mps2));
+            }
             if let Some(change) = own.change
                 && own.is_in(change.from_lane)
                 && let Some(k) = last_in[change.from_lane]
                 && leader != Some(k)
             {
                 let view = view_of(k, self.vehicles[k].acceleration_mps2);
-                command =
-                    command.min(following_acceleration(own.speed_mps, LEAVING_HEADWAY * headway_s, view, &own.driver));
+                let kept_s = LEAVING_HEADWAY * headway_s;
+                command = command.min(following_acceleration(own.speed_mps, kept_s, view, &driver));
+            }
+            if let Some(change) = own.change
+                && let Some(acceleration_mps2) = change.acceleration_mps2
+            {
+                let room = |k: usize| {
+                    let v = &self.vehicles[k];
+                    let (gap_m, closing_mps) = (v.rear_m() - own.front_m(), own.speed_mps - v.speed_mps);
+                    gap_m > ROOM_M + ROOM_HEADWAY_S * own.speed_mps && gap_m > ROOM_TTC_S * closing_mps
+                };
+                let old = if own.is_in(change.from_lane) { last_in[change.from_lane] } else { None };
+                if leader.is_none_or(room) && old.is_none_or(room) && own.speed_mps < own.driver.desired_speed_mps {
+                    command = command.max(acceleration_mps2);
+                }
             }
             if let Some(braking) = own.braking {
                 command = command.min(braking.acceleration());

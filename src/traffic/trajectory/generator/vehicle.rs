@@ -73,7 +73,7 @@ pub(super) struct Vehicle {
 
 impl Vehicle {
     /// Draws size and driver. `lane_speed_mps` is the mean desired speed of cars in this lane.
-    pub fn draw(class: VehicleClass, lane_speed_mps: f64, stream: &mut TrafficRandom) -> Vehicle {
+    pub fn draw(class: VehicleClass, lane_speed_mps: f64, overreaction: f64, stream: &mut TrafficRandom) -> Vehicle {
         let (length_m, width_m) = match class {
             VehicleClass::Car => (stream.normal_within(4.6, 0.5, 3.4, 6.4), stream.normal_within(1.9, 0.09, 1.6, 2.2)),
             // Articulated and other trucks: two peaks that give the published 12 ± 4.7 m.
@@ -91,6 +91,7 @@ impl Vehicle {
                 standstill_gap_m: 3.4,
                 acceleration_mps2: stream.lognormal_within(0.55, 0.25, 0.3, 1.2),
                 comfortable_mps2: stream.lognormal_within(1.5, 0.2, 0.9, 2.5),
+                overreaction,
             },
             VehicleClass::Truck => DriverParameters {
                 desired_speed_mps: stream.normal_within(24.8, 0.9, 22.0, 28.0),
@@ -98,6 +99,7 @@ impl Vehicle {
                 standstill_gap_m: 3.4,
                 acceleration_mps2: stream.lognormal_within(0.45, 0.25, 0.2, 0.9),
                 comfortable_mps2: stream.lognormal_within(1.2, 0.2, 0.8, 2.0),
+                overreaction,
             },
         };
         Vehicle {

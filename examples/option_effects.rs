@@ -1,0 +1,201 @@
+//! What each named option of the method changes on the default recordings, and whether it brings the study nearer to
+//! the published numbers.
+//!
+//! ```text
+//! cargo run --release --example option_effects > effects.csv
+//! ```
+//!
+//! Each row changes one option. `s_points` is the root mean square change of the shares of failures of S, per cent;
+//! `f1_change` the mean absolute change of the F1 that are defined in both runs; the misfits are those to the published
+//! shares and to the published F1 of LVD.
+
+use std::error::Error;
+
+use lanesweep::engine::{CpuBackend, Executor};
+use lanesweep::model::profile::Profile;
+use lanesweep::run::score::{Misfit, ScoreOptions, ScoreTable, f1};
+use lanesweep::run::study::{Study, StudyOptions};
+use lanesweep::scenario::parameterization::ParameterizationOptions;
+use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+
+/// Where an option stands, its key, and another value of it in TOML.
+const OPTIONS: [(&str, &str, &str); 57] = [
+    ("frame", "dt_s", "0.01"),
+    ("frame", "dt_s", "0.1"),
+    ("frame", "time_cap_s", "60.0"),
+    ("frame", "start_shift", "true"),
+    ("frame", "end_when_settled", "false"),
+    ("frame", "cut_out_target", "\"exposed\""),
+    ("frame", "cut_out_judged", "\"ahead\""),
+    ("criteria", "gate", "\"overlap\""),
+    ("criteria", "btn", "\"exact\""),
+    ("criteria", "btn", "\"distance-ratio\""),
+    ("criteria", "btn_contact", "\"gated\""),
+    ("reg157", "margin_s", "0.0"),
+    ("reg157", "margin_s", "0.2"),
+    ("reg157", "visible_lateral_movement_s", "0.72"),
+    ("reg157", "always_unsafe", "[\"lvd\", \"cut_out\"]"),
+    ("cchdm", "delay_s", "0.75"),
+    ("cchdm", "delay_s", "1.15"),
+    ("cchdm", "coasting_mps2", "0.0"),
+    ("cchdm", "always_unsafe", "[\"lvd\", \"cut_out\"]"),
+    ("cchdm", "abort_on_large_ttc", "true"),
+    ("cchdm", "wandering_m", "0.375"),
+    ("cchdm", "perception_time_s", "0.4"),
+    ("cchdm", "cut_out_headway_s", "2.0"),
+    ("cchdm", "lead_deceleration_trigger_mps2", "5.0"),
+    ("parameterization", "after_duration", "\"unlimited\""),
+    ("parameterization", "lateral_speed", "\"initial\""),
+    ("parameterization", "lateral_start", "\"recorded\""),
+    ("parameterization", "lane_change_m", "3.75"),
+    ("parameterization", "sinusoid_intervals", "200"),
+    ("parameterization", "svd_instants", "20"),
+    ("parameterization", "svd_instants", "200"),
+    ("parameterization", "series_scale", "\"per-series\""),
+    ("parameterization", "svd_lateral", "\"mirrored\""),
+    ("parameterization", "svd_fit", "\"all\""),
+    ("mining", "leader_max_thw_s", "3.0"),
+    ("mining.ego_view", "range_m", "150.0"),
+    ("mining.ego_view", "cut_m", "50.0"),
+    ("mining.longitudinal", "window_s", "0.5"),
+    ("mining.longitudinal", "window_s", "2.0"),
+    ("mining.longitudinal", "min_speed_change_mps", "2.0"),
+    ("mining.longitudinal", "min_cruise_s", "2.0"),
+    ("mining.lateral", "window_s", "0.5"),
+    ("mining.lateral", "calm_speed_mps", "0.1"),
+    ("mining.lateral", "search_s", "5.0"),
+    ("mining.lateral", "lc_end", "\"published\""),
+    ("mining.cut_in", "max_speed_share", "0.9"),
+    ("mining.cut_in", "max_speed_share", "1.0"),
+    ("mining.cut_in", "max_thw_s", "1.0"),
+    ("mining.cut_out", "require_slower_lead", "false"),
+    ("mining.lvd", "min_duration_s", "2.0"),
+    ("mining.lvd", "min_peak_deceleration_mps2", "1.5"),
+    ("mining.lvd", "min_peak_deceleration_mps2", "3.0"),
+    ("generator", "event_rate_factor", "1.0"),
+    ("generator", "event_rate_factor", "4.0"),
+    ("profile", "name", "\"paper-fit\""),
+    ("profile", "name", "\"jrc-2021\""),
+    ("profile", "name", "\"un-r157\""),
+];
+
+/// Everything that a study of generated recordings follows from.
+#[derive(Clone)]
+struct Settings {
+    generator: GeneratorOptions,
+    mining: MiningOptions,
+    parameterization: ParameterizationOptions,
+    profile: Profile,
+}
+
+impl Settings {
+    fn with(&self, table: &str, key: &str, value: &str) -> Result<Settings, Box<dyn Error>> {
+        let mut changed = self.clone();
+        let set = |old: toml::Table, at: &str| -> Result<toml::Table, Box<dyn Error>> {
+            let text = if at.is_empty() { format!("{key} = {value}") } else { format!("[{at}]\n{key} = {value}") };
+            Ok(merged(old, toml::from_str(&text)?))
+        };
+        match table.split_once('.').unwrap_or((table, "")) {
+            ("generator", at) => changed.generator = set(toml::Table::try_from(&self.generator)?, at)?.try_into()?,
+            ("mining", at) => changed.mining = set(toml::Table::try_from(&self.mining)?, at)?.try_into()?,
+            ("parameterization", at) => {
+                changed.parameterization = set(toml::Table::try_from(&self.parameterization)?, at)?.try_into()?;
+            }
+            ("profile", _) => changed.profile = Profile::load(value.trim_matches('"'))?,
+            (at, _) => changed.profile = set(toml::Table::try_from(&self.profile)?, at)?.try_into()?,
+        }
+        Ok(changed)
+    }
+
+    fn scores(&self, collection: &Collection) -> Result<ScoreTable, Box<dyn Error>> {
+        let options = StudyOptions { parameterization: self.parameterization.clone(), ..StudyOptions::default() };
+        let score = ScoreOptions { bootstrap_draws: 20, ..ScoreOptions::default() };
+        let study = Study::builder(collection, self.profile.clone()).options(options).score(score).plan()?;
+        let backend = CpuBackend::lane_arithmetic();
+        Ok(study.score(&study.run(&Executor::new(&backend))?.counts)?)
+    }
+}
+
+fn merged(mut old: toml::Table, new: toml::Table) -> toml::Table {
+    for (key, value) in new {
+        let both = (old.remove(&key), value);
+        let value = match both {
+            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => toml::Value::Table(merged(old, new)),
+            (_, value) => value,
+        };
+        old.insert(key, value);
+    }
+    old
+}
+
+/// Numbers with their names.
+type Named = Vec<(String, f64)>;
+
+/// Shares of failures of S, per cent, and F1.
+fn numbers(scores: &ScoreTable) -> (Named, Named) {
+    let (mut shares, mut f1s) = (Named::new(), Named::new());
+    for category in &scores.categories {
+        for cell in &category.cells {
+            let what = format!("{} {} {}", category.category.label(), cell.model.name(), cell.criterion.label());
+            if cell.variant == 0 {
+                shares.push((what, 100.0 * cell.counts.tp as f64 / category.simulations as f64));
+            } else if let Some(f1) = f1(&cell.counts) {
+                f1s.push((format!("{} {what}", category.variants[cell.variant]), f1));
+            }
+        }
+    }
+    (shares, f1s)
+}
+
+/// Differences of the numbers that are in both.
+fn changes<'a>(old: &'a [(String, f64)], new: &[(String, f64)]) -> Vec<(&'a str, f64)> {
+    let find = |name: &str| new.iter().find(|(other, _)| other == name).map(|(_, value)| *value);
+    old.iter().filter_map(|(name, old)| Some((name.as_str(), find(name)? - old))).collect()
+}
+
+fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
+    let ((old_shares, old_f1), (shares, f1s)) = (numbers(base), numbers(scores));
+    let (shares, f1s) = (changes(&old_shares, &shares), changes(&old_f1, &f1s));
+    let largest = |changes: &[(&str, f64)]| {
+        let most = changes.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        most.map_or_else(String::new, |(name, change)| format!("{name} {change:+.2}"))
+    };
+    let n = |changes: &[(&str, f64)]| changes.len().max(1) as f64;
+    let s_points = (shares.iter().map(|(_, d)| d * d).sum::<f64>() / n(&shares)).sqrt();
+    let f1_change = f1s.iter().map(|(_, d)| d.abs()).sum::<f64>() / n(&f1s);
+    let misfit = Misfit::of(scores).expect("all models are published");
+    let kept: Vec<String> = scores.categories.iter().map(|category| category.scenarios.to_string()).collect();
+    format!(
+        "{},{s_points:.2},{},{f1_change:.3},{},{:.2},{:.3}",
+        kept.join(" "),
+        largest(&shares),
+        largest(&f1s),
+        misfit.share_rms_points,
+        misfit.f1_mean
+    )
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let settings = Settings {
+        generator: GeneratorOptions::default(),
+        mining: MiningOptions::default(),
+        parameterization: ParameterizationOptions::default(),
+        profile: Profile::load("paper")?,
+    };
+    let mine = |settings: &Settings| mine_generated(&settings.generator, &settings.mining, || ());
+    let collection = mine(&settings)?;
+    let base = settings.scores(&collection)?;
+    println!("option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1");
+    println!("(default),,{}", row(&base, &base));
+    for (table, key, value) in OPTIONS {
+        let changed = settings.with(table, key, value)?;
+        let scores = if table.starts_with("mining") || table == "generator" {
+            changed.scores(&mine(&changed)?)?
+        } else {
+            changed.scores(&collection)?
+        };
+        println!("{table}.{key},{},{}", value.replace(['"', ','], ""), row(&base, &scores));
+    }
+    Ok(())
+}

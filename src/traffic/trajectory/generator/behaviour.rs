@@ -1,0 +1,118 @@
+//! The numbers of the generator on which the failures of recorded scenarios depend most.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::support::error::{Error, Place, Result};
+
+/// How drivers change lanes and brake, and how often traffic is dense, where scenarios arise. Rates and shares are those
+/// at rate factor 1.
+///
+/// `examples/calibrate_generator.rs` prints what a set of numbers gives beside the paper's 36 shares of failures of S, and
+/// fits them. The defaults are set by published traffic figures only.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Behaviour {
+    /// Share of carriageways with stop-and-go traffic, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub dense_share: f64,
+    /// Median of the mean speed that the waves of stop-and-go traffic allow, m/s.
+    #[schemars(range(min = 3.0, max = 40.0))]
+    pub dense_speed_mps: f64,
+    /// Standard deviation of the speed in the waves, as a fraction of their mean.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub wave_amplitude: f64,
+    /// Share of the waves' variance that each lane has for itself, 0 (all lanes alike) to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub wave_own_share: f64,
+    /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub follower_braking_mps2: f64,
+    /// Share of decisions by a bold driver, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub bold_share: f64,
+    /// The same braking of the new follower, for a bold driver, m/s².
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub bold_follower_braking_mps2: f64,
+    /// Mean acceleration during a lane change where there is room, m/s².
+    #[schemars(range(min = 0.0, max = 4.0))]
+    pub change_acceleration_mps2: f64,
+    /// Fraction of the time headway that a driver keeps to the new leader during a lane change.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub change_headway_share: f64,
+    /// Rate of hard brakings of a vehicle with a follower, 1/s.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub brakings_per_s: f64,
+    /// Mean time for which a hard braking is held, s.
+    #[schemars(range(min = 0.01, max = 60.0))]
+    pub braking_hold_s: f64,
+    /// Mean excess of its peak over 1.4 m/s², m/s².
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub braking_excess_mps2: f64,
+    /// Share of hard brakings with a mean excess of 1.8 m/s², 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub hardest_share: f64,
+    /// How much harder than needed a driver brakes where the gap is too short, as a fraction of the comfortable
+    /// deceleration.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub overreaction: f64,
+}
+
+impl Default for Behaviour {
+    fn default() -> Self {
+        Behaviour {
+            dense_share: 0.0,
+            dense_speed_mps: 12.0,
+            wave_amplitude: 0.2,
+            wave_own_share: 0.4,
+            follower_braking_mps2: 0.1,
+            bold_share: 0.0,
+            bold_follower_braking_mps2: 1.5,
+            change_acceleration_mps2: 0.0,
+            change_headway_share: 1.0,
+            brakings_per_s: 0.0012,
+            braking_hold_s: 1.6,
+            braking_excess_mps2: 0.45,
+            hardest_share: 0.15,
+            overreaction: 1.0,
+        }
+    }
+}
+
+impl Behaviour {
+    /// Checks every number; the error names the first one outside its range.
+    pub fn validate(&self) -> Result<()> {
+        let ranges = [
+            ("dense_share", self.dense_share, 0.0, 1.0),
+            ("dense_speed_mps", self.dense_speed_mps, 3.0, 40.0),
+            ("wave_amplitude", self.wave_amplitude, 0.0, 1.0),
+            ("wave_own_share", self.wave_own_share, 0.0, 1.0),
+            ("follower_braking_mps2", self.follower_braking_mps2, 0.001, 10.0),
+            ("bold_share", self.bold_share, 0.0, 1.0),
+            ("bold_follower_braking_mps2", self.bold_follower_braking_mps2, 0.001, 10.0),
+            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 4.0),
+            ("change_headway_share", self.change_headway_share, 0.0, 1.0),
+            ("brakings_per_s", self.brakings_per_s, 0.0, 1.0),
+            ("braking_hold_s", self.braking_hold_s, 0.01, 60.0),
+            ("braking_excess_mps2", self.braking_excess_mps2, 0.0, 5.0),
+            ("hardest_share", self.hardest_share, 0.0, 1.0),
+            ("overreaction", self.overreaction, 0.0, 2.0),
+        ];
+        check_ranges("generator.behaviour", &ranges)
+    }
+}
+
+/// The error names the first (name, value, minimum, maximum) of a table that is outside its range.
+pub(super) fn check_ranges(table: &str, ranges: &[(&str, f64, f64, f64)]) -> Result<()> {
+    for (name, value, low, high) in ranges {
+        // NaN is in no range.
+        if !(low..=high).contains(&value) {
+            return Err(Error::usage(
+                Place::item(format!("{table}.{name}")),
+                format!("{value} is outside {low} to {high}"),
+                format!("choose a value from {low} to {high}"),
+            ));
+        }
+    }
+    Ok(())
+}
