@@ -212,7 +212,7 @@ fn write(
     file.levels = result.levels;
     if sample.has_given_proposals() {
         // A proposal in this folder may be one that was given.
-        results.keep(|name| name.starts_with("proposal-"));
+        results.keep(|name| name.starts_with("proposal-"))?;
     }
     for (model, proposal) in &result.proposals {
         results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;

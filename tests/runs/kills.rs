@@ -12,6 +12,9 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+/// Lists the files of a folder's runs.
+const LIST: &str = "lanesweep-files.json";
+
 /// Names and content of a folder's results.
 type Files = BTreeMap<String, Vec<u8>>;
 
@@ -172,7 +175,12 @@ fn names(dir: &Path) -> Vec<String> {
 /// Not a result: plan and parts, and what is there only while a run is at work.
 fn is_beside(name: &str) -> bool {
     let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
-    is_of_work || name == "pilot.json" || name == "plan.json" || name == "unfinished.json" || name.starts_with("part-")
+    is_of_work || name == "pilot.json" || name == "plan.json" || name == LIST || name.starts_with("part-")
+}
+
+/// Whether files are getting their names.
+fn is_switching(dir: &Path) -> bool {
+    std::fs::read_to_string(dir.join(LIST)).is_ok_and(|text| text.contains("\"is_complete\":false"))
 }
 
 fn files(dir: &Path) -> Files {
@@ -279,9 +287,10 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
         if round % 2 == 0 && verb.record.is_some() {
             // As soon as the files get their names, or shortly after.
             let started = Instant::now();
-            let list = dir.join("out/unfinished.json");
-            while !list.exists() && child.try_wait().unwrap().is_none() && started.elapsed() < Duration::from_secs(60) {
-            }
+            while !is_switching(&dir.join("out"))
+                && child.try_wait().unwrap().is_none()
+                && started.elapsed() < Duration::from_secs(60)
+            {}
             std::thread::sleep(Duration::from_micros(kill as u64 * 377 % 3000));
         } else {
             // A low-discrepancy sequence of moments over the whole run.
@@ -303,7 +312,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
                     same(&settled(found), expected, &what);
                 }
             }
-            Some(_) => switching += usize::from(out.join("unfinished.json").exists()),
+            Some(_) => switching += usize::from(is_switching(&out)),
             None => {
                 for (name, content) in &found {
                     assert!(before.get(name) == Some(content) || expected.get(name) == Some(content), "{what}: {name}");

@@ -114,7 +114,7 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     let map = ["-q", "map", "lvd", "--x", "deceleration_mps2=2,4", "--y", "ego_speed_kmh=60,90", "--set", "thw_s=1.2"];
     let part = [&study[..], &["--shard", "0/1"]].concat();
     let links: [(&[&str], &[&str]); 5] = [
-        (&study, &["run.lock", "run.json", "f1.csv", "run-plan.json", "unfinished.json"]),
+        (&study, &["run.lock", "run.json", "f1.csv", "run-plan.json", "lanesweep-files.json"]),
         (&part, &["run.lock", "part-00000-of-00001.lock", "part-00000-of-00001.journal"]),
         (&sample, &["run.lock", "estimate.json", "estimates.csv"]),
         (&map, &["run.lock", "map.json", "cells.csv"]),

@@ -278,6 +278,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
         if wanted == Wanted::Counts {
             counts.resize(plan.cell_count(), CellCounts::EMPTY);
         }
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts })
+        let redone_and_rechecked = [0; 2];
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked })
     }
 }

@@ -60,7 +60,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// [`Error::Io`]; [`Error::Input`] where the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let engine = ENGINE_VERSION;
-        let head = Head { lanesweep_journal: 2, engine, run_sha256: run_sha256.to_owned(), units };
+        let head = Head { lanesweep_journal: 3, engine, run_sha256: run_sha256.to_owned(), units };
         let due = Instant::now() + MIN_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
@@ -307,7 +307,7 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), before);
         // Of another engine, whose version is part of the head and its checksum; and as earlier versions began.
         let units = 0..10;
-        let head = Head { lanesweep_journal: 2, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
+        let head = Head { lanesweep_journal: 3, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
         let earlier =
             serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
         for (text, said) in [(line_of(&head), "of engine "), (line_of(&earlier), "another version")] {

@@ -35,7 +35,7 @@ pub use compare::{
 };
 pub use conditional::{Conditional, conditional, mixture_of};
 pub use crude::{
-    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, sample_crude, sample_into,
+    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into,
 };
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
