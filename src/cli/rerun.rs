@@ -29,6 +29,7 @@ struct Recorded {
     #[serde(default)]
     given: Vec<(String, f64)>,
     plan_sha256: Option<String>,
+    worst_sha256: Option<String>,
 }
 
 /// What the sampling run that wrote this folder was asked for, with its density.
@@ -54,8 +55,32 @@ pub(super) fn same_engine(recorded: Option<u64>) -> std::result::Result<(), Stri
     }
 }
 
+/// Checksum of the table of worst lanes, as the record has it.
+///
+/// # Errors
+/// As [`facts_of`].
+pub(super) fn worst_sha256(dir: &Path) -> Result<Option<String>> {
+    Ok(read(dir)?.1.worst_sha256)
+}
+
 /// The same of a run without a density of ours.
 pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
+    let (estimator, run) = read(dir)?;
+    let facts = RunFacts {
+        estimator,
+        profile: run.profile,
+        models: run.models,
+        headways: run.plan_headways,
+        points: if run.points == "sobol" { "sobol" } else { "random" },
+        samples: run.samples,
+        seed: run.seed,
+        given: run.given,
+    };
+    Ok((facts, run.plan_sha256))
+}
+
+/// The estimator and the record of a folder.
+fn read(dir: &Path) -> Result<(&'static str, Recorded)> {
     let path = dir.join("estimate.json");
     let wrong = |problem: String| {
         let help = "give the folder (--out) of a `lanesweep sample` run by this version";
@@ -69,17 +94,7 @@ pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
     }
     same_engine(run.engine).map_err(wrong)?;
     let estimator = ["mc", "is", "ce", "subset"].into_iter().find(|known| *known == run.estimator);
-    let facts = RunFacts {
-        estimator: estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?,
-        profile: run.profile,
-        models: run.models,
-        headways: run.plan_headways,
-        points: if run.points == "sobol" { "sobol" } else { "random" },
-        samples: run.samples,
-        seed: run.seed,
-        given: run.given,
-    };
-    Ok((facts, run.plan_sha256))
+    Ok((estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?, run))
 }
 
 /// The plan of the sampling run that wrote this folder, with what the run was asked for and its density.

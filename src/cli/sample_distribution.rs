@@ -16,7 +16,7 @@ use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::model::profile::Profile;
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
-use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::grid::MapParameter;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
 use crate::scenario::Category;
@@ -232,7 +232,7 @@ fn write(
             });
         }
         let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        results.add("worst.csv", &worst_csv(&rows, &names, counting.criterion)?)?;
+        sample_lanes::add_worst(&mut results, &rows, &names, counting.criterion, file)?;
     }
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
     results.add(KEPT, &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;

@@ -204,7 +204,7 @@ fn write(
     let mut file = EstimateFile::new(density, RunFacts::of(sample), result.rows, host)?;
     let mut figures = Vec::new();
     if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
-        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting())?;
+        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting(), &mut file)?;
         file.plan_sha256 = Some(planned.plan.hash().to_owned());
         file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
     }

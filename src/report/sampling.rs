@@ -155,6 +155,8 @@ pub struct EstimateFile {
     pub bootstrap: Option<BootstrapRecord>,
     /// Files beside this one.
     pub files: Vec<String>,
+    /// SHA-256 of `worst.csv`, where there is one.
+    pub worst_sha256: Option<String>,
     /// The machine.
     pub host: HostRecord,
 }
@@ -205,6 +207,7 @@ impl EstimateFile {
             levels: Vec::new(),
             bootstrap: None,
             files: Vec::new(),
+            worst_sha256: None,
             host,
         }
     }
