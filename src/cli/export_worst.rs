@@ -110,7 +110,11 @@ pub(super) fn worst_of_sample(
     let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
     if worst_sha256(dir)?.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
         let problem = "its checksum does not fit the one in estimate.json: it was changed or damaged";
-        return Err(Error::input(Place::file(&path), problem, "run `lanesweep sample` again, or name lanes with --lane"));
+        return Err(Error::input(
+            Place::file(&path),
+            problem,
+            "run `lanesweep sample` again, or name lanes with --lane",
+        ));
     }
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let wrong = |row: u64, problem: String| {

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
+use crate::model::criterion::Criterion;
 use crate::report::convergence::ConvergenceFigure;
 use crate::report::failure_map::FailureMap;
 use crate::report::html::PageFigure;
-use crate::model::criterion::Criterion;
 use crate::report::lanes;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};

@@ -153,6 +153,7 @@ impl OutputDir {
         let list = FileList::read(&self.dir)?;
         let is_foreign = |name: &&str| !list.holds(name) && self.dir.join(name).symlink_metadata().is_ok();
         let Some(name) = { names }.find(is_foreign) else { return Ok(()) };
+        refuse_link(&self.dir.join(name))?;
         let problem = format!("it would be overwritten, and {LIST} does not list it as a result of an earlier run");
         let help = "move it away, or give another option `out`";
         Err(Error::usage(Place::file(self.dir.join(name)), problem, help))

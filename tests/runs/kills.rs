@@ -188,18 +188,23 @@ fn files(dir: &Path) -> Files {
     results.map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
 }
 
-/// Without what belongs to the machine and the hour.
+/// Without times.
 fn settled(files: Files) -> Files {
     let settle = |(name, mut content): (String, Vec<u8>)| {
         if ["run.json", "estimate.json", "map.json", "compare.json"].contains(&name.as_str()) {
             let mut record: serde_json::Value = serde_json::from_slice(&content).unwrap();
-            for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
+            for checks in ["/sweep", "/host", "/host/sweep"] {
+                for time in ["device_s", "seconds", "plan_s", "sweep_s"] {
+                    record.pointer_mut(checks).and_then(|checks| checks.as_object_mut()?.remove(time));
+                }
+            }
+            for host in ["timings", "settings"] {
                 record.as_object_mut().unwrap().remove(host);
             }
             content = record.to_string().into_bytes();
         }
         if name == "report.html" {
-            content = page::without_host(&String::from_utf8(content).unwrap()).into_bytes();
+            content = page::without_times(&String::from_utf8(content).unwrap()).into_bytes();
         }
         (name, content)
     };

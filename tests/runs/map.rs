@@ -427,6 +427,7 @@ fn the_same_files_come_from_any_number_of_threads() {
             "cut_in_fsm.svg",
             "cut_in_fsm_against_jrc-2021.svg",
             "differences.csv",
+            "lanesweep-files.json",
             "map.json",
             "report.html",
         ]
