@@ -8,13 +8,13 @@ use std::path::Path;
 use assert_cmd::Command;
 
 /// Runs the program in a folder: exit code, stdout, stderr.
-fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
+pub fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
     let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
 
-fn done(dir: &Path, args: &[&str]) -> String {
+pub fn done(dir: &Path, args: &[&str]) -> String {
     let (code, out, err) = lanesweep(dir, args);
     assert_eq!(code, 0, "{args:?}: {err}");
     out
@@ -25,7 +25,7 @@ fn flat(text: &str) -> String {
 }
 
 /// Names and content of a folder's results; of the records only what does not belong to the machine.
-fn results(dir: &Path) -> Vec<(String, String)> {
+pub fn results(dir: &Path) -> Vec<(String, String)> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
@@ -65,15 +65,21 @@ fn same(a: &Path, b: &Path) {
     }
 }
 
-const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
+pub const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
 
-fn density(dir: &Path) {
+pub fn density(dir: &Path) {
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
 }
 
-const SAMPLE: [&str; 9] =
+pub const SAMPLE: [&str; 9] =
     ["-q", "sample", "densities/cut-in-2.json", "--samples", "30000", "--thw", "0.6", "--backend", "cpu"];
+
+/// Importance sampling that can be split: with a proposal of a run before.
+pub fn weighted(dir: &Path) -> Vec<&'static str> {
+    done(dir, &[&SAMPLE[..], &["--estimator", "is", "--pilot", "2000", "--models", "RSS", "--out", "pilot"]].concat());
+    [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal-RSS.json", "--models", "RSS,FSM"]].concat()
+}
 
 #[test]
 fn a_study_in_shards_is_the_study_in_one_piece() {
@@ -245,7 +251,7 @@ fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
-    let is = [&SAMPLE[..], &["--estimator", "is", "--pilot", "2000"]].concat();
+    let is = weighted(dir);
     type Change = fn(&mut serde_json::Value);
     let of_study: [(&str, Change); 2] = [
         ("belong to plan", |part| part["segments"][0]["plan_hash"] = "00".into()),
