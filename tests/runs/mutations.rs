@@ -1,6 +1,6 @@
 //! Files that runs leave and read again, changed at random: refused, or of no effect. With a checksum made anew counts may
 //! be other counts, but never a defect of the program. 60 changes by default; the long form is
-//! `LANESWEEP_MUTATIONS=2000 cargo test --release --test runs mutations:: -- --nocapture`.
+//! `LANESWEEP_MUTATED_INPUTS=2000 cargo test --release --test runs mutations:: -- --nocapture`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -69,7 +69,7 @@ fn resealed(file: &str, bytes: &[u8]) -> Option<Vec<u8>> {
 
 #[test]
 fn changed_files_of_a_run_are_refused_or_have_no_effect() {
-    let count: u64 = std::env::var("LANESWEEP_MUTATIONS").map_or(60, |text| text.parse().unwrap());
+    let count: u64 = std::env::var("LANESWEEP_MUTATED_INPUTS").map_or(60, |text| text.parse().unwrap());
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
