@@ -59,7 +59,7 @@ impl Exit {
             Exit::BadInput => "invalid data; nothing was written",
             Exit::Incomplete => "a result was written, but parts of the input were left out",
             Exit::VerificationFailed => "a check failed",
-            Exit::Io => "the system refused to read, to write or to start a thread",
+            Exit::Io => "the system refused to read, to write, to start a thread or to give memory",
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a program error",
             Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",

@@ -163,9 +163,7 @@ pub fn main() -> ExitCode {
     let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => {
-            let asked_for = !error.use_stderr();
-            console::refuse(&error);
-            return if asked_for { Exit::Ok } else { Exit::Usage }.into();
+            return told(|| console::refuse(&error)).into();
         }
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
