@@ -86,7 +86,8 @@ fn read(dir: &Path) -> Result<(&'static str, Recorded)> {
         let help = "give the folder (--out) of a `lanesweep sample` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
+    let again = "run `lanesweep sample` into this folder again";
+    let text = input_file::read_json(&path, input_file::MAX_TABLE_BYTES, "the record of a run", again)?;
     let run: Recorded =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
     if run.lanesweep_estimate != 1 {

@@ -75,7 +75,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
             help,
         ));
     }
-    let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
+    let text = input_file::read_text(path, input_file::MAX_XML_BYTES)?;
     let name = flags.category.as_deref().unwrap_or_default();
     let category = Category::parse(name).ok_or_else(|| {
         let problem = format!("there is no category `{name}`");
@@ -249,7 +249,8 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
         let help = "give the folder (--out) of a `lanesweep sample --distribution` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
+    let again = "run `lanesweep sample --distribution` into this folder again";
+    let text = input_file::read_json(&path, input_file::MAX_TABLE_BYTES, "the record of a distribution", again)?;
     let kept: Kept =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a distribution: {e}")))?;
     if kept.lanesweep_distribution != 1 {

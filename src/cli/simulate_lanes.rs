@@ -152,7 +152,8 @@ fn study_of(dir: &Path, run: &Path) -> Result<Study> {
                  folder; a study keeps it up to 256 MiB, and always with `--keep-plan always`",
         )
     };
-    let text = input_file::read(run, input_file::MAX_TABLE_BYTES)?;
+    let again = "run the study into this folder again";
+    let text = input_file::read_json(run, input_file::MAX_TABLE_BYTES, "the record of a study", again)?;
     let recorded: Recorded =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a study: {e}")))?;
     super::rerun::same_engine(recorded.engine).map_err(wrong)?;

@@ -28,6 +28,9 @@ use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::counts_text;
 
+/// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
+const FORECAST_BYTES: u64 = 64 << 20;
+
 /// How far do parameterized scenarios agree with recorded ones?
 ///
 /// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S') from ten
@@ -202,7 +205,7 @@ impl Study {
         let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let some = study.cases().thinned(WINDOW)?;
+        let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
         let mut forecast =
             forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
         forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
@@ -217,8 +220,9 @@ impl Study {
             parts: dry_run::parts(plan),
             units: "scenarios",
             is_at_most: false,
-            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum(),
-            more: "counts and bootstrap",
+            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum::<u64>()
+                + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
+            more: "counts, bootstrap and the series of a window",
             forecast: Some(forecast),
             backend: backend.describe(),
             before: before_s.map(|seconds| (seconds, "reading, mining and planning")),

@@ -170,3 +170,29 @@ fn what_holds_no_case_is_refused_with_what_to_give() {
         assert!((2..=3).contains(&code) && error.contains(says), "{args:?}: {code} {error}");
     }
 }
+
+#[test]
+fn a_check_of_lanes_with_too_many_steps_is_refused_in_seconds() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("cap.toml");
+    let profile = include_str!("../../configs/profiles/jrc-2021.toml");
+    assert!(profile.contains("time_cap_s = 34.9"));
+    let case = "check --category cut-in --ego-speed 30 --speed 20 --gap 36 --lateral-speed 1 --profiles";
+    // A cap that lost its point; then the longest one, whose lanes never settle.
+    for (cap, dt, expected) in [
+        ("34900.0", "0.1", "0.001 to 3600 s"),
+        ("3600.0", "0.01", "too many steps"),
+        ("3600.0", "0.002", "too many steps"),
+    ] {
+        let changed = profile
+            .replace("time_cap_s = 34.9", &format!("time_cap_s = {cap}"))
+            .replace("dt_s = 0.1", &format!("dt_s = {dt}"));
+        std::fs::write(&path, changed).unwrap();
+        let started = std::time::Instant::now();
+        let (code, _, error) = check(&case.split(' ').chain([text(&path)]).collect::<Vec<_>>());
+        // The drawing breaks long lines.
+        let error = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(code == 2 && error.contains(expected) && error.contains("time_cap_s"), "{cap}: {code} {error}");
+        assert!(started.elapsed() < std::time::Duration::from_secs(30), "{cap}: {:?}", started.elapsed());
+    }
+}

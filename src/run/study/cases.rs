@@ -147,6 +147,19 @@ impl StudyCases {
         Ok(summary)
     }
 
+    /// Bytes of the series of these units' cases, at most.
+    pub(super) fn series_bytes(&self, units: Range<u64>) -> u64 {
+        (self.entries(units) * size_of::<f64>() as f64) as u64
+    }
+
+    /// Bytes of the series that a sweep holds at once, about: those of its first window, and as many again for their copy in
+    /// binary32 and what a batch unrolls.
+    pub(crate) fn window_bytes(&self) -> u64 {
+        let first = self.held.units();
+        let bytes = self.series_bytes(first.start..first.end.min(first.start + WINDOW));
+        2 * bytes.min((MAX_ENTRIES_AT_ONCE * size_of::<f64>() as f64) as u64)
+    }
+
     /// How many values the series of these units' cases have together, at most.
     fn entries(&self, units: Range<u64>) -> f64 {
         let grid = TimeGrid::of(&self.outline.profile);
