@@ -2,7 +2,7 @@
 //! run and which interval. A torn or damaged record ends what is believed; all after it is computed again.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
         }
         let (records, whole) = journal.parse(&mut BufReader::with_capacity(1 << 16, &file))?;
-        if whole == 0 && about.len() > MAX_FIRST_BYTES {
+        if whole == 0 && (about.len() > MAX_FIRST_BYTES || !begins_as_journal(&file).map_err(io)?) {
             let help = "move it away: it holds nothing that a run could continue from";
             return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
         }
@@ -225,6 +225,14 @@ fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
     Ok(line)
 }
 
+/// Whether a file may be a journal that was torn while it was begun: as far as it goes, it begins with a checksum.
+fn begins_as_journal(mut file: &File) -> std::io::Result<bool> {
+    let mut begin = Vec::new();
+    file.rewind()?;
+    file.take(CHECKSUM as u64).read_to_end(&mut begin)?;
+    Ok(begin.iter().all(|byte| byte.is_ascii_hexdigit()))
+}
+
 /// The content of a whole line.
 fn checked(line: &[u8]) -> Option<&[u8]> {
     let line = line.strip_suffix(b"\n")?;
@@ -318,8 +326,12 @@ mod tests {
         let head = Head { lanesweep_journal: 3, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
         let earlier =
             serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
-        for (text, said) in [(line_of(&head), "of engine "), (line_of(&earlier), "another version")] {
-            let text = text.unwrap();
+        let mine = b"notes of a user\n".to_vec();
+        for (text, said) in [
+            (line_of(&head).unwrap(), "of engine "),
+            (line_of(&earlier).unwrap(), "another version"),
+            (mine, "no journal of lanesweep"),
+        ] {
             std::fs::write(&path, &text).unwrap();
             let error = Journal::<Vec<u32>>::open(&path, "run", 0..10).err().unwrap();
             assert!(error.to_string().contains(said), "{error}");
