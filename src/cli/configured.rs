@@ -22,7 +22,7 @@ pub(super) struct Configured {
 }
 
 /// A flag that sets a key: the verb (every one that has the flag where it is empty), the flag's id, the key.
-pub(super) const FLAGS: [(&str, &str, &str); 30] = [
+pub(super) const FLAGS: [(&str, &str, &str); 28] = [
     ("", "threads", "run.threads"),
     ("", "backend", "run.backend"),
     ("", "device", "run.device"),
@@ -48,8 +48,6 @@ pub(super) const FLAGS: [(&str, &str, &str); 30] = [
     ("sample", "elite_fraction", "sample.elite_fraction"),
     ("sample", "broad_weight", "sample.broad_weight"),
     ("sample", "defensive_weight", "sample.defensive_weight"),
-    ("sample", "bootstrap", "sample.bootstrap"),
-    ("sample", "bootstrap_samples", "sample.bootstrap_samples"),
     ("sample", "seed", "sample.seed"),
     ("compare", "samples", "compare.samples"),
     ("compare", "seed", "compare.seed"),

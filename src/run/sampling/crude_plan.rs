@@ -155,8 +155,7 @@ impl CrudeFacts {
         }
     }
 
-    /// As the bootstrap takes them.
-    pub fn plan_options(&self) -> SamplePlanOptions {
+    fn plan_options(&self) -> SamplePlanOptions {
         SamplePlanOptions {
             samples: self.samples,
             seed: self.seed,

@@ -3,7 +3,6 @@
 //! [`Sample`] is the way in: it plans a run of any estimator, runs it whole or in shards, resumes and merges it. Densities
 //! and estimators come from [`crate::stats`], lanes run in [`crate::engine`].
 
-mod bootstrap;
 mod compare;
 mod conditional;
 mod crude;
@@ -28,7 +27,6 @@ mod weighted;
 pub(crate) mod weighted_plan;
 mod weighted_tally;
 
-pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,

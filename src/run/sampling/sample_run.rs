@@ -3,7 +3,6 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::bootstrap::{BootstrapRecord, bootstrap};
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
 use super::sample::{Sample, SampleKind};
 use super::sample_result::SampleResult;
@@ -145,25 +144,6 @@ impl Sample {
             }
         };
         Ok((sample, result))
-    }
-
-    /// Replicates of crude Monte Carlo over resampled scenarios: the data's share of the uncertainty.
-    ///
-    /// # Errors
-    /// As [`bootstrap`]; [`Error::Usage`] for another estimator.
-    pub fn bootstrap(
-        &self,
-        executor: &Executor,
-        replicates: u32,
-        samples: u64,
-        progress: impl FnMut(),
-    ) -> Result<BootstrapRecord> {
-        let SampleKind::Crude(plan, _) = &self.0 else {
-            let help = "use crude Monte Carlo, or leave it out";
-            return Err(Error::usage(Place::item("bootstrap"), "this belongs to crude Monte Carlo", help));
-        };
-        let options = plan.facts.plan_options();
-        bootstrap(&plan.density, &plan.facts.profile, &options, executor, replicates, samples, progress)
     }
 }
 
