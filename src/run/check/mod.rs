@@ -19,6 +19,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Perturbation, Point};
+use crate::support::repeats::refuse_repeats;
 use crate::{Place, Result};
 
 /// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
@@ -109,8 +110,11 @@ impl Check {
     /// Runs every model under every profile.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] for a case that cannot be made, or a time step that is too long for it.
+    /// [`crate::Error::Usage`] for a case that cannot be made, a time step that is too long for it, and a profile or model
+    /// that is there twice.
     pub fn run(&self) -> Result<Vec<Judgement>> {
+        refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
+        refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
         self.profiles.par_iter().map(|profile| self.under(profile)).collect()
     }
 
