@@ -11,6 +11,7 @@ use crate::run::sampling::limit_state;
 use crate::run::study::{StudyCases, WINDOW};
 use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::repeats::refuse_repeats;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 use sha2::{Digest, Sha256};
@@ -34,6 +35,7 @@ pub(super) fn worst_of_study(
 ) -> Result<Vec<LaneKey>> {
     let plan = study.outline();
     let models = wanted_models(plan, models, count)?;
+    refuse_repeats(|| Place::item("--variant"), variants.iter().map(|name| (name.trim(), name.trim())))?;
     for name in variants {
         if !plan.blocks.iter().any(|b| b.variants.iter().any(|v| v == name.trim())) {
             let mut known: Vec<&str> = plan.blocks.iter().flat_map(|b| &b.variants).map(String::as_str).collect();

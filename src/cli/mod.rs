@@ -49,6 +49,7 @@ mod verify;
 
 pub use exit::Exit;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
@@ -160,7 +161,8 @@ const MAX_THREADS: usize = 4096;
 
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
-    let matches = match configured::command().try_get_matches() {
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let matches = match configured::command().try_get_matches_from(&words) {
         Ok(matches) => matches,
         Err(error) => {
             return told(|| console::refuse(&error)).into();
@@ -171,7 +173,7 @@ pub fn main() -> ExitCode {
     }
     crate::support::interrupt::install();
     told(|| {
-        let (cli, configured) = Configured::of(&matches)?;
+        let (cli, configured) = Configured::of(&matches, &words)?;
         run(&cli, &configured)
     })
     .into()

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use super::source::file_of;
+use crate::support::repeats::refuse_repeats;
 use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
@@ -97,6 +99,7 @@ impl Sample {
                 "add --estimator is",
             ));
         }
+        refuse_repeats(|| Place::item("--proposal"), self.proposal.iter().map(|path| (file_of(path), path.display())))?;
         Ok(())
     }
 }

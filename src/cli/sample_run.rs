@@ -46,6 +46,18 @@ impl Sample {
         if let Some(path) = &self.distribution {
             return sample_distribution::run(self, path, started, verbosity);
         }
+        let (sample, data) = self.planned()?;
+        let opened = self.backend.open()?;
+        tracing::info!("{data}");
+        self.run_sample(sample, &opened, started, verbosity)
+    }
+
+    /// Plans a run of the density, for who writes the command down too; with what the data are.
+    ///
+    /// # Errors
+    /// Those that the run would end with.
+    pub(super) fn planned(&self) -> Result<(sampling::Sample, String)> {
+        self.check()?;
         let Some(density) = &self.density else {
             return Err(Error::usage(
                 Place::item("DENSITY"),
@@ -59,13 +71,11 @@ impl Sample {
         }
         let profile = self.load_profile()?;
         let options = self.options(&density)?;
-        let opened = self.backend.open()?;
         if let Some(rows) = &self.rows {
             guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }
-        tracing::info!("{}", density.provenance.data);
-        let sample = sampling::Sample::plan(density, &profile, &options)?;
-        self.run_sample(sample, &opened, started, verbosity)
+        let data = density.provenance.data.clone();
+        Ok((sampling::Sample::plan(density, &profile, &options)?, data))
     }
 
     /// From a plan to the estimates, or to a part of them.

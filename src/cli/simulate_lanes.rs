@@ -16,6 +16,7 @@ use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::support::input_file;
 use crate::support::plausibility::Implausible;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Which lanes are asked for: one by its key, and others of the same scenario and headway beside it.
@@ -256,6 +257,7 @@ pub(super) fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
 fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
     let names = &plan.blocks[key.block].variants;
     let mut variants = Vec::new();
+    refuse_repeats(|| Place::item("--compare"), compare.iter().map(|name| (name.trim(), name.trim())))?;
     for name in compare.iter().map(|name| name.trim()) {
         match names.iter().position(|n| n == name) {
             Some(at) => variants.push(at),

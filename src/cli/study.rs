@@ -18,6 +18,7 @@ use super::{Exit, ProfileFlags, lists};
 use crate::Result;
 use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
+use crate::model::profile::Profile;
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
@@ -162,22 +163,40 @@ impl Study {
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
-    /// From data to a plan.
-    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
-        let mut config = configured.settings.clone();
-        config.score.seed = self.seed.unwrap_or(config.score.seed);
+    /// Checks what a plan is made of, but for recordings, which are not read: for who writes the command down.
+    ///
+    /// # Errors
+    /// Those that the run would end with.
+    pub(super) fn check(&self, configured: &Configured) -> Result<()> {
+        self.guard_inputs(configured)?;
+        check_folder(&self.out)?;
+        let (profile, options, source) = self.asked(configured)?;
+        profile.check_time_step(&options.models)?;
+        source.check(self.plausibility.policy())
+    }
+
+    /// What is studied, with what.
+    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions, Source)> {
         let profile = self.profile.load()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
             headways: lists::paper_or_headways(&self.thw)?,
-            parameterization: config.parameterization.clone(),
+            parameterization: configured.settings.parameterization.clone(),
         };
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
+        Ok((profile, options, source))
+    }
+
+    /// From data to a plan.
+    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
+        let mut config = configured.settings.clone();
+        config.score.seed = self.seed.unwrap_or(config.score.seed);
+        let (profile, options, source) = self.asked(configured)?;
         tracing::info!("{}", source.describe(false));
         let mut timings = Timings::default();
         let collection =

@@ -10,6 +10,7 @@ use crate::model::criterion::CriteriaProfile;
 use crate::model::driver::{self, Bound, DriverProfile, ModelId};
 use crate::support::input_file;
 use crate::support::near_name::nearest;
+use crate::support::repeats::refuse_repeats;
 use crate::support::toml_file;
 use crate::{Error, Place, Result};
 
@@ -188,6 +189,10 @@ impl Profile {
                 format!("{value} is not usable; expected {expected}"),
                 "the chapter on profiles has the range of every key, configs/profiles/paper.toml usual values",
             ));
+        }
+        for (key, list) in [("reg157", &self.reg157.always_unsafe), ("cchdm", &self.cchdm.always_unsafe)] {
+            let place = || place.clone().of(format!("`{key}.always_unsafe`"));
+            refuse_repeats(place, list.iter().map(|category| (*category, category.key())))?;
         }
         if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
             return Err(Error::usage(

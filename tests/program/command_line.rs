@@ -220,9 +220,29 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--threads", "0"], 2, "use at least 1"),
         (&["study", "--scenarios", "no-such-file.jsonl"], 6, "no-such-file.jsonl"),
         (&["simulate", "--category", "cutin"], 2, "use cut-in, cut-out or lvd"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--gap", "5", "--models", "XYZ"], 2, "Reg157, CCHDM"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--models", "RSS"], 2, "at least 0"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--models", "RSS"], 2, "--thw"),
+        (
+            &[
+                "simulate",
+                "--category",
+                "lvd",
+                "--ego-speed",
+                "20",
+                "--gap",
+                "5",
+                "--acceleration",
+                "-6",
+                "--models",
+                "XYZ",
+            ],
+            2,
+            "Reg157, CCHDM",
+        ),
+        (
+            &["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--acceleration", "-6"],
+            2,
+            "at least 0",
+        ),
+        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--acceleration", "-6"], 2, "--thw"),
         (&["conformance"], 2, "nothing to compare"),
         (&["conformance", &no_table], 3, "no conformance table"),
     ];
@@ -232,6 +252,61 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         assert_eq!(code(&output), expected, "{args:?}: {said}");
         assert!(said.contains(hint), "{args:?} should say `{hint}`: {said}");
         assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn a_list_with_a_value_twice_is_refused_with_the_value() {
+    let lane = "01_cut_in_81_74_836/S/0.6s/RSS";
+    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
+    let export = ["export", "xosc", "--scenarios", text(&scenarios), "--lane", lane, "--lane"];
+    let case = "--category lvd --ego-speed 20 --gap 20 --acceleration -6 --models FSM,fsm";
+    let case: Vec<&str> = case.split(' ').collect();
+    let lists: [(&[&str], &str); 18] = [
+        (&["study", "--thw", "0.6,0.6"], "--thw: `0.6` is given twice"),
+        (&["study", "--thw", "0.6,1, 0.60"], "--thw: `0.60` repeats `0.6`"),
+        (&["study", "--thw", "0.6,0.6000000001"], "--thw: `0.6000000001` repeats `0.6`"),
+        (&["study", "--thw", "r157,1,r157"], "--thw: `r157` is given twice"),
+        (&["compare", "--thw", "1,1.0"], "--thw: `1.0` repeats `1`"),
+        (&["justify", "--parameterization", "2", "--models", "FSM", "--thw", "1,1"], "--thw: `1` is given twice"),
+        (&["study", "--models", "FSM,RSS,FSM"], "--models: `FSM` is given twice"),
+        (&["study", "--models", "FSM", "--models", "all"], "--models: `all` repeats `FSM`"),
+        (&["study", "--categories", "lvd,cut-in,cut_in"], "--categories: `cut_in` repeats `cut-in`"),
+        (&["fit", "--parameterizations", "2,i,2"], "--parameterizations: `2` is given twice"),
+        (&["compare", "--parameterizations", "all,2"], "--parameterizations: `2` repeats `all`"),
+        (&["map", "lvd", "--preset", "r157", "--models", "RSS,RSS"], "--models: `RSS` is given twice"),
+        (&["conformance", "a.csv", "./a.csv"], "FILE: `./a.csv` repeats `a.csv`"),
+        (
+            &["sample", "a.json", "--estimator", "is", "--proposal", "p.json", "--proposal", "p.json"],
+            "--proposal: `p.json` is given twice",
+        ),
+        (&[&["simulate"], &case[..]].concat(), "models: `fsm` repeats `FSM`"),
+        (&[&["export", "xosc"], &case[..]].concat(), "models: `fsm` repeats `FSM`"),
+        (
+            &[
+                "check",
+                "--category",
+                "lvd",
+                "--ego-speed",
+                "20",
+                "--gap",
+                "9",
+                "--acceleration",
+                "-6",
+                "--profiles",
+                "paper,paper",
+            ],
+            "--profiles: `paper` is given twice",
+        ),
+        (&[&export[..], &["01_cut_in_81_74_836/S/0.60s/RSS"]].concat(), "01_cut_in_81_74_836/S/0.6s/RSS"),
+    ];
+    for (args, expected) in lists {
+        let output = lanesweep(args);
+        // The drawing breaks long lines.
+        let said = stderr(&output);
+        let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert_eq!(code(&output), 2, "{args:?}: {said}");
+        assert!(said.contains(expected) && said.contains("give every value once"), "{args:?}: {said}");
     }
 }
 

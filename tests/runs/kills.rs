@@ -134,7 +134,7 @@ const VERBS: [Verb; 16] = [
     verb(
         "slurm",
         Some("submit.sh"),
-        Some("slurm --array 3 --out result --scripts out -- study --scenarios s.jsonl"),
+        Some("slurm --array 3 --out result --scripts out -- study --synth-recordings 2"),
         "slurm --array 2 --out result --scripts out -- sample d.json",
     ),
 ];

@@ -22,6 +22,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Perturbation, Point};
 use crate::scenario::Category;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
@@ -162,8 +163,11 @@ impl Check {
     /// Runs every model under every profile.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a case that cannot be made, a time step that is too long for it, or lanes with too many steps.
+    /// [`Error::Usage`] for a case that cannot be made, a time step that is too long for it, lanes with too many steps, and a
+    /// profile or model that is there twice.
     pub fn run(&self) -> Result<Vec<Judgement>> {
+        refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
+        refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
         self.profiles.par_iter().map(|profile| self.under(profile)).collect()
     }
 

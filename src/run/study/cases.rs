@@ -240,6 +240,26 @@ mod tests {
     }
 
     #[test]
+    fn a_study_whose_lanes_would_share_a_key_is_refused_with_what_is_there_twice() {
+        let (scenarios, paper) = (scenarios(), Profile::load("paper").unwrap());
+        let refused = |scenarios: &[Scenario], change: &dyn Fn(&mut StudyOptions)| {
+            let mut options = StudyOptions::default();
+            change(&mut options);
+            outline_study(scenarios, &paper, &options).err().map_or(String::new(), |error| error.to_string())
+        };
+        assert_eq!(refused(&scenarios, &|_| {}), "");
+        let headways = refused(&scenarios, &|o| o.headways = [0.6, 1.0, 0.6].map(Headway::ThwS).to_vec());
+        assert!(headways.contains("`0.6s` is given twice"), "{headways}");
+        let models = refused(&scenarios, &|o| o.models.push(o.models[0]));
+        assert!(models.contains("is given twice"), "{models}");
+        let categories = refused(&scenarios, &|o| o.categories.push(Category::Lvd));
+        assert!(categories.contains("`LVD` is given twice"), "{categories}");
+        let kept = scenarios.iter().find(|scenario| scenario.kept).unwrap().clone();
+        let twice = refused(&[&scenarios[..], std::slice::from_ref(&kept)].concat(), &|_| {});
+        assert!(twice.contains(&format!("`{}` is given twice", kept.id)), "{twice}");
+    }
+
+    #[test]
     fn a_window_has_the_cases_of_its_scenarios_and_the_hash_of_the_whole() {
         let scenarios = scenarios();
         let StudyOutline { cases: study, reductions, .. } = outlined(&scenarios);
