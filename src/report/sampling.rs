@@ -297,6 +297,9 @@ impl EstimateFile {
                 let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
             }
         }
+        for (row, remark) in self.costlier_than_crude() {
+            let _ = writeln!(text, "{} {} {}: {remark}", row.model.name(), row.criterion.label(), row.headway);
+        }
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
             text.push_str(&self.weights_text());
         }
@@ -350,6 +353,18 @@ impl EstimateFile {
             ]);
         }
         aligned(rows, 2)
+    }
+}
+
+impl EstimateFile {
+    /// The rows for which crude Monte Carlo needs fewer lanes for the same interval, with a sentence that says so.
+    pub(super) fn costlier_than_crude(&self) -> impl Iterator<Item = (&EstimateRow, String)> {
+        let is_costlier = |row: &&EstimateRow| row.estimate.variance_reduction < 1.0;
+        let rows = self.estimates.iter().filter(|_| self.estimator != "mc").filter(is_costlier);
+        rows.map(|row| {
+            let ratio = short(1.0 / row.estimate.variance_reduction);
+            (row, format!("this estimator used {ratio} times the lanes that crude Monte Carlo (`mc`) needs for the same interval"))
+        })
     }
 }
 
