@@ -7,6 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::case_flags::{CaseFlags, from_toml};
 use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
 use super::format::FormatFlag;
+use super::lists;
 use super::source::PlausibilityFlag;
 use super::{Exit, ProfileFlags};
 use crate::interop::openscenario::{EgoMotion, export_folder};
@@ -76,8 +77,9 @@ pub struct Xosc {
     /// its worst lane.
     #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
     worst: Option<usize>,
-    #[command(flatten)]
-    criterion: super::lists::CriterionFlag,
+    /// Criterion that ranks the lanes of --worst [default: collision; of a sampling run: that of worst.csv]
+    #[arg(long, value_name = "collision|ttc|btn", requires = "worst")]
+    criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
     #[arg(long, value_name = "LIST", requires = "worst", value_delimiter = ',')]
     variant: Vec<String>,
@@ -149,7 +151,8 @@ impl Xosc {
                     return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
                 }
                 let worst = self.worst.map(|count| (count, &self.variant[..]));
-                of_run(dir, &source, worst, self.criterion.get()?, scenarios.as_deref(), extras)
+                let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
+                of_run(dir, &source, worst, criterion, scenarios.as_deref(), extras)
             }
             (None, Some(path)) if self.lane.is_empty() => {
                 let problem = format!("{} has many lanes", path.display());

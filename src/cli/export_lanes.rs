@@ -73,7 +73,7 @@ pub(super) fn of_run(
     dir: &Path,
     source: &Source,
     worst: Option<(usize, &[String])>,
-    criterion: Criterion,
+    criterion: Option<Criterion>,
     scenarios: Option<&Path>,
     extras: &Extras,
 ) -> Result<Exported> {
@@ -88,7 +88,7 @@ pub(super) fn of_run(
                     study.cases(),
                     facts.reference,
                     count,
-                    criterion,
+                    criterion.unwrap_or(Criterion::Collision),
                     variants,
                     source.models.as_deref(),
                 )?,
@@ -117,7 +117,7 @@ pub(super) fn of_run(
                 return Err(Error::usage(Place::item("--scenarios, --variant"), problem, "leave them out"));
             }
             let keys = match worst {
-                Some((count, _)) => worst_of_sample(dir, &plan, count, source.models.as_deref())?,
+                Some((count, _)) => worst_of_sample(dir, &plan, count, criterion, source.models.as_deref())?,
                 None => named(&plan, source)?,
             };
             let about = About {
@@ -140,7 +140,7 @@ pub(super) fn of_run(
                     let problem = "a sampling run has one variant";
                     return Err(Error::usage(Place::item("--variant"), problem, "leave it out"));
                 }
-                Some((count, _)) => worst_of_sample(dir, &plan, count, source.models.as_deref())?,
+                Some((count, _)) => worst_of_sample(dir, &plan, count, criterion, source.models.as_deref())?,
                 None => named(&plan, source)?,
             };
             let provenance = &density.provenance;
@@ -371,8 +371,11 @@ fn concrete<R: Real>(
 
 /// The case's numbers by name; those of a sampled point as its density names them.
 fn parameters(trace: &Trace, case: &LaneCase<f64>, known: &Known) -> Vec<(String, f64)> {
-    // Products with the time step, made decimals again.
-    let decimal = |value: f64| (value * 1e9).round() / 1e9;
+    // A product with the time step is a decimal again where that is the same product; else every digit counts.
+    let decimal = |value: f64| {
+        let short = (value * 1e9).round() / 1e9;
+        if short * trace.dt_s == value * trace.dt_s { short } else { value }
+    };
     let first = &trace.steps[0];
     let mut list = vec![
         ("ego_speed_mps", decimal(first.v_ego_mps)),

@@ -96,11 +96,13 @@ fn keep(worst: &mut [Vec<(f64, u64)>], of_unit: &mut [Option<(f64, u64)>], count
 /// Of a sampling run: the first lanes of each model in `worst.csv`.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] for a run without such a table; [`Error::Usage`] for models that it does not have.
+/// [`Error::Io`]; [`Error::Input`] for a run without such a table; [`Error::Usage`] for models that it does not have, and
+/// for another criterion than the table's.
 pub(super) fn worst_of_sample(
     dir: &Path,
     plan: &LanePlan,
     count: usize,
+    criterion: Option<Criterion>,
     models: Option<&[ModelId]>,
 ) -> Result<Vec<LaneKey>> {
     let models = wanted_models(plan, models, count)?;
@@ -126,9 +128,16 @@ pub(super) fn worst_of_sample(
     let header = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
     let column =
         header.iter().position(|name| name == "lane").ok_or_else(|| wrong(1, "no column `lane`".to_owned()))?;
+    let by = header.iter().position(|name| name == "criterion");
     let mut per_model: Vec<Vec<LaneKey>> = vec![Vec::new(); plan.models.len()];
     for (at, record) in reader.records().enumerate() {
         let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
+        let ranked_by = by.and_then(|by| record.get(by)).unwrap_or_default();
+        if let Some(asked) = criterion.filter(|asked| asked.key() != ranked_by) {
+            let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", asked.key());
+            let help = format!("leave it out, or run `lanesweep sample --criterion {}`", asked.key());
+            return Err(Error::usage(Place::item("--criterion"), problem, help));
+        }
         let key = find(plan, text_of_cell(record.get(column).unwrap_or("")))?;
         if per_model[key.model].len() < count {
             per_model[key.model].push(key);

@@ -114,11 +114,19 @@ impl CriterionFlag {
     /// # Errors
     /// [`Error::Usage`] for one that there is not.
     pub fn get(&self) -> Result<Criterion> {
-        Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(self.criterion.trim())).ok_or_else(|| {
-            let problem = format!("there is no criterion `{}`", self.criterion);
-            Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
-        })
+        criterion(&self.criterion)
     }
+}
+
+/// The criterion of `--criterion`.
+///
+/// # Errors
+/// [`Error::Usage`] for one that there is not.
+pub fn criterion(name: &str) -> Result<Criterion> {
+    Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(name.trim())).ok_or_else(|| {
+        let problem = format!("there is no criterion `{name}`");
+        Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
+    })
 }
 
 /// `--hours` and `--km`.

@@ -14,6 +14,7 @@ use crate::run::parts::{PLAN_FILE, Shard, kind_of};
 use crate::run::sampling::Sample;
 use crate::run::study::Study;
 use crate::support::files::check_folder;
+use crate::support::readable::counted;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
@@ -77,7 +78,7 @@ impl Merge {
 fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
     let (study, result) = Study::merge_or(folder.dir(), again)?;
     let host = Host {
-        backend: format!("{} parts merged", result.parts),
+        backend: format!("{} merged", counted(result.parts, "part")),
         device: None,
         swept: result.summary,
         timings: Timings::default(),

@@ -15,7 +15,7 @@ use crate::run::sampling::{EstimateRow, Levels, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, StopReason};
-use crate::support::readable::{count, count_of, significant, value};
+use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -106,7 +106,13 @@ impl HostRecord {
     /// Of the parts of a run that were merged.
     pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Self {
         let threads = rayon::current_num_threads();
-        HostRecord { backend: format!("{parts} parts merged"), device: None, rechecked_lanes, seconds: 0.0, threads }
+        HostRecord {
+            backend: format!("{} merged", counted(parts, "part")),
+            device: None,
+            rechecked_lanes,
+            seconds: 0.0,
+            threads,
+        }
     }
 }
 

@@ -130,9 +130,9 @@ impl EstimateFile {
             let name = format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);
             row.estimate.trust.warnings.iter().map(move |warning| (name.clone(), warning.to_string()))
         });
-        let costlier = self.costlier_than_crude().map(|(row, remark)| {
-            (format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway), remark)
-        });
+        let costlier = self
+            .costlier_than_crude()
+            .map(|(row, remark)| (format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway), remark));
         let said = said.chain(costlier);
         Section {
             intro: format!(

@@ -188,6 +188,8 @@ fn worst_lanes_of_a_changed_table_are_not_exported() {
     assert!(lanesweep(&[&sample[..], &["--out", text(&out)]].concat()).status.success());
     let export = ["-q", "export", "xosc", "--from", text(&out), "--worst", "1", "--out", text(&exported)];
     assert!(lanesweep(&export).status.success());
+    refused(&[&export[..], &["--criterion", "ttc"]].concat(), "ranks its lanes by collision");
+    assert!(lanesweep(&[&export[..], &["--criterion", "collision"]].concat()).status.success());
     let table = std::fs::read_to_string(out.join("worst.csv")).unwrap();
     let mut lines: Vec<&str> = table.lines().collect();
     lines.swap(1, 2);

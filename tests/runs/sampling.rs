@@ -331,7 +331,8 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
         let how = ["--thw", "0.4", "--estimator", estimator, "--samples", "3000"];
         let (file, text) = estimated(dir.path(), "all.json", &how);
         let rows = file["estimates"].as_array().unwrap();
-        let is_costlier = rows.iter().any(|row| row["estimate"]["variance_reduction"].as_f64().is_some_and(|r| r < 1.0));
+        let is_costlier =
+            rows.iter().any(|row| row["estimate"]["variance_reduction"].as_f64().is_some_and(|r| r < 1.0));
         assert_eq!(text.contains("times the lanes that crude Monte Carlo"), is_costlier, "{estimator}: {text}");
         let row = rows[0].clone();
         let [a, b] = [&crude, &row].map(|row| row["failing_scenarios"].as_f64().unwrap());

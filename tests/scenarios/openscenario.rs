@@ -333,6 +333,21 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
     refused(dir.path(), &[&["export", "xosc", "--duration", "5"], &CUT_IN[..]].concat(), 2, "add --ego external");
 }
 
+/// Ten digits of 20 km/h gave another first gap and another instant of braking.
+#[test]
+fn the_declared_speed_of_an_ego_of_the_users_own_is_the_cases_to_the_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    for kmh in [7.0, 20.0, 33.3, 50.0, 108.0] {
+        let ego = format!("{kmh}km/h");
+        let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1", "--gap", "9"];
+        let flags = ["export", "xosc", "--ego", "external", "--out", "x", "--lateral-speed", "1"];
+        good(dir.path(), &[&flags[..], &case].concat());
+        let (_, all) = played(&only_scenario(&dir.path().join("x")));
+        let declared = all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "ego_speed_mps")).unwrap();
+        assert_eq!(declared.number("value") * 0.04, kmh / 3.6 * 0.04, "{ego}");
+    }
+}
+
 #[test]
 fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
     let dir = tempfile::tempdir().unwrap();
