@@ -2,7 +2,7 @@
 //! one run beside a record, or no record; started again it ends as if undisturbed. Two processes on one folder: each ends
 //! as if alone or is refused. Every verb that writes a folder, from nothing and over the result of a run with other
 //! flags. One kill per verb and a ninth of the pairs by default; the long form is
-//! `LANESWEEP_KILLS=200 cargo test --release --test runs kills:: -- --nocapture`.
+//! `LANESWEEP_KILLS=300 cargo test --release --test runs kills:: -- --nocapture`.
 #![cfg(unix)]
 
 use crate::common::page;
@@ -39,7 +39,7 @@ const fn verb(
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 16] = [
+const VERBS: [Verb; 17] = [
     verb(
         "study",
         Some("run.json"),
@@ -113,6 +113,12 @@ const VERBS: [Verb; 16] = [
         Some("compare.json"),
         Some("compare --synth-recordings 1 --categories cut-in --parameterizations 1 --samples 50 --thw 1.0 --out out"),
         "compare --synth-recordings 2 --categories lvd --parameterizations i --samples 300 --thw 1.0,0.6 --out out",
+    ),
+    verb(
+        "justify",
+        Some("dossier.json"),
+        Some("justify --parameterization 2 --models FSM --criterion ttc --synth-recordings 1 --out out"),
+        "justify --parameterization 1 --models CCHDM --criterion ttc --synth-recordings 2 --out out",
     ),
     verb(
         "fit",
@@ -191,7 +197,7 @@ fn files(dir: &Path) -> Files {
 /// Without times.
 fn settled(files: Files) -> Files {
     let settle = |(name, mut content): (String, Vec<u8>)| {
-        if ["run.json", "estimate.json", "map.json", "compare.json"].contains(&name.as_str()) {
+        if ["run.json", "estimate.json", "map.json", "compare.json", "dossier.json"].contains(&name.as_str()) {
             let mut record: serde_json::Value = serde_json::from_slice(&content).unwrap();
             for checks in ["/sweep", "/host", "/host/sweep"] {
                 for time in ["device_s", "seconds", "plan_s", "sweep_s"] {
