@@ -51,7 +51,11 @@ pub(crate) fn cut_names(message: &str) -> String {
 
 fn cut_words(text: &str) -> String {
     let most = |word: &str| if word.contains(['/', '\\']) { MAX_PATH } else { MAX_NAME };
-    text.split_inclusive(char::is_whitespace).map(|word| cut_to(word, most(word))).collect()
+    let cut = |word| {
+        let name = str::trim_end(word);
+        [cut_to(name, most(name)), Cow::Borrowed(&word[name.len()..])]
+    };
+    text.split_inclusive(char::is_whitespace).flat_map(cut).collect()
 }
 
 fn escaped(text: &str, stays: &[char]) -> String {
@@ -134,6 +138,7 @@ mod tests {
             assert!(told.chars().count() <= MAX_MESSAGE, "{} characters of {told:.200}", told.len());
         }
         assert_eq!(cut_names(&format!("no `{long}` here")).chars().count(), MAX_NAME + 10);
+        assert_eq!(cut_names(&format!("no {long} here")), format!("no {short} here"));
     }
 
     #[test]

@@ -331,7 +331,6 @@ fn no_message_repeats_a_text_of_any_size() {
         ("study --dt @", 2, "--dt"),
         ("study @", 6, "cannot read"),
         ("study --device @", 2, "--device"),
-        ("verify --backend cpu --lane @", 2, "lane"),
         ("study --@", 2, "unexpected argument"),
         ("@", 2, "unrecognized subcommand"),
         ("simulate --scenarios id.jsonl --lane @", 3, "id.jsonl"),
@@ -342,7 +341,7 @@ fn no_message_repeats_a_text_of_any_size() {
         let args = args.join(" ").chars().take(60).collect::<String>();
         assert!(said.len() < 3000, "{args}: {} bytes: {said:.300}", said.len());
         assert!([code, 2, 3, 7].contains(&status) && said.contains(expected), "{args}: {status} {said}");
-        assert!(started.elapsed() < Duration::from_secs(3), "{args}: {:?}", started.elapsed());
+        assert!(started.elapsed() < Duration::from_secs(5), "{args}: {:?}", started.elapsed());
     }
 }
 
