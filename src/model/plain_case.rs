@@ -133,7 +133,7 @@ impl PlainCase {
 }
 
 /// What a case of a category cannot do without, by the names of `simulate`'s flags: the first that is missing.
-pub fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
+pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
     let changes_lane = category != Category::Lvd;
     let needs = [
         ("ego_speed", true),
@@ -148,7 +148,7 @@ pub fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Opti
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn check_headway(ego_speed_mps: f64, thw_s: Option<f64>) -> Result<()> {
+pub(crate) fn check_headway(ego_speed_mps: f64, thw_s: Option<f64>) -> Result<()> {
     match thw_s {
         Some(thw_s) if ego_speed_mps == 0.0 => Err(Error::usage(
             Place::item("thw"),

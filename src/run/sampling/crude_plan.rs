@@ -93,7 +93,10 @@ impl CrudePlan {
         if facts.map.as_ref().is_some_and(|map| map.x.parameter >= parameters || map.y.parameter >= parameters) {
             return Err(wrong("its map is over parameters that the density does not have"));
         }
-        let plan = facts.plan(&density)?;
+        let plan = facts.plan(&density).map_err(|error| match error {
+            Error::Usage { problem, .. } => wrong(&problem),
+            other => other,
+        })?;
         if plan.hash() != facts.plan_sha256 {
             return Err(wrong("its content is not that of its hash: another version of lanesweep made it"));
         }

@@ -225,6 +225,7 @@ fn cases_of(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Headway;
     use crate::model::profile::Profile;
     use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
     use crate::traffic::mining::{MiningOptions, mine_generated};

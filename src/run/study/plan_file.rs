@@ -12,6 +12,7 @@ use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, problem_of};
 use crate::support::hex::hex;
+use crate::support::repeats::repeated;
 use crate::{Error, Place, Result};
 
 /// Scenarios of a page.
@@ -119,6 +120,10 @@ impl StudyHead {
         }
         if (0..self.models.len()).any(|at| self.models[..at].contains(&self.models[at])) {
             return wrong("a driver model is there twice");
+        }
+        let headways = self.headways.iter().map(|headway| (headway.identity(), headway));
+        if let Some(problem) = repeated(headways) {
+            return wrong(&format!("a headway is there twice: {problem}"));
         }
         let number = |headway: &Headway| match *headway {
             Headway::ThwS(number) | Headway::GapM(number) => number,
