@@ -188,7 +188,7 @@ fn a_device_that_fails_while_counts_are_checked_leaves_complete_counts() {
             Ok(())
         });
         let summary = summary.unwrap();
-        assert!(chunks.len() == 1 && chunks[0] == expected, "lost at job {at_job}");
+        assert!(chunks.len() == 1 && chunks[0].counts == expected.counts, "lost at job {at_job}");
         assert_eq!((summary.redone_lanes, summary.rechecked_lanes), (plan.lane_count(), 0));
     }
 }
