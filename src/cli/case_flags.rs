@@ -10,6 +10,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{Case, CaseParameters, Category, ParameterRows, PlainCase, RowPlace};
 use crate::support::plausibility::{Doubts, Implausible, Quantity};
+use crate::support::readable::value;
 use crate::support::table::{TableFormat, TableReader};
 use crate::support::toml_file;
 use crate::{Error, Place, Result};
@@ -31,19 +32,19 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     speed: Option<f64>,
     /// Initial gap, bumper to bumper
-    #[arg(long, value_name = "m", conflicts_with = "thw")]
+    #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw")]
     gap: Option<f64>,
     /// Initial time headway instead of the gap
-    #[arg(long, value_name = "s")]
+    #[arg(long, value_name = "s", value_parser = time_s)]
     thw: Option<f64>,
     /// Cut-in, cut-out: lateral speed
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     lateral_speed: Option<f64>,
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", value_parser = length_m)]
     lateral_distance: Option<f64>,
     /// Acceleration of the other vehicle [default: 0]
-    #[arg(long, value_name = "m/s²")]
+    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2)]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends [default: standstill, or never]
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]
@@ -52,13 +53,13 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]
     ahead_speed: Option<f64>,
     /// Cut-out: gap between the two, bumper to bumper
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", value_parser = length_m)]
     ahead_gap: Option<f64>,
     /// Length of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", value_parser = length_m)]
     length: Option<f64>,
     /// Width of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", value_parser = length_m)]
     width: Option<f64>,
     /// Of files: then the other vehicles keep their speed and lateral position, s.
     #[arg(skip)]
@@ -197,22 +198,62 @@ impl CaseFlags {
     }
 }
 
-/// Units of a speed, and how many of each are 1 m/s.
-const SPEED_UNITS: [(&str, f64); 6] =
+/// A unit, and how many of it are one of the SI.
+type Unit = (&'static str, f64);
+
+/// Units of a speed.
+const SPEEDS: [Unit; 6] =
     [("km/h", 3.6), ("kmh", 3.6), ("kph", 3.6), ("mph", 1.0 / 0.44704), ("m/s", 1.0), ("mps", 1.0)];
+/// Units of an acceleration.
+const ACCELERATIONS: [Unit; 4] = [("m/s2", 1.0), ("m/s²", 1.0), ("m/s^2", 1.0), ("mps2", 1.0)];
+
+/// A speed above this needs a unit, m/s: 162 km/h, or 45 km/h that lost theirs.
+const UNITLESS_MPS: f64 = 45.0;
+
+/// A number in SI units, and whether a unit stands behind it.
+fn si(text: &str, units: &[Unit]) -> Option<(f64, bool)> {
+    let text = text.trim();
+    let with_unit = units.iter().find_map(|(unit, per_si)| Some((text.strip_suffix(unit)?, *per_si)));
+    let (number, per_si) = with_unit.unwrap_or((text, 1.0));
+    let value = number.trim_end().parse::<f64>().ok().filter(|value| value.is_finite())?;
+    Some((value / per_si, with_unit.is_some()))
+}
 
 /// A speed in m/s, from a number (m/s) or a number with its unit: `16.7`, `60km/h`, `37 mph`.
 ///
 /// # Errors
-/// What to write, for a text that is none.
+/// What to write, for a text that is none, and for a number without a unit that no car on a road reaches in m/s.
 fn speed_mps(text: &str) -> std::result::Result<f64, String> {
-    let text = text.trim();
-    let (number, per_mps) = SPEED_UNITS
-        .iter()
-        .find_map(|(unit, per_mps)| Some((text.strip_suffix(unit)?, *per_mps)))
-        .unwrap_or((text, 1.0));
-    let value = number.trim_end().parse::<f64>().ok().filter(|value| value.is_finite());
-    value.map(|value| value / per_mps).ok_or_else(|| "write a speed such as 16.7, 60km/h or 37mph".to_owned())
+    match si(text, &SPEEDS) {
+        Some((speed, false)) if speed > UNITLESS_MPS => Err(format!(
+            "{speed} has no unit: as m/s it is {} km/h; write {speed}km/h or {speed}m/s",
+            value(speed * 3.6)
+        )),
+        Some((speed, _)) => Ok(speed),
+        None => Err("write a speed such as 16.7, 60km/h or 37mph".to_owned()),
+    }
+}
+
+/// A length in m: `12`, `12m`.
+fn length_m(text: &str) -> std::result::Result<f64, String> {
+    let found = si(text, &[("m", 1.0)]).map(|(length, _)| length);
+    found.ok_or_else(|| "write a length in metres, such as 12 or 12m".to_owned())
+}
+
+/// A time in s: `1.2`, `1.2s`.
+fn time_s(text: &str) -> std::result::Result<f64, String> {
+    let found = si(text, &[("s", 1.0)]).map(|(time, _)| time);
+    found.ok_or_else(|| "write a time in seconds, such as 1.2 or 1.2s".to_owned())
+}
+
+/// An acceleration in m/s²: `-5`, `-5m/s2`. Multiples of g are refused with their value: -6g often means -6 m/s².
+fn acceleration_mps2(text: &str) -> std::result::Result<f64, String> {
+    const G_MPS2: f64 = 9.80665;
+    if let Some((g, true)) = si(text, &[("g", 1.0)]) {
+        return Err(format!("write m/s²: {}m/s2 if {g} g is meant, {g}m/s2 otherwise", value(g * G_MPS2)));
+    }
+    let found = si(text, &ACCELERATIONS).map(|(acceleration, _)| acceleration);
+    found.ok_or_else(|| "write an acceleration in m/s², such as -5 or -5m/s2".to_owned())
 }
 
 /// The flags that a TOML file holds.

@@ -14,7 +14,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
-use crate::run::check::{Check as Checked, Subject};
+use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::Scenario;
 use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
@@ -26,9 +26,10 @@ const PROFILES: [&str; 4] = ["un-r157", "jrc-2021", "paper", "paper-fit"];
 ///
 /// The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns; flags
 /// win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under every profile.
-/// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. The
-/// sheet says so first, then by what margin, what the clauses say, and how far the case lies from the boundary along
-/// each of its numbers. Exit status: 0 preventable, 1 not preventable.
+/// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. It
+/// has no conflict where nothing collides even if the ego never reacts. It is undecided where half the time step, 1 cm of
+/// gap or 0.1 km/h changes the answer. Then follow the margins, the clauses, and the distance from the boundary along each
+/// number. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 4 input was left out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -98,10 +99,13 @@ impl Check {
             write(path, trace::csv(&named.collect::<Vec<_>>()).as_bytes())?;
         }
         self.format.print(|| sheet.text(), || sheet.json())?;
-        Ok(match (judgements[0].is_preventable(), asked.incomplete) {
-            (false, _) => Exit::NotPreventable,
-            (true, true) => Exit::Incomplete,
-            (true, false) => Exit::Ok,
+        Ok(match judgements[0].verdict() {
+            // Of input that was left out nothing is known, whatever the answer.
+            _ if asked.incomplete => Exit::Incomplete,
+            Verdict::Undecided => Exit::Undecided,
+            Verdict::Answer(Answer::Preventable) => Exit::Ok,
+            Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
+            Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,
         })
     }
 

@@ -8,7 +8,7 @@ use crate::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Everything was done.
+    /// Everything was done; of `check`: the case is preventable, and the answer is robust.
     Ok = 0,
     /// The case that was checked is not preventable; the sheet was written.
     NotPreventable = 1,
@@ -24,6 +24,10 @@ pub enum Exit {
     Io = 6,
     /// No usable compute device, or the device failed.
     NoDevice = 7,
+    /// The answer on the checked case changes with a small change of the case or of the time step; the sheet was written.
+    Undecided = 8,
+    /// Nothing collides in the checked case even where the ego never reacts; the sheet was written.
+    NoConflict = 9,
     /// A defect of the program.
     Internal = 70,
     /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
@@ -32,7 +36,7 @@ pub enum Exit {
 
 impl Exit {
     /// All, for documentation.
-    pub const ALL: [Exit; 10] = [
+    pub const ALL: [Exit; 12] = [
         Exit::Ok,
         Exit::NotPreventable,
         Exit::Usage,
@@ -41,6 +45,8 @@ impl Exit {
         Exit::VerificationFailed,
         Exit::Io,
         Exit::NoDevice,
+        Exit::Undecided,
+        Exit::NoConflict,
         Exit::Internal,
         Exit::Interrupted,
     ];
@@ -53,7 +59,7 @@ impl Exit {
     /// What it means, in a few words.
     pub fn meaning(self) -> &'static str {
         match self {
-            Exit::Ok => "done",
+            Exit::Ok => "done; the checked case is preventable (check)",
             Exit::NotPreventable => "the checked case is not preventable (check)",
             Exit::Usage => "invalid flag, key or profile; nothing was done",
             Exit::BadInput => "invalid data; nothing was written",
@@ -61,6 +67,8 @@ impl Exit {
             Exit::VerificationFailed => "a check failed",
             Exit::Io => "the system refused to read, to write, to start a thread or to give memory",
             Exit::NoDevice => "no usable device, or the device failed",
+            Exit::Undecided => "the answer on the checked case is undecided (check)",
+            Exit::NoConflict => "the checked case has no conflict: nothing to prevent (check)",
             Exit::Internal => "a program error",
             Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",
         }

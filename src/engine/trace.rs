@@ -65,7 +65,7 @@ pub struct TracedStep {
 pub enum StepMark {
     /// First step that the driver finds unsafe: the reaction time begins.
     Reaction,
-    /// First step before which the ego braked.
+    /// The ego begins to brake: from this step on it decelerates by more than CCHDM coasts at during its delay.
     Braking,
     /// The vehicles touch.
     Contact,
@@ -101,6 +101,8 @@ pub struct Trace {
     pub ego_width_m: f64,
     /// Widths of the other vehicles, m.
     pub widths_m: [f64; 2],
+    /// Deceleration during the reaction time that does not count as braking, m/s².
+    pub coasting_mps2: f64,
     /// A TTC below this fails, s.
     pub ttc_threshold_s: f64,
     /// A BTN above this fails.
@@ -157,6 +159,7 @@ impl Trace {
             initial_gap_m: shifted_gap_m.unwrap_or(nominal_gap_m),
             ego_width_m,
             widths_m: case.others.map(|other| 2.0 * other.half_widths.to_f64() - ego_width_m),
+            coasting_mps2: if model == ModelId::Cchdm { profile.cchdm.coasting_mps2 } else { 0.0 },
             ttc_threshold_s: profile.criteria.ttc_threshold_s,
             btn_threshold: profile.criteria.btn_threshold,
             vehicles: if case.pair != 0 { 2 } else { 1 },
@@ -170,7 +173,11 @@ impl Trace {
         let happened = |step: u32| (step != NO_STEP).then_some(step);
         match mark {
             StepMark::Reaction => happened(self.outcome.reaction_step),
-            StepMark::Braking => self.steps.iter().find(|s| s.a_ego_mps2 < 0.0).map(|s| s.step),
+            // The acceleration of a step is that since the step before.
+            StepMark::Braking => {
+                let brakes = |step: &&TracedStep| step.a_ego_mps2 < -(self.coasting_mps2 + 1e-6);
+                self.steps.iter().find(brakes).map(|step| step.step.saturating_sub(1))
+            }
             StepMark::Contact => happened(self.outcome.contact_step),
         }
     }

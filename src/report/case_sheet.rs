@@ -9,13 +9,15 @@ use super::tables::{aligned, table};
 use super::trace::{TraceFigure, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Judged, Judgement, Subject};
+use crate::run::check::{Answer, Boundary, Change, Judged, Judgement, REFERENCE_DRIVERS, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
 use crate::{Error, Result};
 
 /// Metres per second in kilometres per hour.
 const KMH: f64 = 3.6;
+/// What a robust verdict survives.
+const VARIED: &str = "half the time step, 1 cm of gap, 0.1 km/h of a speed";
 
 /// A checked case with what has to be said of it.
 pub struct CaseSheet<'a> {
@@ -38,32 +40,93 @@ impl CaseSheet<'_> {
         &self.judgements[0]
     }
 
-    /// The answer in one sentence.
+    /// The case in one line: speeds in km/h, all else in SI units.
+    pub fn case(&self) -> String {
+        let point = self.subject.point();
+        let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
+        let quantities = [
+            (MapQuantity::EgoSpeed, "ego"),
+            (MapQuantity::OtherSpeed, "other vehicle"),
+            (MapQuantity::Gap, "gap"),
+            (MapQuantity::Thw, "headway"),
+            (MapQuantity::LateralSpeed, "across"),
+            (MapQuantity::Deceleration, "other vehicle's deceleration"),
+            (MapQuantity::EndSpeed, "to"),
+            (MapQuantity::AheadSpeed, "vehicle ahead"),
+            (MapQuantity::AheadGap, "its gap"),
+        ];
+        let parts = quantities.into_iter().filter_map(|(quantity, name)| {
+            let si = point.get(quantity)?;
+            let unit = PARAMETERS.iter().find(|parameter| parameter.quantity == quantity)?.unit;
+            Some(match unit {
+                "m/s" | "km/h" => kmh(name, si),
+                unit => format!("{name} {} {unit}", value(si)),
+            })
+        });
+        format!("{}: {}", self.subject.category().label(), parts.collect::<Vec<_>>().join(", "))
+    }
+
+    /// The answer in one sentence; "robust" stands only where it holds for every verdict that is named.
     pub fn answer(&self) -> String {
         let first = self.first();
         let names = |list: &[ModelId]| list.iter().map(|m| m.name()).collect::<Vec<_>>().join(" and ");
-        let answer = match first.avoided_by[..] {
-            [] => "not preventable: CCHDM and FSM collide".to_owned(),
-            ref all if all.len() == 2 => "preventable: CCHDM and FSM avoid the collision".to_owned(),
-            ref one => {
-                let other = crate::run::check::REFERENCE_DRIVERS.into_iter().find(|model| !one.contains(model));
-                let collides = other.map_or(String::new(), |model| format!(", {} collides", model.name()));
-                format!("preventable: {} avoids the collision{collides}", names(one))
-            }
+        let answer = first.verdicts.answer();
+        let avoided_by = first.verdicts.avoided_by();
+        let collide: Vec<ModelId> = REFERENCE_DRIVERS.into_iter().filter(|m| !avoided_by.contains(m)).collect();
+        let drivers = match (answer, &avoided_by[..], &collide[..]) {
+            (Answer::NoConflict, ..) => "nothing collides even if the ego never reacts".to_owned(),
+            (_, [], all) => format!("{} collide", names(all)),
+            (_, all, []) => format!("{} avoid the collision", names(all)),
+            (_, one, other) => format!("{} avoids the collision, {} collides", names(one), names(other)),
         };
-        let robust = match first.flips[..] {
-            [] => "robust".to_owned(),
-            ref flips => format!("UNDECIDED: it changes with {}", flips.join(", ")),
+        let changes = |flips: &[&str]| flips.join(", ");
+        let of_drivers = REFERENCE_DRIVERS.into_iter().filter(|_| answer != Answer::NoConflict).filter_map(|model| {
+            let flips = first.flips_of(model);
+            (!flips.is_empty()).then(|| format!("the verdict of {} changes with {}", model.name(), changes(flips)))
+        });
+        let of_drivers: Vec<String> = of_drivers.collect();
+        let robustness = match (&first.flips[..], &of_drivers[..]) {
+            ([], []) => format!("robust: {VARIED} change none of it"),
+            ([], of_drivers) => format!("the answer is robust; {}", of_drivers.join("; ")),
+            (flips, _) => format!("the answer changes with {}", changes(flips)),
         };
-        format!("{answer} (profile {}; {robust})", first.profile)
+        format!("{}: {drivers} (profile {}; {robustness})", first.verdict().label(), first.profile)
     }
 
-    /// What 5.2.5.2 demands of the system, where it says something of this kind of scenario.
-    fn demand(&self) -> Option<&'static str> {
-        Some(match self.first().is_demanded()? {
-            true => "5.2.5.2: the system has to avoid the collision",
-            false => "5.2.5.2: no demand, a condition does not hold",
-        })
+    /// What 5.2.5.2 demands of the system, where it says something of this kind of scenario, and where that and the
+    /// drivers disagree.
+    pub fn demand(&self) -> Vec<String> {
+        let first = self.first();
+        let Some(is_demanded) = first.is_demanded() else { return Vec::new() };
+        let unmet: Vec<&str> = first.unmet().map(|reading| reading.then).collect();
+        let mut sentences = vec![match (is_demanded, &first.demand_flips[..]) {
+            (true, []) => "5.2.5.2: the system has to avoid the collision (robust)".to_owned(),
+            (false, []) => format!("5.2.5.2: no demand; this does not hold: {}", unmet.join("; ")),
+            (_, flips) => format!(
+                "5.2.5.2: undecided: whether the system has to avoid the collision changes with {}",
+                flips.join(", ")
+            ),
+        }];
+        let model_collides = first.verdicts.collides(ModelId::Reg157);
+        let model =
+            format!("Reg157, the model of the clause, {}", if model_collides { "collides" } else { "avoids it" });
+        match (is_demanded, first.verdicts.answer()) {
+            (true, Answer::NotPreventable) => sentences.push(format!(
+                "Clause and drivers disagree: 5.2.5.2 demands what CCHDM and FSM do not achieve; {model}"
+            )),
+            (true, Answer::Preventable) if model_collides => {
+                sentences.push(format!("Clause and model disagree: 5.2.5.2 demands an avoidance, and {model}"));
+            }
+            (true, Answer::NoConflict) => {
+                sentences.push("The conditions of 5.2.5.2 hold, but there is no collision to avoid".to_owned());
+            }
+            (false, Answer::Preventable) => sentences.push(
+                "Clause and drivers disagree: 5.2.5.2 demands nothing, and a driver of Annex 3 avoids the collision"
+                    .to_owned(),
+            ),
+            _ => {}
+        }
+        sentences
     }
 
     /// The numbers of the case: name, value with unit.
@@ -115,16 +178,14 @@ impl CaseSheet<'_> {
             "gap m",
             "TTC s",
             "BTN",
-            "impact km/h",
+            "contact",
             "reacts s",
             "brakes s",
             "changes with",
         ];
         let mut rows = Vec::new();
-        for (judgement, profile) in self.judgements.iter().zip(self.profiles) {
-            for judged in &judgement.models {
-                rows.push(driver_row(judgement, profile, judged));
-            }
+        for judgement in self.judgements {
+            rows.extend(judgement.models.iter().map(|judged| driver_row(judgement, judged)));
         }
         (header.map(str::to_owned).to_vec(), rows)
     }
@@ -152,11 +213,11 @@ impl CaseSheet<'_> {
         header.extend(ModelId::ALL.iter().map(|model| format!("{} at", model.name())));
         let row = |boundary: &Boundary| {
             let parameter = boundary.parameter;
-            let nearest = nearest(&boundary.preventable, boundary.value);
+            let nearest = nearest(&boundary.answer, boundary.value);
             let mut row = vec![
                 parameter.title(),
                 value(boundary.value),
-                change(&boundary.preventable),
+                becomes(boundary),
                 nearest.map_or("–".to_owned(), |at| Rounded(at - boundary.value).to_string()),
             ];
             row.extend(boundary.models.iter().map(change));
@@ -177,12 +238,13 @@ impl CaseSheet<'_> {
             });
             aligned(table, texts)
         };
+        let demand: Vec<String> = self.demand().iter().map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}: {}\n{}{}\nDrivers; smallest gap and TTC, largest BTN\n{}\nClauses under {}\n{}\nWhere the \
-             case ceases, or begins, to be preventable under {}\n{}",
-            self.subject.category().label(),
+            "{synthetic}{}\n{}\n{}{}\nDrivers; smallest gap and TTC, largest BTN\n{}\nClauses under {}\n{}\nWhere the \
+             answer changes, and each driver's collision, under {}\n{}",
+            self.case(),
             self.answer(),
-            self.demand().map_or(String::new(), |demand| format!("  {demand}\n")),
+            demand.concat(),
             numbers.concat(),
             rows(self.drivers(), 3),
             self.first().profile,
@@ -201,7 +263,7 @@ impl CaseSheet<'_> {
             let models = judgement.models.iter().map(|judged| {
                 let mut outcome = records::outcome(&judged.trace.outcome, judged.trace.dt_s);
                 outcome["model"] = json!(judged.trace.model.name());
-                outcome["t_brake_s"] = json!(judged.braking_s(coasting(profile, judged)));
+                outcome["t_brake_s"] = json!(judged.braking_s());
                 outcome["changes_with"] = json!(judged.flips);
                 outcome
             });
@@ -218,15 +280,19 @@ impl CaseSheet<'_> {
                     models.map(|(model, at)| (model.name().to_owned(), ends(at))).collect();
                 json!({
                     "parameter": boundary.parameter.key, "value": boundary.value, "searched": boundary.range,
-                    "preventable_changes_at": ends(&boundary.preventable), "collision_changes_at": models,
+                    "answer_changes_at": ends(&boundary.answer),
+                    "answer_becomes": {"below": boundary.becomes[0].map(Answer::label), "above": boundary.becomes[1].map(Answer::label)},
+                    "collision_changes_at": models,
                 })
             });
             json!({
                 "profile": judgement.profile,
                 "dt_s": profile.frame.dt_s,
-                "preventable": judgement.is_preventable(),
+                "verdict": judgement.verdict().label(),
+                "answer": judgement.verdicts.answer().label(),
                 "demanded_by_5_2_5_2": judgement.is_demanded(),
-                "avoided_by": judgement.avoided_by.iter().map(|m| m.name()).collect::<Vec<_>>(),
+                "demand_changes_with": judgement.demand_flips,
+                "avoided_by": judgement.verdicts.avoided_by().iter().map(|m| m.name()).collect::<Vec<_>>(),
                 "changes_with": judgement.flips,
                 "models": models.collect::<Vec<_>>(),
                 "clauses": readings.collect::<Vec<_>>(),
@@ -246,9 +312,9 @@ impl CaseSheet<'_> {
             "synthetic": self.is_synthetic,
             "category": self.subject.category().key(),
             "case": numbers,
-            "preventable": self.first().is_preventable(),
-            "robust": self.first().flips.is_empty(),
+            "verdict": self.first().verdict().label(),
             "answer": self.answer(),
+            "demand": self.demand(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
         }))
     }
@@ -276,15 +342,18 @@ impl CaseSheet<'_> {
         if self.is_synthetic {
             warnings.push("SYNTHETIC DATA: nothing on this sheet is a statement about real traffic.".to_owned());
         }
-        if !first.flips.is_empty() {
+        if first.verdict() == Verdict::Undecided {
             warnings.push(format!("Undecided: the answer changes with {}.", first.flips.join(", ")));
         }
         let case = Section { facts: self.numbers(), ..Section::new("case", "Case") };
         let drivers = Section {
-            intro: "A collision is preventable where one of the two drivers of Annex 3, CCHDM or FSM, avoids it. Gap and \
-                    TTC are the smallest, BTN is the largest. \"Changes with\" names what turns the collision verdict: half \
-                    the time step, 1 cm of gap, 0.1 km/h of a speed."
-                .to_owned(),
+            intro: format!(
+                "A collision is preventable where one of the two drivers of Annex 3, CCHDM or FSM, avoids it. Where nothing \
+                 collides even if the ego never reacts, there is no conflict. Gap and TTC are the smallest, BTN is the \
+                 largest. In a rear-end contact the ego's front hits the other vehicle; in a side contact the other vehicle \
+                 hits the ego from the side or behind. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
+                 before it is no braking. \"Changes with\" names what turns the collision verdict, of {VARIED}."
+            ),
             tables: vec![page_table("Drivers", 3, self.drivers())],
             ..Section::new("drivers", "Drivers")
         };
@@ -298,10 +367,10 @@ impl CaseSheet<'_> {
         };
         let boundaries = Section {
             intro: "One number is changed, all others stay. \"Changes at\" is the nearest value on either side (below, above) \
-                    at which the case ceases, or begins, to be preventable; the last columns say so of each model's collision."
+                    at which the answer is another one, and what it is there; the last columns say so of each model's collision."
                 .to_owned(),
             tables: vec![page_table("Distance to the boundary", 1, self.boundaries())],
-            ..Section::new("boundary", "Distance to the boundary of preventable cases")
+            ..Section::new("boundary", "Distance to another answer")
         };
         let course = Section {
             figures: vec![PageFigure::new(&self.figure(), &["this sheet"])],
@@ -322,7 +391,12 @@ impl CaseSheet<'_> {
         let page = Page {
             title: format!("One {} against UN R157", self.subject.category().label()),
             program: program(),
-            lead: format!("{}.{}", self.answer(), self.demand().map_or(String::new(), |demand| format!(" {demand}."))),
+            lead: std::iter::once(self.case())
+                .chain([self.answer()])
+                .chain(self.demand())
+                .map(|sentence| format!("{sentence}."))
+                .collect::<Vec<_>>()
+                .join(" "),
             warnings,
             sections: vec![case, drivers, clauses, boundaries, course, reproduction],
         };
@@ -330,7 +404,7 @@ impl CaseSheet<'_> {
     }
 }
 
-fn driver_row(judgement: &Judgement, profile: &Profile, judged: &Judged) -> Vec<String> {
+fn driver_row(judgement: &Judgement, judged: &Judged) -> Vec<String> {
     let outcome = &judged.trace.outcome;
     let time = |time: Option<f64>| time.map_or("never".to_owned(), value);
     vec![
@@ -340,16 +414,18 @@ fn driver_row(judgement: &Judgement, profile: &Profile, judged: &Judged) -> Vec<
         value(outcome.min_gap),
         value(outcome.min_ttc),
         value(outcome.max_btn),
-        judged.impact_closing_mps().map_or("–".to_owned(), |mps| value(mps * KMH)),
+        contact(judged),
         time(judged.reaction_s()),
-        time(judged.braking_s(coasting(profile, judged))),
+        time(judged.braking_s()),
         judged.flips.join(", "),
     ]
 }
 
-/// What does not count as braking, m/s².
-fn coasting(profile: &Profile, judged: &Judged) -> f64 {
-    if judged.trace.model == ModelId::Cchdm { profile.cchdm.coasting_mps2 } else { 0.0 }
+/// Kind of contact, and by how much the ego is faster or slower than what it touches.
+fn contact(judged: &Judged) -> String {
+    let Some(closing_mps) = judged.impact_closing_mps() else { return "–".to_owned() };
+    let than = if closing_mps < 0.0 { "slower" } else { "faster" };
+    format!("{}, ego {} km/h {than}", judged.trace.outcome.contact.label(), value((closing_mps * KMH).abs()))
 }
 
 fn nearest(change: &Change, from: f64) -> Option<f64> {
@@ -363,6 +439,14 @@ fn change(change: &Change) -> String {
         (Some(at), None) | (None, Some(at)) => value(at),
         (Some(below), Some(above)) => format!("{}, {}", value(below), value(above)),
     }
+}
+
+/// Where the answer changes, and what it becomes.
+fn becomes(boundary: &Boundary) -> String {
+    let ends = [boundary.answer.below, boundary.answer.above].into_iter().zip(boundary.becomes);
+    let named = ends.filter_map(|(at, answer)| Some(format!("{}: {}", value(at?), answer?.label())));
+    let named: Vec<String> = named.collect();
+    if named.is_empty() { "–".to_owned() } else { named.join(", ") }
 }
 
 fn ends(change: &Change) -> Value {

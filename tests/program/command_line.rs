@@ -178,7 +178,7 @@ fn conformance_passes_on_the_golden_tables_and_fails_with_code_5_on_a_wrong_one(
 #[test]
 fn no_time_step_lets_the_ego_drive_through_a_vehicle() {
     let simulate = |dt: &str, model: &str| {
-        let case = ["--category", "lvd", "--ego-speed", "50", "--speed", "0", "--gap", "20", "--acceleration", "0"];
+        let case = ["--category", "lvd", "--ego-speed", "50m/s", "--speed", "0", "--gap", "20", "--acceleration", "0"];
         lanesweep(&[&["simulate", "--dt", dt, "--models", model], &case[..]].concat())
     };
     for dt in ["0.04", "0.1", "0.17", "0.2", "0.25"] {

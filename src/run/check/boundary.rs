@@ -1,9 +1,9 @@
-//! How far a case lies from the boundary of preventable cases: one number is changed, all others stay. A scan of evenly
+//! How far a case lies from the boundary at which the answer is another one: one number is changed, all others stay. A scan of evenly
 //! spaced values finds the nearest change on either side, bisection then finds the value. A change between two values
 //! of the scan and back is missed.
 
 use super::subject::Subject;
-use super::{REFERENCE_DRIVERS, StepBudget};
+use super::{Answer, CaseVerdicts, StepBudget};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -42,8 +42,10 @@ pub struct Boundary {
     pub value: f64,
     /// Range that is searched.
     pub range: (f64, f64),
-    /// Where a driver of Annex 3 ceases (or begins) to avoid the collision.
-    pub preventable: Change,
+    /// Where the answer becomes another one.
+    pub answer: Change,
+    /// What it becomes below and above.
+    pub becomes: [Option<Answer>; 2],
     /// The same for every model, in the order of [`ModelId::ALL`].
     pub models: Vec<Change>,
 }
@@ -60,47 +62,67 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
         }
         let value = si * parameter.per_si;
         let verdicts = |value: f64| verdicts(subject, profile, parameter, value, budget);
-        let side = |end: f64| -> Vec<(f64, Vec<bool>)> {
+        let side = |end: f64| -> Vec<(f64, CaseVerdicts)> {
             let step = (end - value) / f64::from(SCANNED);
             // The first is the case itself; a value that makes no case ends the scan.
             let values = (0..=SCANNED).map(|k| value + step * f64::from(k));
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
         let (below, above) = (side(least.min(value)), side(most.max(value)));
-        let change = |of: &dyn Fn(&[bool]) -> bool| {
-            let nearest = |side: &[(f64, Vec<bool>)]| {
-                let at = (1..side.len()).find(|&at| of(&side[at].1) != of(&side[0].1))?;
-                let (mut same, mut other) = (side[at - 1].0, side[at].0);
-                while (other - same).abs() > resolution {
-                    let middle = (same + other) / 2.0;
-                    let changed = verdicts(middle).is_some_and(|v| of(&v) != of(&side[0].1));
-                    *(if changed { &mut other } else { &mut same }) = middle;
-                }
-                Some((other / resolution).round() * resolution)
-            };
-            Change { below: nearest(&below), above: nearest(&above) }
+        let answers = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.answer());
+        let change = |model: &ModelId| {
+            let found = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.collides(*model));
+            change_of(&found)
         };
-        let position = |model: ModelId| ModelId::ALL.iter().position(|m| *m == model).unwrap_or(0);
         found.push(Boundary {
             parameter,
             value,
             range: (least.min(value), most.max(value)),
-            preventable: change(&|verdicts| REFERENCE_DRIVERS.iter().any(|&model| !verdicts[position(model)])),
-            models: ModelId::ALL.iter().map(|&model| change(&|verdicts| verdicts[position(model)])).collect(),
+            answer: change_of(&answers),
+            becomes: answers.map(|found| found.map(|(_, answer)| answer)),
+            models: ModelId::ALL.iter().map(change).collect(),
         });
         budget.check()?;
     }
     Ok(found)
 }
 
-/// Does each model collide with another value of one parameter? `None` too where no more steps may be made.
+/// The nearest values below and above at which something is another one, and what it is there.
+fn nearest<T: PartialEq>(
+    below: &[(f64, CaseVerdicts)],
+    above: &[(f64, CaseVerdicts)],
+    resolution: f64,
+    verdicts: &dyn Fn(f64) -> Option<CaseVerdicts>,
+    of: &dyn Fn(&CaseVerdicts) -> T,
+) -> [Option<(f64, T)>; 2] {
+    [below, above].map(|side| {
+        let case = of(&side.first()?.1);
+        let at = (1..side.len()).find(|&at| of(&side[at].1) != case)?;
+        let (mut same, mut other, mut is) = (side[at - 1].0, side[at].0, of(&side[at].1));
+        while (other - same).abs() > resolution {
+            let middle = (same + other) / 2.0;
+            match verdicts(middle).map(|verdicts| of(&verdicts)) {
+                Some(found) if found != case => (other, is) = (middle, found),
+                _ => same = middle,
+            }
+        }
+        Some(((other / resolution).round() * resolution, is))
+    })
+}
+
+fn change_of<T>([below, above]: &[Option<(f64, T)>; 2]) -> Change {
+    let at = |found: &Option<(f64, T)>| found.as_ref().map(|(at, _)| *at);
+    Change { below: at(below), above: at(above) }
+}
+
+/// The verdicts with another value of one parameter. `None` too where no more steps may be made.
 fn verdicts(
     subject: &Subject,
     profile: &Profile,
     parameter: &MapParameter,
     value: f64,
     budget: &StepBudget,
-) -> Option<Vec<bool>> {
+) -> Option<CaseVerdicts> {
     if budget.is_spent() {
         return None;
     }

@@ -4,6 +4,7 @@
 use crate::engine::{Trace, TracedStep, TracedVehicle};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::run::grid::SPEED_MPS;
 use crate::scenario::Category;
 
 /// The clause of cut-ins.
@@ -73,10 +74,15 @@ impl Reading {
     }
 }
 
-/// The readings of a category, in the order of the clauses.
-pub(super) fn readings(profile: &Profile, category: Category, trace: &dyn Fn(ModelId) -> Trace) -> Vec<Reading> {
+/// The readings of a category, in the order of the clauses; `unreacting` is the ego that keeps its speed.
+pub(super) fn readings(
+    profile: &Profile,
+    category: Category,
+    unreacting: &Trace,
+    trace: &dyn Fn(ModelId) -> Trace,
+) -> Vec<Reading> {
     let mut list = match category {
-        Category::CutIn => lane_intrusion(profile, &trace(ModelId::Reg157)),
+        Category::CutIn => lane_intrusion(profile, unreacting),
         Category::CutOut | Category::Lvd => Vec::new(),
     };
     list.extend(competent_driver(profile, category, &trace(ModelId::Cchdm)));
@@ -84,41 +90,83 @@ pub(super) fn readings(profile: &Profile, category: Category, trace: &dyn Fn(Mod
     list
 }
 
+/// Do all conditions of 5.2.5.2 hold? `None` where the clause says nothing.
+pub(super) fn is_demanded(readings: &[Reading]) -> Option<bool> {
+    let mut of_clause = readings.iter().filter(|reading| reading.clause == LANE_INTRUSION).peekable();
+    of_clause.peek()?;
+    Some(of_clause.all(Reading::holds))
+}
+
+/// The other vehicle as it intrudes into the ego's lane: between two steps, where the lateral gap is that of the clause.
+struct Intrusion {
+    time_s: f64,
+    closing_mps: f64,
+    ttc_s: f64,
+}
+
+impl Intrusion {
+    fn of(trace: &Trace, lateral_gate_m: f64) -> Option<Intrusion> {
+        let at = trace.steps.iter().position(|step| step.others[0].lateral_gap_m <= lateral_gate_m)?;
+        let (before, after) = (&trace.steps[at.saturating_sub(1)], &trace.steps[at]);
+        let change_m = before.others[0].lateral_gap_m - after.others[0].lateral_gap_m;
+        let share = if change_m > 0.0 { (before.others[0].lateral_gap_m - lateral_gate_m) / change_m } else { 1.0 };
+        let between = |of: fn(&TracedStep) -> f64| of(before) + share * (of(after) - of(before));
+        let gap_m = between(|step| step.others[0].gap_m).max(0.0);
+        let closing_mps = between(|step| step.v_ego_mps - step.others[0].v_mps);
+        let ttc_s = if closing_mps > 0.0 { gap_m / closing_mps } else { f64::INFINITY };
+        Some(Intrusion { time_s: between(|step| step.time_s), closing_mps, ttc_s })
+    }
+}
+
 /// 5.2.5.2: a collision with a vehicle that cuts in has to be avoided where (a), (b) and (c) hold.
-fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
+pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let constants = &profile.reg157;
     let other = |step: &TracedStep| step.others[0];
-    let intrudes = |step: &&TracedStep| other(step).lateral_gap_m <= constants.lateral_gate_m;
-    let intrusion = trace.steps.iter().find(intrudes);
-    let start_m = trace.steps.first().map_or(0.0, |step| other(step).y_m);
+    let intrusion = Intrusion::of(trace, constants.lateral_gate_m);
+    let first = trace.steps.first().map(other);
+    let start_m = first.map_or(0.0, |other| other.y_m);
     let moves = |step: &&TracedStep| (other(step).y_m - start_m).abs() > 1e-9;
     // Movement is seen at the step that it begins from.
     let moved_s = trace.steps.iter().find(moves).map(|step| trace.time_s(step.step.saturating_sub(1)));
-    let closing_mps = intrusion.map_or(0.0, |step| step.v_ego_mps - other(step).v_mps);
-    let reading = |quantity, unit, value, relation, threshold, then| Reading {
+    let change_mps = |step: &TracedStep| first.map_or(0.0, |first| (other(step).v_mps - first.v_mps).abs());
+    let changed = first_largest(trace.steps.iter().map(|step| (step.time_s, change_mps(step))));
+    let reading = |quantity, unit, value: Option<f64>, relation, threshold, then| Reading {
         clause: LANE_INTRUSION,
         quantity,
         unit,
         value,
         relation,
         threshold,
-        time_s: intrusion.map(|step| step.time_s),
+        time_s: intrusion.as_ref().map(|intrusion| intrusion.time_s),
         then,
     };
-    let required_s = closing_mps.max(0.0) / (2.0 * constants.deceleration_mps2) + constants.reaction_time_s;
+    let closing_mps = intrusion.as_ref().map(|intrusion| intrusion.closing_mps);
+    let required_s =
+        closing_mps.unwrap_or(0.0).max(0.0) / (2.0 * constants.deceleration_mps2) + constants.reaction_time_s;
     vec![
         reading(
             "(a) relative speed at lane intrusion",
             "m/s",
-            intrusion.map(|_| closing_mps),
+            closing_mps,
             Relation::Above,
             0.0,
             "the other vehicle is slower",
         ),
+        Reading {
+            time_s: changed.map(|(time_s, _)| time_s),
+            ..reading(
+                "(a) largest change of the other vehicle's speed",
+                "m/s",
+                changed.map(|(_, change_mps)| change_mps),
+                Relation::AtMost,
+                SPEED_MPS,
+                "the other vehicle keeps its speed, to 0.1 km/h",
+            )
+        },
         reading(
             "(b) lateral movement visible before lane intrusion",
             "s",
-            intrusion.zip(moved_s).map(|(step, moved_s)| step.time_s - moved_s),
+            intrusion.as_ref().zip(moved_s).map(|(intrusion, moved_s)| intrusion.time_s - moved_s),
             Relation::AtLeast,
             constants.visible_lateral_movement_s,
             "the movement could be seen",
@@ -126,12 +174,22 @@ fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
         reading(
             "(c) TTC at lane intrusion",
             "s",
-            intrusion.map(|step| other(step).ttc_s),
+            intrusion.as_ref().map(|intrusion| intrusion.ttc_s),
             Relation::Above,
             required_s,
             "with (a) and (b): the system has to avoid the collision",
         ),
     ]
+}
+
+/// The largest value and the first time of it.
+fn first_largest(values: impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
+    values.reduce(|largest, next| if next.1 > largest.1 + 1e-9 { next } else { largest })
+}
+
+/// The first value above a threshold with its time; the largest where none is.
+fn first_above(values: impl Iterator<Item = (f64, f64)> + Clone, threshold: f64) -> Option<(f64, f64)> {
+    values.clone().find(|(_, value)| *value > threshold + 1e-9).or_else(|| first_largest(values))
 }
 
 /// Annex 3, the competent and careful human driver.
@@ -154,37 +212,34 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         then,
     };
     if category == Category::Lvd {
-        let dt_s = trace.dt_s;
-        let pairs = || {
-            trace.steps.windows(2).map(|pair| (&pair[1], (pair[0].others[0].v_mps - pair[1].others[0].v_mps) / dt_s))
-        };
-        let peak = pairs().max_by(|a, b| a.1.total_cmp(&b.1));
+        // The deceleration of a step acts from the step before on.
+        let decelerations = trace
+            .steps
+            .windows(2)
+            .map(|pair| (pair[0].time_s, (pair[0].others[0].v_mps - pair[1].others[0].v_mps) / trace.dt_s));
         let trigger_mps2 = constants.lead_deceleration_trigger_mps2;
-        let first_s = pairs().find(|(_, a)| *a > trigger_mps2 + 1e-9).map(|(step, _)| step.time_s);
-        let then = "perceived after the risk perception time";
-        let peak_mps2 = peak.map(|(_, a)| a);
+        let found = first_above(decelerations, trigger_mps2);
         return vec![reading(
-            "largest deceleration of the leader",
+            "deceleration of the leader",
             "m/s²",
-            peak_mps2,
+            found.map(|(_, deceleration)| deceleration),
             Relation::Above,
             trigger_mps2,
-            first_s,
-            then,
+            found.map(|(time_s, _)| time_s),
+            "perceived after the risk perception time",
         )];
     }
     let wandering_m = constants.wandering_m;
     let deviates = trace.steps.iter().find(|step| deviation_m(step) > wandering_m);
     let seen = perceived(deviates);
-    let largest_m = trace.steps.iter().map(deviation_m).fold(0.0, f64::max);
-    let deviates_s = deviates.map(|step| step.time_s);
+    let found = first_above(trace.steps.iter().map(|step| (step.time_s, deviation_m(step))), wandering_m);
     let mut list = vec![reading(
         "deviation from the lane centre",
         "m",
-        Some(largest_m),
+        found.map(|(_, deviation)| deviation),
         Relation::Above,
         wandering_m,
-        deviates_s,
+        found.map(|(time_s, _)| time_s),
         "perceived after the risk perception time",
     )];
     let danger = match category {

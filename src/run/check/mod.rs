@@ -1,5 +1,5 @@
 //! One concrete case against the regulation: every profile and model, the margins, the clauses, and how far the case
-//! lies from the boundary of preventable cases.
+//! lies from another answer.
 //!
 //! Here lives what is computed, in f64. The case comes from [`crate::scenario`]; the sheet is made by
 //! [`crate::report`].
@@ -7,6 +7,7 @@
 mod boundary;
 mod clauses;
 mod subject;
+mod verdict;
 
 use std::cell::Cell;
 
@@ -15,12 +16,13 @@ use rayon::prelude::*;
 pub use boundary::{Boundary, Change};
 pub use clauses::{Reading, Relation};
 pub use subject::{Lane, Subject};
+pub use verdict::{Answer, CaseVerdicts, Verdict};
 
 use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Perturbation, Point};
+use crate::run::grid::{Perturbation, Point, without_reaction};
 use crate::scenario::Category;
 use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -55,13 +57,17 @@ pub struct Judgement {
     pub profile: String,
     /// One entry per model.
     pub models: Vec<Judged>,
-    /// Drivers of Annex 3 that avoid the collision.
-    pub avoided_by: Vec<ModelId>,
-    /// Perturbations under which the case changes from preventable to not, or back.
+    /// The verdicts of the case as it is.
+    pub verdicts: CaseVerdicts,
+    /// Perturbations under which the answer is another one.
     pub flips: Vec<&'static str>,
+    /// The same for each driver's collision, in the order of [`ModelId::ALL`].
+    pub driver_flips: Vec<Vec<&'static str>>,
+    /// The same for the demand of 5.2.5.2.
+    pub demand_flips: Vec<&'static str>,
     /// What the clauses say of the case.
     pub readings: Vec<Reading>,
-    /// Where along each parameter the case stops (or starts) to be preventable.
+    /// Where along each parameter the answer becomes another one.
     pub boundaries: Vec<Boundary>,
 }
 
@@ -71,12 +77,9 @@ impl Judged {
         collides(&self.trace.outcome)
     }
 
-    /// Time at which braking begins, s, coasting left out.
-    pub fn braking_s(&self, coasting_mps2: f64) -> Option<f64> {
-        let brakes = |step: &&crate::engine::TracedStep| step.a_ego_mps2 < -(coasting_mps2 + 1e-6);
-        let first = self.trace.steps.iter().find(brakes)?;
-        // The acceleration is that of the step before.
-        Some(self.trace.time_s(first.step.saturating_sub(1)))
+    /// Time at which braking begins, s: [`StepMark::Braking`].
+    pub fn braking_s(&self) -> Option<f64> {
+        self.trace.step_of(StepMark::Braking).map(|step| self.trace.time_s(step))
     }
 
     /// Time of the first reaction, s.
@@ -92,27 +95,39 @@ impl Judged {
 }
 
 impl Judgement {
-    /// Does a driver of Annex 3 avoid the collision?
-    pub fn is_preventable(&self) -> bool {
-        !self.avoided_by.is_empty()
+    /// The answer, where no perturbation changes it.
+    pub fn verdict(&self) -> Verdict {
+        if self.flips.is_empty() { Verdict::Answer(self.verdicts.answer()) } else { Verdict::Undecided }
     }
 
     /// Do all conditions of 5.2.5.2 hold, so that the system has to avoid the collision? `None` but for cut-ins.
     pub fn is_demanded(&self) -> Option<bool> {
-        let mut of_clause = self.readings.iter().filter(|reading| reading.clause == clauses::LANE_INTRUSION).peekable();
-        of_clause.peek()?;
-        Some(of_clause.all(Reading::holds))
+        clauses::is_demanded(&self.readings)
+    }
+
+    /// Conditions of 5.2.5.2 that do not hold.
+    pub fn unmet(&self) -> impl Iterator<Item = &Reading> {
+        self.readings.iter().filter(|reading| reading.clause == clauses::LANE_INTRUSION && !reading.holds())
+    }
+
+    /// Perturbations under which a driver's collision is another one.
+    pub fn flips_of(&self, model: ModelId) -> &[&'static str] {
+        let at = ModelId::ALL.iter().position(|m| *m == model);
+        at.map_or(&[], |at| &self.driver_flips[at])
     }
 }
 
-/// Does each model collide?
-fn verdicts(lane: &Lane, profile: &Profile, category: Category, budget: &StepBudget) -> Vec<bool> {
-    let collides = |model| {
+/// Does each model collide, and an ego that never reacts?
+fn verdicts(lane: &Lane, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
+    let ran = |profile: &Profile, model| {
         let outcome = lane.run(profile, category, model);
         budget.take(&outcome);
         collides(&outcome)
     };
-    ModelId::ALL.map(collides).to_vec()
+    CaseVerdicts {
+        collide: ModelId::ALL.map(|model| ran(profile, model)),
+        conflict: ran(&without_reaction(profile), ModelId::Reg157),
+    }
 }
 
 fn collides(outcome: &Outcome<f64>) -> bool {
@@ -178,47 +193,59 @@ impl Check {
         let trace = |model| lane.trace(profile, self.subject.category(), model);
         let budget = StepBudget { profile, left: Cell::new(MAX_STEPS) };
         let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model);
-        let traced: u64 = self.models.iter().map(|model| u64::from(run(model).end_step) + 1).sum();
+        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157);
+        let traced = self.models.iter().map(run).chain([unreacting]).map(|outcome| u64::from(outcome.end_step) + 1);
+        let traced: u64 = traced.sum();
         if traced > MAX_TRACED_STEPS {
             return Err(too_many_steps(profile));
         }
         let changed = self.perturbed(profile, &budget)?;
-        let flips = |avoids: &dyn Fn(&[bool]) -> bool| {
-            let nominal = avoids(&changed[0].1);
-            let differs = |(_, verdicts): &&(&'static str, Vec<bool>)| avoids(verdicts) != nominal;
-            let mut names: Vec<&'static str> = changed.iter().filter(differs).map(|(name, _)| *name).collect();
-            names.dedup();
-            names
-        };
-        let position = |model: ModelId| ModelId::ALL.iter().position(|m| *m == model).unwrap_or(0);
-        let models = self
-            .models
-            .iter()
-            .map(|&model| Judged { trace: trace(model), flips: flips(&|verdicts| verdicts[position(model)]) });
-        let references = REFERENCE_DRIVERS.map(position);
-        let avoided_by = REFERENCE_DRIVERS.into_iter().filter(|&model| !changed[0].1[position(model)]).collect();
+        let driver = |model: ModelId| flips(&changed, |changed| changed.verdicts.collides(model));
+        let models = self.models.iter().map(|&model| Judged { trace: trace(model), flips: driver(model) });
+        let unreacting = lane.unreacting(profile, self.subject.category());
         Ok(Judgement {
             profile: profile.name.clone(),
             models: models.collect(),
-            avoided_by,
-            flips: flips(&|verdicts| references.iter().any(|&at| !verdicts[at])),
-            readings: clauses::readings(profile, self.subject.category(), &trace),
+            verdicts: changed[0].verdicts.clone(),
+            flips: flips(&changed, |changed| changed.verdicts.answer()),
+            driver_flips: ModelId::ALL.map(driver).to_vec(),
+            demand_flips: flips(&changed, |changed| changed.is_demanded),
+            readings: clauses::readings(profile, self.subject.category(), &unreacting, &trace),
             boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
         })
     }
 
-    /// Does each model collide, in the case and under each perturbation? The case itself comes first.
-    fn perturbed(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<(&'static str, Vec<bool>)>> {
-        let verdicts = |profile: &Profile, point: &Point| -> Result<Vec<bool>> {
+    /// The verdicts of the case and of each perturbation. The case itself comes first.
+    fn perturbed(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<Changed>> {
+        let category = self.subject.category();
+        let changed = |by, profile: &Profile, point: &Point| -> Result<Changed> {
             budget.check()?;
             let lane = self.subject.lane(profile, point)?;
-            Ok(verdicts(&lane, profile, self.subject.category(), budget))
+            let verdicts = verdicts(&lane, profile, category, budget);
+            let readings = match category {
+                Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
+                Category::CutOut | Category::Lvd => Vec::new(),
+            };
+            Ok(Changed { by, verdicts, is_demanded: clauses::is_demanded(&readings) })
         };
-        let mut all = vec![("", verdicts(profile, self.subject.point())?)];
+        let mut all = vec![changed("", profile, self.subject.point())?];
         for perturbation in Perturbation::ALL {
             let point = perturbation.of_point(*self.subject.point());
-            all.push((perturbation.label(), verdicts(&perturbation.profile(profile)?, &point)?));
+            all.push(changed(perturbation.label(), &perturbation.profile(profile)?, &point)?);
         }
         Ok(all)
     }
+}
+
+/// The case after a perturbation.
+struct Changed {
+    by: &'static str,
+    verdicts: CaseVerdicts,
+    is_demanded: Option<bool>,
+}
+
+/// Perturbations under which something is not what it is in the first.
+fn flips<T: PartialEq>(all: &[Changed], of: impl Fn(&Changed) -> T) -> Vec<&'static str> {
+    let differs = |changed: &&Changed| of(changed) != of(&all[0]);
+    all.iter().filter(differs).map(|changed| changed.by).collect()
 }

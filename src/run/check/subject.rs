@@ -3,7 +3,7 @@
 use crate::engine::{Constants, Headway, LaneCase, Outcome, Silent, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{MapQuantity, Point};
+use crate::run::grid::{MapQuantity, Point, without_reaction};
 use crate::scenario::parameterization::{TimeGrid, recorded_case};
 use crate::scenario::{Case, Category, PlainCase, Scenario, Speed, Tables};
 use crate::{Error, Place, Result};
@@ -164,5 +164,10 @@ impl Lane {
     /// The same with every step.
     pub fn trace(&self, profile: &Profile, category: Category, model: ModelId) -> Trace {
         Trace::record(profile, category, &self.case, &self.tables, self.headway, model)
+    }
+
+    /// Every step of an ego that never reacts.
+    pub fn unreacting(&self, profile: &Profile, category: Category) -> Trace {
+        self.trace(&without_reaction(profile), category, ModelId::Reg157)
     }
 }

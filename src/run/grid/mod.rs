@@ -21,7 +21,7 @@ pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, boundary, count, runs};
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
-pub use robustness::Perturbation;
+pub use robustness::{Perturbation, SPEED_MPS, without_reaction};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};

@@ -110,3 +110,12 @@ impl Perturbation {
         }
     }
 }
+
+/// The profile under which Reg157 never reacts: the ego keeps its speed. What collides there is a conflict.
+pub fn without_reaction(profile: &Profile) -> Profile {
+    let mut without = profile.clone();
+    without.reg157.always_unsafe.clear();
+    // No vehicle overlaps the ego so far across the road.
+    without.reg157.lateral_gate_m = -100.0;
+    without
+}
