@@ -16,8 +16,8 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::run::sampling::{
-    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, checkpoints,
-    plan_samples, sample_into,
+    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, cuts, plan_samples,
+    sample_into,
 };
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::Parameterization;
@@ -62,7 +62,7 @@ fn sampling(folder: &Path) {
         exposure: None,
         is_sampled_headway: false,
     };
-    pairs("sample", folder, plan.unit_count(), &checkpoints(samples), |ledger: &mut Ledger<SampleTally>| {
+    pairs("sample", folder, plan.unit_count(), &cuts(samples, &(0..samples)), |ledger: &mut Ledger<SampleTally>| {
         sample_into(&plan, ledger, &executor, &counting, &crude, false, |_| Ok(())).unwrap();
     });
 }
@@ -83,7 +83,7 @@ fn study(folder: &Path) {
     pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
         let units = ledger.units();
         Executor::new(&backend)
-            .sweep(&plan, units, Wanted::Verdicts, |chunk| ledger.add(Partial::from_chunk(&plan, &chunk)?))
+            .sweep(&plan, units, Wanted::Verdicts, |chunk| ledger.add(Partial::from_chunk(&plan, &chunk)?, [0; 2]))
             .unwrap();
     });
     plan_file(folder, &study);
@@ -98,7 +98,7 @@ fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run:
             let mut ledger = Ledger::new(0..units, cuts);
             if with {
                 let (journal, found) = Journal::open(&folder.join("run.journal"), "run", 0..units).unwrap();
-                ledger.resume(journal, found).unwrap();
+                ledger.resume(journal, found, &|_| Ok(())).unwrap();
             }
             run(&mut ledger);
             let (segments, journal) = ledger.finish().unwrap();
@@ -120,7 +120,7 @@ fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run:
         let part = Part { run_sha256: "run".to_owned(), units: 0..units, lanes_redone_and_rechecked: [0; 2], segments };
         write_part(&path, &part).unwrap();
         let written_s = start.elapsed().as_secs_f64();
-        read_part::<T>(&path, "run", &(0..units), "again").unwrap();
+        read_part::<T>(&path, "run", &(0..units), "again", &|_| Ok(())).unwrap();
         let read_s = start.elapsed().as_secs_f64() - written_s;
         println!("{name},{repetition},{without_s},{with_s},{in_journal_s},{written_s},{read_s}");
         ratios.push(with_s / without_s);

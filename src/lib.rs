@@ -28,6 +28,7 @@
 //!     ahead_gap_m: 0.0,
 //!     length_m: 4.3,
 //!     width_m: 1.9,
+//!     duration_s: None,
 //! };
 //! let mut tables = Tables::default();
 //! let case = LaneCase::encode(&cut_in.case(profile.frame.time_cap_s)?, &profile, &mut tables);

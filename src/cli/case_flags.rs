@@ -8,8 +8,8 @@ use serde::Deserialize;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, CaseParameters, Category, ParameterRows, PlainCase, at_least};
-use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
+use crate::scenario::{Case, CaseParameters, Category, ParameterRows, PlainCase, RowPlace};
+use crate::support::plausibility::{Doubts, Implausible, Quantity};
 use crate::support::table::{TableFormat, TableReader};
 use crate::support::toml_file;
 use crate::{Error, Place, Result};
@@ -60,6 +60,13 @@ pub(super) struct CaseFlags {
     /// Width of every vehicle [default: the profile's]
     #[arg(long, value_name = "m")]
     width: Option<f64>,
+    /// Of files: then the other vehicles keep their speed and lateral position, s.
+    #[arg(skip)]
+    duration: Option<f64>,
+    /// Where the values of a table stand.
+    #[arg(skip)]
+    #[serde(skip)]
+    row: Option<RowPlace>,
 }
 
 impl CaseFlags {
@@ -85,16 +92,26 @@ impl CaseFlags {
             ahead_gap: self.ahead_gap.or(other.ahead_gap),
             length: self.length.or(other.length),
             width: self.width.or(other.width),
+            duration: other.duration,
+            row: other.row.map(|row| row.without(&self.parameters().given())),
         }
     }
 
     pub(super) fn category(&self) -> Result<Category> {
-        self.parameters().category()
+        self.located(self.parameters().category())
+    }
+
+    /// An error about a value of a table says where it stands.
+    fn located<T>(&self, result: Result<T>) -> Result<T> {
+        result.map_err(|error| match &self.row {
+            Some(row) => row.locate(error),
+            None => error,
+        })
     }
 
     /// Does it say anything of the case itself?
     pub(super) fn says_a_case(&self) -> bool {
-        CaseFlags { models: None, ..self.clone() } != CaseFlags::default()
+        CaseFlags { models: None, row: None, ..self.clone() } != CaseFlags::default()
     }
 
     /// Does it say where the ego starts?
@@ -112,57 +129,41 @@ impl CaseFlags {
         self.models.as_ref().map(|_| self.models()).transpose()
     }
 
-    /// The models, each once, in the order given; all where none is named.
+    /// The models, in the order given; all where none is named.
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {
-        let Some(text) = self.models.as_ref().filter(|text| text.trim() != "all") else {
-            return Ok(ModelId::ALL.to_vec());
-        };
-        let mut models = Vec::new();
-        for name in text.split(',').map(str::trim) {
-            let model = ModelId::parse(name).ok_or_else(|| {
-                let problem = format!("there is no driver model `{name}`");
-                Error::usage(Place::item("models"), problem, format!("use one of {}, or all", ModelId::names()))
-            })?;
-            if !models.contains(&model) {
-                models.push(model);
-            }
-        }
-        Ok(models)
+        let names = self.models.iter().flat_map(|list| list.split(','));
+        self.located(super::lists::models(names, "models"))
     }
 
     pub(super) fn headway(&self) -> Result<Headway> {
-        match (self.gap, self.thw) {
-            (Some(gap), None) => Ok(Headway::GapM(at_least(gap, 0.0, "gap")?)),
-            (None, Some(thw)) => Ok(Headway::ThwS(at_least(thw, 0.0, "thw")?)),
-            (Some(_), Some(_)) => {
-                Err(Error::usage(Place::item("gap, thw"), "both are given", "give the gap or the time headway"))
-            }
-            (None, None) => Err(Error::usage(
+        let parameters = self.parameters();
+        self.located(parameters.check_start())?;
+        parameters.gap.map(Headway::GapM).or(parameters.thw.map(Headway::ThwS)).ok_or_else(|| {
+            Error::usage(
                 Place::item("gap, thw"),
                 "the initial distance is missing",
                 "give --gap in metres or --thw in seconds",
-            )),
-        }
+            )
+        })
     }
 
     /// The case; what is doubtful of it is told.
     pub(super) fn case(&self, profile: &Profile, implausible: Implausible) -> Result<Case> {
-        self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s)
+        self.located(self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s))
     }
 
     /// Its numbers; what is doubtful of them is told.
     pub(super) fn plain_case(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
+        self.located(self.checked(profile, implausible))
+    }
+
+    fn checked(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
         let (frame, mut doubts) = (&profile.frame, Doubts::new(implausible));
         let mut parameters = self.parameters();
         parameters.settle(&mut doubts, str::to_owned);
-        let wrong = |key: &str, problem| Error::usage(Place::item(key), problem, HELP);
         let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
         self.headway()?;
         parameters.judge(&mut doubts)?;
-        for (key, quantity, value) in [("gap", Quantity::Gap, self.gap), ("thw", Quantity::Headway, self.thw)] {
-            let judged = value.map_or(Ok(()), |value| doubts.judge(quantity, value, || key.to_owned()));
-            judged.map_err(|problem| wrong(key, problem))?;
-        }
         // An acceleration without an end leads far within the time cap.
         let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
         let judged =
@@ -181,6 +182,8 @@ impl CaseFlags {
             category: self.category.clone(),
             ego_speed: self.ego_speed,
             speed: self.speed,
+            gap: self.gap,
+            thw: self.thw,
             lateral_speed: self.lateral_speed,
             lateral_distance: self.lateral_distance,
             acceleration: self.acceleration,
@@ -189,6 +192,7 @@ impl CaseFlags {
             ahead_gap: self.ahead_gap,
             length: self.length,
             width: self.width,
+            duration: self.duration,
         }
     }
 }
@@ -225,10 +229,11 @@ pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
     for _ in 1..row {
         drop(rows.next_row()?.ok_or_else(missing)?);
     }
-    let (_, found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
+    let (line, found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
     let mut found = found?;
     // Of tables of scenarios: a single run has no key and no samples.
-    ["id", "duration", "rate"].iter().for_each(|key| drop(found.remove(*key)));
-    serde_json::from_value(serde_json::Value::Object(found))
-        .map_err(|e| Error::Internal(format!("{}, row {row}: {e}", path.display())))
+    ["id", "rate"].iter().for_each(|key| drop(found.remove(*key)));
+    let flags: CaseFlags = serde_json::from_value(serde_json::Value::Object(found))
+        .map_err(|e| Error::Internal(format!("{}, row {row}: {e}", path.display())))?;
+    Ok(CaseFlags { row: Some(rows.row_place(line)), ..flags })
 }

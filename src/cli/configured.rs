@@ -1,6 +1,7 @@
 //! From the command line to a configuration and back: which flag sets which key, and verbs that see what files and the
 //! environment set as if it were their flags' default.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::parser::ValueSource;
@@ -22,7 +23,7 @@ pub(super) struct Configured {
 }
 
 /// A flag that sets a key: the verb (every one that has the flag where it is empty), the flag's id, the key.
-pub(super) const FLAGS: [(&str, &str, &str); 30] = [
+pub(super) const FLAGS: [(&str, &str, &str); 28] = [
     ("", "threads", "run.threads"),
     ("", "backend", "run.backend"),
     ("", "device", "run.device"),
@@ -48,8 +49,6 @@ pub(super) const FLAGS: [(&str, &str, &str); 30] = [
     ("sample", "elite_fraction", "sample.elite_fraction"),
     ("sample", "broad_weight", "sample.broad_weight"),
     ("sample", "defensive_weight", "sample.defensive_weight"),
-    ("sample", "bootstrap", "sample.bootstrap"),
-    ("sample", "bootstrap_samples", "sample.bootstrap_samples"),
     ("sample", "seed", "sample.seed"),
     ("compare", "samples", "compare.samples"),
     ("compare", "seed", "compare.seed"),
@@ -108,11 +107,11 @@ fn with_config(mut command: Command) -> Command {
 }
 
 impl Configured {
-    /// Puts the layers together, and gives the command line with what they set.
+    /// Puts the layers together, and gives the command line with what they set. `words` are those that `matches` are of.
     ///
     /// # Errors
     /// As [`Layers::read`]; [`Error::Usage`] for a value that the verb's flag does not take.
-    pub fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
+    pub fn of(matches: &ArgMatches, words: &[OsString]) -> Result<(Cli, Configured)> {
         let (path, typed, last) = verb_of(matches);
         if path.last() == Some(&"slurm") && !typed.is_empty() {
             let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
@@ -146,7 +145,7 @@ impl Configured {
         }
         let with = |given: &[(&str, Setting)]| {
             let command = with_defaults(command.clone(), &path, given);
-            command.try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches))
+            command.try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches))
         };
         match with(&given) {
             Ok(cli) => Ok((cli, configured)),

@@ -8,6 +8,7 @@ use comfy_table::{Table as TextTable, presets};
 
 use super::Exit;
 use super::format::FormatFlag;
+use super::source::file_of;
 use crate::interop::conformance::{
     LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes,
 };
@@ -15,6 +16,7 @@ use crate::model::profile::Profile;
 use crate::report::records;
 use crate::scenario::read_scenarios;
 use crate::support::readable::{count, count_of};
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Compare golden tables of simulated cases with our own lanes
@@ -47,6 +49,7 @@ impl Conformance {
                 "give JRC tables, or --scenarios and --golden-lanes",
             ));
         }
+        refuse_repeats(|| Place::item("FILE"), self.tables.iter().map(|path| (file_of(path), path.display())))?;
         let mut tallies = Vec::new();
         let jrc = Profile::load("jrc-2021")?;
         for path in &self.tables {

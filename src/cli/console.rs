@@ -1,14 +1,20 @@
 //! Data on stdout, everything else on stderr; a reader that goes away is no error. All of it passes here, so that no
 //! foreign text (an id, a file's name) reaches a terminal with characters that act on it.
 
+use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 
+use clap::error::ContextValue;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
-use crate::support::plain_text::{shown, shown_in_line, shown_json};
+use super::Exit;
+use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
+
+/// What errors call it.
+const STDOUT: &str = "standard output";
 
 /// How much is said on stderr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +41,7 @@ pub fn start_log(verbosity: Verbosity) {
         .log_internal_errors(false)
         // One message is one line, whatever a file is called.
         .fmt_fields(debug_fn(|out, field, value| match field.name() {
-            "message" => write!(out, "{}", shown_in_line(&with_flags(&format!("{value:?}")))),
+            "message" => write!(out, "{}", shown_in_line(&with_flags(&cut_names(&format!("{value:?}"))))),
             name => write!(out, "{name}={}", shown_in_line(&format!("{value:?}"))),
         }))
         .with_ansi(io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
@@ -59,7 +65,7 @@ fn write_out(text: &str) -> Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.map_err(|e| Error::io("standard output", "write", e)),
+        other => other.map_err(|e| Error::io(STDOUT, "write", e)),
     }
 }
 
@@ -117,12 +123,29 @@ pub fn complain(error: &Error) {
     let _ = writeln!(stderr, "{report:?}");
 }
 
-/// Tells what is wrong with the command line, or the help that was asked for.
-pub fn refuse(error: &clap::Error) {
+/// Tells what is wrong with the command line, or prints the help that was asked for.
+///
+/// # Errors
+/// [`Error::Io`] where standard output does not take the help.
+pub fn refuse(error: &clap::Error) -> Result<Exit> {
+    if !error.use_stderr() {
+        return match error.print().and_then(|()| io::stdout().flush()) {
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::io(STDOUT, "write", error)),
+            _ => Ok(Exit::Ok),
+        };
+    }
     let text = error.to_string();
-    let safe = shown(&with_flags(&text)).into_owned();
-    // A closed pipe on `--help | head` is success.
+    let mut safe = shown(&with_flags(&text)).into_owned();
+    for (_, value) in error.context() {
+        if let ContextValue::String(value) = value
+            && let Cow::Owned(short) = cut(&shown(value))
+        {
+            safe = safe.replace(&*shown(value), &short);
+        }
+    }
+    // Where stderr is gone there is nobody to tell.
     let _ = if safe == text { error.print() } else { write!(io::stderr().lock(), "{safe}") };
+    Ok(Exit::Usage)
 }
 
 /// A library error as miette draws it.

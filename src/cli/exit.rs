@@ -20,14 +20,14 @@ pub enum Exit {
     Incomplete = 4,
     /// A check that was asked for did not pass (conformance).
     VerificationFailed = 5,
-    /// The system refused to read or write, or to start a thread.
+    /// The system refused to read or write, to start a thread or to give memory.
     Io = 6,
     /// No usable compute device, or the device failed.
     NoDevice = 7,
     /// A defect of the program.
     Internal = 70,
     /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
-    Interrupted = 75,
+    Interrupted = crate::support::interrupt::EXIT_STATUS,
 }
 
 impl Exit {
@@ -59,7 +59,7 @@ impl Exit {
             Exit::BadInput => "invalid data; nothing was written",
             Exit::Incomplete => "a result was written, but parts of the input were left out",
             Exit::VerificationFailed => "a check failed",
-            Exit::Io => "the system refused to read, to write or to start a thread",
+            Exit::Io => "the system refused to read, to write, to start a thread or to give memory",
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Internal => "a program error",
             Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",

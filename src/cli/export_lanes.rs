@@ -17,6 +17,7 @@ use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
 use crate::stats::density::DensityModel;
 use crate::support::plausibility::Implausible;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// What the flags say beside the lanes.
@@ -235,6 +236,7 @@ fn named(plan: &LanePlan, source: &Source) -> Result<Vec<LaneKey>> {
             }
         }
     }
+    refuse_repeats(|| Place::item("--lane"), keys.iter().map(|key| (*key, plan.key_text(key))))?;
     Ok(keys)
 }
 

@@ -2,15 +2,19 @@
 
 use std::path::Path;
 
+use super::rerun::worst_sha256;
 use super::simulate_lanes::{find, model};
 use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::limit_state;
 use crate::run::study::{StudyCases, WINDOW};
+use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::repeats::refuse_repeats;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
+use sha2::{Digest, Sha256};
 
 /// Lanes that one export writes at most.
 const MAX_LANES: usize = 10_000;
@@ -31,6 +35,7 @@ pub(super) fn worst_of_study(
 ) -> Result<Vec<LaneKey>> {
     let plan = study.outline();
     let models = wanted_models(plan, models, count)?;
+    refuse_repeats(|| Place::item("--variant"), variants.iter().map(|name| (name.trim(), name.trim())))?;
     for name in variants {
         if !plan.blocks.iter().any(|b| b.variants.iter().any(|v| v == name.trim())) {
             let mut known: Vec<&str> = plan.blocks.iter().flat_map(|b| &b.variants).map(String::as_str).collect();
@@ -105,6 +110,14 @@ pub(super) fn worst_of_sample(
         return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
     }
     let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
+    if worst_sha256(dir)?.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
+        let problem = "its checksum does not fit the one in estimate.json: it was changed or damaged";
+        return Err(Error::input(
+            Place::file(&path),
+            problem,
+            "run `lanesweep sample` again, or name lanes with --lane",
+        ));
+    }
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let wrong = |row: u64, problem: String| {
         let help = "give the folder of a `lanesweep sample` run by this version";

@@ -114,7 +114,6 @@ const FLAGS: [Group; 5] = [
             "broad_weight",
             "defensive_weight",
             "bootstrap",
-            "bootstrap_samples",
             "threshold_units",
         ],
     ),

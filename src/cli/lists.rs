@@ -10,6 +10,7 @@ use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::Driven;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// A whole number as the configuration writes it too: `10000`, `10_000` or `1e4`.
@@ -78,7 +79,9 @@ impl ModelsFlag {
     /// # Errors
     /// [`Error::Usage`] for a model that there is not.
     pub fn list(&self) -> Result<Vec<ModelId>> {
-        models(&self.models)
+        let mut list = models(self.models.iter().map(String::as_str), "--models")?;
+        list.sort();
+        Ok(list)
     }
 
     /// Those that are named; `None` where none is.
@@ -141,31 +144,34 @@ impl ExposureFlags {
     }
 }
 
-/// The models of `--models`, in the order of every table; all where none is given.
+/// Models by their names, in the order given; `all`, or no name, stands for every one. `flag` names the place of an error.
 ///
 /// # Errors
-/// [`Error::Usage`] for a model that there is not.
-fn models(list: &[String]) -> Result<Vec<ModelId>> {
-    if list.is_empty() || list.iter().any(|name| name.trim() == "all") {
-        return Ok(ModelId::ALL.to_vec());
+/// [`Error::Usage`] for a model that there is not, or that is named twice.
+pub fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result<Vec<ModelId>> {
+    let mut named: Vec<(ModelId, &str)> = Vec::new();
+    for text in list.into_iter().map(str::trim) {
+        match ModelId::parse(text) {
+            Some(model) => named.push((model, text)),
+            None if text == "all" => named.extend(ModelId::ALL.map(|model| (model, text))),
+            None => {
+                let problem = format!("there is no driver model `{text}`");
+                return Err(Error::usage(
+                    Place::item(flag),
+                    problem,
+                    format!("use one of {}, or all", ModelId::names()),
+                ));
+            }
+        }
     }
-    let parse = |text: &String| {
-        ModelId::parse(text.trim()).ok_or_else(|| {
-            let names: Vec<&str> = ModelId::ALL.iter().map(|m| m.name()).collect();
-            let problem = format!("there is no driver model `{text}`");
-            Error::usage(Place::item("--models"), problem, format!("use {}", names.join(", ")))
-        })
-    };
-    let mut models = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    models.sort();
-    models.dedup();
-    Ok(models)
+    refuse_repeats(|| Place::item(flag), named.iter().copied())?;
+    Ok(if named.is_empty() { ModelId::ALL.to_vec() } else { named.into_iter().map(|(model, _)| model).collect() })
 }
 
 /// The headways of `--thw`, s. `words` are what else the flag takes, for the message.
 ///
 /// # Errors
-/// [`Error::Usage`] for one that is not above 0.
+/// [`Error::Usage`] for one that is not above 0, or that is given twice.
 pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let parse = |text: &str| {
         if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
@@ -178,7 +184,10 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
             Error::usage(Place::item("--thw"), problem, help)
         })
     };
-    list.split(',').map(parse).collect()
+    let found = list.split(',').map(parse).collect::<Result<Vec<_>>>()?;
+    let meanings = found.iter().map(|headway| headway.identity());
+    refuse_repeats(|| Place::item("--thw"), meanings.zip(list.split(',').map(str::trim)))?;
+    Ok(found)
 }
 
 /// The same, or `paper`: the ten of the paper.
@@ -196,10 +205,14 @@ pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
 /// none is given.
 ///
 /// # Errors
-/// [`Error::Usage`] for one that the categories do not have.
+/// [`Error::Usage`] for one that the categories do not have, or that is named twice.
 fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Parameterization>> {
     let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
     let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
+    let of_all = wanted.iter().filter(|key| **key == "all");
+    let every = of_all.flat_map(|all| of_categories().map(|p| (p.key.into_owned(), *all)));
+    let named = wanted.iter().filter(|key| **key != "all").map(|key| ((*key).to_owned(), *key));
+    refuse_repeats(|| Place::item("--parameterizations"), every.chain(named))?;
     if wanted.is_empty() || wanted.contains(&"all") {
         return Ok(of_categories().collect());
     }

@@ -49,6 +49,7 @@ mod verify;
 
 pub use exit::Exit;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
@@ -160,12 +161,11 @@ const MAX_THREADS: usize = 4096;
 
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
-    let matches = match configured::command().try_get_matches() {
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let matches = match configured::command().try_get_matches_from(&words) {
         Ok(matches) => matches,
         Err(error) => {
-            let asked_for = !error.use_stderr();
-            console::refuse(&error);
-            return if asked_for { Exit::Ok } else { Exit::Usage }.into();
+            return told(|| console::refuse(&error)).into();
         }
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
@@ -173,7 +173,7 @@ pub fn main() -> ExitCode {
     }
     crate::support::interrupt::install();
     told(|| {
-        let (cli, configured) = Configured::of(&matches)?;
+        let (cli, configured) = Configured::of(&matches, &words)?;
         run(&cli, &configured)
     })
     .into()
@@ -226,30 +226,41 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     }
 }
 
+/// Threads per logical core beyond which no thread is started: two keep a core at work while a thread waits for a file,
+/// and more only take turns.
+const THREADS_PER_CORE: usize = 4;
+
 /// Address space of a thread: its stack, and its share of the allocator's arenas.
 const BYTES_PER_THREAD: usize = 4 << 20;
 
 /// Starts the workers, one per core unless told otherwise: before the work, for a pool that cannot start later panics.
+/// No more are started than are of use; results do not depend on it.
 ///
 /// # Errors
 /// [`Error::Io`] where the system gives no more threads, or no memory for them.
-fn start_threads(count: Option<usize>) -> Result<()> {
-    if let Some(count) = count {
-        // Where memory ends after some of the threads have started, an allocation of one of them ends the process.
-        let mut room = Vec::<u8>::new();
-        room.try_reserve_exact(count.saturating_mul(BYTES_PER_THREAD)).map_err(|error| {
-            let source = std::io::Error::new(std::io::ErrorKind::WouldBlock, error.to_string());
-            Error::io(format!("--threads {count}"), "start", source)
-        })?;
-        // Else the compiler leaves out an allocation that nobody uses.
-        std::hint::black_box(&room);
+fn start_threads(asked: Option<usize>) -> Result<()> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let useful = THREADS_PER_CORE * cores;
+    if let Some(asked) = asked.filter(|asked| *asked > useful) {
+        tracing::info!(
+            "--threads {asked}: {useful} are started; more than {THREADS_PER_CORE} per logical core bring no gain"
+        );
     }
+    let count = asked.map(|asked| asked.min(useful));
+    let refused = |reason: String| {
+        let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
+        Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
+    };
+    // Where memory ends after some of the threads have started, an allocation of one of them ends the process.
+    let mut room = Vec::<u8>::new();
+    let bytes = count.unwrap_or(cores).saturating_mul(BYTES_PER_THREAD);
+    room.try_reserve_exact(bytes).map_err(|error| refused(error.to_string()))?;
+    // Else the compiler leaves out an allocation that nobody uses.
+    std::hint::black_box(&room);
+    drop(room);
     let started = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).build_global();
     started.map_err(|error| match std::error::Error::source(&error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
-        Some(refused) => {
-            let what = count.map_or("the worker threads".to_owned(), |count| format!("--threads {count}"));
-            Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, refused.to_string()))
-        }
+        Some(source) => refused(source.to_string()),
         None => Error::Internal(format!("the thread pool did not start: {error}")),
     })
 }

@@ -29,6 +29,7 @@ struct Recorded {
     #[serde(default)]
     given: Vec<(String, f64)>,
     plan_sha256: Option<String>,
+    worst_sha256: Option<String>,
 }
 
 /// What the sampling run that wrote this folder was asked for, with its density.
@@ -54,23 +55,19 @@ pub(super) fn same_engine(recorded: Option<u64>) -> std::result::Result<(), Stri
     }
 }
 
+/// Checksum of the table of worst lanes, as the record has it.
+///
+/// # Errors
+/// As [`facts_of`].
+pub(super) fn worst_sha256(dir: &Path) -> Result<Option<String>> {
+    Ok(read(dir)?.1.worst_sha256)
+}
+
 /// The same of a run without a density of ours.
 pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
-    let path = dir.join("estimate.json");
-    let wrong = |problem: String| {
-        let help = "give the folder (--out) of a `lanesweep sample` run by this version";
-        Error::input(Place::file(&path), problem, help)
-    };
-    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
-    let run: Recorded =
-        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
-    if run.lanesweep_estimate != 1 {
-        return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
-    }
-    same_engine(run.engine).map_err(wrong)?;
-    let estimator = ["mc", "is", "ce", "subset"].into_iter().find(|known| *known == run.estimator);
+    let (estimator, run) = read(dir)?;
     let facts = RunFacts {
-        estimator: estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?,
+        estimator,
         profile: run.profile,
         models: run.models,
         headways: run.plan_headways,
@@ -80,6 +77,25 @@ pub(super) fn record_of(dir: &Path) -> Result<(RunFacts, Option<String>)> {
         given: run.given,
     };
     Ok((facts, run.plan_sha256))
+}
+
+/// The estimator and the record of a folder.
+fn read(dir: &Path) -> Result<(&'static str, Recorded)> {
+    let path = dir.join("estimate.json");
+    let wrong = |problem: String| {
+        let help = "give the folder (--out) of a `lanesweep sample` run by this version";
+        Error::input(Place::file(&path), problem, help)
+    };
+    let again = "run `lanesweep sample` into this folder again";
+    let text = input_file::read_json(&path, input_file::MAX_TABLE_BYTES, "the record of a run", again)?;
+    let run: Recorded =
+        serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a run: {e}")))?;
+    if run.lanesweep_estimate != 1 {
+        return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
+    }
+    same_engine(run.engine).map_err(wrong)?;
+    let estimator = ["mc", "is", "ce", "subset"].into_iter().find(|known| *known == run.estimator);
+    Ok((estimator.ok_or_else(|| wrong(format!("estimator `{}` is not known", run.estimator)))?, run))
 }
 
 /// The plan of the sampling run that wrote this folder, with what the run was asked for and its density.

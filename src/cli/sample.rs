@@ -33,7 +33,7 @@ use crate::stats::density::DensityModel;
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "density" | "distribution" | "category" | "rename" | "set" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "half_width"
     | "time_limit" | "worst" | "map" | "pilot" | "elite_fraction" | "broad_weight" | "defensive_weight" | "given" | "proposal"
-    | "bootstrap" | "bootstrap_samples" | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
+    | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
 }))]
@@ -56,7 +56,7 @@ pub struct Sample {
     /// OpenSCENARIO file with stochastic distributions, not a density
     ///
     /// Its numberOfTestRuns and randomSeed are the defaults of --samples and --seed.
-    #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "bootstrap", "rows", "shard", "plan_only"])]
+    #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "rows", "shard", "plan_only"])]
     pub(super) distribution: Option<PathBuf>,
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", requires = "distribution")]
@@ -124,11 +124,6 @@ pub struct Sample {
     /// Several are combined by the balance heuristic.
     #[arg(long, value_name = "FILE")]
     pub(super) proposal: Vec<PathBuf>,
-    /// Replicates over resampled scenarios, for the data's share of the uncertainty (mc)
-    #[arg(long, value_name = "N", value_parser = lists::whole::<u32>)]
-    pub(super) bootstrap: u32,
-    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
-    pub(super) bootstrap_samples: u64,
     /// Seed of the draws [default: 157, or the --distribution's]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use super::source::file_of;
+use crate::support::repeats::refuse_repeats;
 use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
@@ -55,7 +57,6 @@ impl Sample {
         let belongs_to_crude = [
             ("--rows", self.rows.is_some()),
             ("--map", self.map.is_some()),
-            ("--bootstrap", self.bootstrap > 0),
             ("--given", !self.given.is_empty()),
             ("--points sobol", self.points == PointsFlag::Sobol),
         ];
@@ -81,18 +82,6 @@ impl Sample {
             EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?,
             _ => (),
         }
-        if self.bootstrap > 0 {
-            least("--bootstrap", self.bootstrap.into(), 20, 1 << 20)?;
-            least("--bootstrap-samples", self.bootstrap_samples, 100, 1 << 40)?;
-            if !self.given.is_empty() {
-                let problem = "replicates are those of the whole density";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave out --bootstrap or --given"));
-            }
-            if self.shards.is_part() || self.shards.plan_only {
-                let problem = "a part of a run has no replicates";
-                return Err(Error::usage(Place::item("--bootstrap"), problem, "leave out --bootstrap or --shard"));
-            }
-        }
         let is_split = self.shards.is_part() || self.shards.plan_only;
         if is_split && !is_crude && !self.is_weighted() {
             let problem = "the adaptive estimators are sequential and cannot be split";
@@ -110,6 +99,7 @@ impl Sample {
                 "add --estimator is",
             ));
         }
+        refuse_repeats(|| Place::item("--proposal"), self.proposal.iter().map(|path| (file_of(path), path.display())))?;
         Ok(())
     }
 }

@@ -16,7 +16,7 @@ use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::model::profile::Profile;
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
-use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::grid::MapParameter;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
 use crate::scenario::Category;
@@ -75,7 +75,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
             help,
         ));
     }
-    let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
+    let text = input_file::read_text(path, input_file::MAX_XML_BYTES)?;
     let name = flags.category.as_deref().unwrap_or_default();
     let category = Category::parse(name).ok_or_else(|| {
         let problem = format!("there is no category `{name}`");
@@ -232,7 +232,7 @@ fn write(
             });
         }
         let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        results.add("worst.csv", &worst_csv(&rows, &names, counting.criterion)?)?;
+        sample_lanes::add_worst(&mut results, &rows, &names, counting.criterion, file)?;
     }
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
     results.add(KEPT, &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;
@@ -249,7 +249,8 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
         let help = "give the folder (--out) of a `lanesweep sample --distribution` run by this version";
         Error::input(Place::file(&path), problem, help)
     };
-    let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
+    let again = "run `lanesweep sample --distribution` into this folder again";
+    let text = input_file::read_json(&path, input_file::MAX_TABLE_BYTES, "the record of a distribution", again)?;
     let kept: Kept =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a distribution: {e}")))?;
     if kept.lanesweep_distribution != 1 {

@@ -100,7 +100,7 @@ fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format:
         forecast: Some(forecast),
         backend: opened.backend().describe(),
         before: None,
-        besides: "figures; --bootstrap and --rows",
+        besides: "figures; --rows",
     }
     .print(format)?;
     Ok(Exit::Ok)

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
+use crate::model::criterion::Criterion;
 use crate::report::convergence::ConvergenceFigure;
 use crate::report::failure_map::FailureMap;
 use crate::report::html::PageFigure;
@@ -12,9 +13,11 @@ use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::run::sampling::{CrudeRun, TallyOptions};
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
+use crate::support::hex::hex;
 use crate::support::run_dir::Results;
 use crate::support::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
+use sha2::{Digest, Sha256};
 
 /// One row per lane: a table that gets its name with the run's other results.
 pub(super) struct RowTable<'a> {
@@ -52,6 +55,7 @@ pub(super) fn write(
     density: &DensityModel,
     run: &CrudeRun,
     counting: &TallyOptions,
+    file: &mut EstimateFile,
 ) -> Result<Vec<PageFigure>> {
     let mut figures = Vec::new();
     if !run.convergence.is_empty() {
@@ -95,7 +99,7 @@ pub(super) fn write(
             rows.push((row, *outcome));
         }
         let rows: Vec<WorstRow> = rows.into_iter().map(|(row, _)| row).collect();
-        results.add("worst.csv", &worst_csv(&rows, &names, counting.criterion)?)?;
+        add_worst(results, &rows, &names, counting.criterion, file)?;
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
@@ -107,6 +111,19 @@ pub(super) fn write(
         }
     }
     Ok(figures)
+}
+
+/// Adds the table of the worst lanes, and its checksum to the record.
+pub(super) fn add_worst(
+    results: &mut Results,
+    rows: &[WorstRow],
+    names: &[String],
+    criterion: Criterion,
+    file: &mut EstimateFile,
+) -> Result<()> {
+    let table = worst_csv(rows, names, criterion)?;
+    file.worst_sha256 = Some(hex(&Sha256::digest(&table)));
+    results.add("worst.csv", &table)
 }
 
 /// Adds density, table and page, and puts all of it into the folder with its record.

@@ -16,7 +16,7 @@ use crate::engine::Executor;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
 use crate::run::parts::{PLAN_FILE, Shard};
 use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::{self, BootstrapRecord, SampleKind, SampleResult, conditional, proposal_text};
+use crate::run::sampling::{self, SampleKind, SampleResult, conditional, proposal_text};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
@@ -46,6 +46,18 @@ impl Sample {
         if let Some(path) = &self.distribution {
             return sample_distribution::run(self, path, started, verbosity);
         }
+        let (sample, data) = self.planned()?;
+        let opened = self.backend.open()?;
+        tracing::info!("{data}");
+        self.run_sample(sample, &opened, started, verbosity)
+    }
+
+    /// Plans a run of the density, for who writes the command down too; with what the data are.
+    ///
+    /// # Errors
+    /// Those that the run would end with.
+    pub(super) fn planned(&self) -> Result<(sampling::Sample, String)> {
+        self.check()?;
         let Some(density) = &self.density else {
             return Err(Error::usage(
                 Place::item("DENSITY"),
@@ -59,13 +71,11 @@ impl Sample {
         }
         let profile = self.load_profile()?;
         let options = self.options(&density)?;
-        let opened = self.backend.open()?;
         if let Some(rows) = &self.rows {
             guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }
-        tracing::info!("{}", density.provenance.data);
-        let sample = sampling::Sample::plan(density, &profile, &options)?;
-        self.run_sample(sample, &opened, started, verbosity)
+        let data = density.provenance.data.clone();
+        Ok((sampling::Sample::plan(density, &profile, &options)?, data))
     }
 
     /// From a plan to the estimates, or to a part of them.
@@ -91,7 +101,7 @@ impl Sample {
             let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
-            return write(&sample, result, None, opened.host(0, started), results, self.format);
+            return write(&sample, result, opened.host(0, started), results, self.format);
         }
         let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
@@ -140,28 +150,12 @@ impl Sample {
             return Ok(Exit::Ok);
         }
         let result = run.take_result()?;
-        let bootstrap = self.replicates(sample, executor, verbosity)?;
         let host = opened.host(result.rechecked_lanes, started);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
-        let exit = write(sample, result, bootstrap, host, results, self.format)?;
+        let exit = write(sample, result, host, results, self.format)?;
         run.close()?;
         Ok(exit)
-    }
-
-    fn replicates(
-        &self,
-        sample: &sampling::Sample,
-        executor: &Executor,
-        verbosity: Verbosity,
-    ) -> Result<Option<BootstrapRecord>> {
-        if self.bootstrap == 0 {
-            return Ok(None);
-        }
-        let bar = console::progress(verbosity, self.bootstrap.into(), "resampling");
-        let record = sample.bootstrap(executor, self.bootstrap, self.bootstrap_samples, || bar.inc(1));
-        bar.finish_and_clear();
-        record.map(Some)
     }
 }
 
@@ -188,14 +182,13 @@ fn warn(planned: &CrudePlan) -> Result<()> {
 pub(super) fn merge(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
     let (sample, result) = sampling::Sample::merge_or(folder.dir(), again)?;
     let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
-    write(&sample, result, None, host, folder.results()?, format)
+    write(&sample, result, host, folder.results()?, format)
 }
 
 /// Tables, figures, the record.
 fn write(
     sample: &sampling::Sample,
     result: SampleResult,
-    bootstrap: Option<BootstrapRecord>,
     host: HostRecord,
     mut results: Results,
     format: FormatFlag,
@@ -204,15 +197,14 @@ fn write(
     let mut file = EstimateFile::new(density, RunFacts::of(sample), result.rows, host)?;
     let mut figures = Vec::new();
     if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
-        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting())?;
+        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting(), &mut file)?;
         file.plan_sha256 = Some(planned.plan.hash().to_owned());
         file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
     }
-    file.bootstrap = bootstrap;
     file.levels = result.levels;
     if sample.has_given_proposals() {
         // A proposal in this folder may be one that was given.
-        results.keep(|name| name.starts_with("proposal-"));
+        results.keep(|name| name.starts_with("proposal-"))?;
     }
     for (model, proposal) in &result.proposals {
         results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;

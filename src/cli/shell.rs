@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use super::configured::command;
 use super::{Exit, console};
-use crate::support::files::{make_folder, write_atomically};
+use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Result};
 
 /// Print the completions for a shell
@@ -64,7 +64,7 @@ impl Man {
             let mut page = Vec::new();
             let unwritten = |e: std::io::Error| Error::Internal(format!("a manual page cannot be made: {e}"));
             clap_mangen::Man::new(command).render(&mut page).map_err(unwritten)?;
-            write_atomically(&self.dir.join(format!("{name}.1")), &page)?;
+            write_inside(&self.dir.join(format!("{name}.1")), |file| file.write_all(&page))?;
             written += 1;
         }
         tracing::info!("{written} pages written to {}", self.dir.display());

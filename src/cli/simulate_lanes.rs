@@ -16,6 +16,7 @@ use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::support::input_file;
 use crate::support::plausibility::Implausible;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Which lanes are asked for: one by its key, and others of the same scenario and headway beside it.
@@ -152,7 +153,8 @@ fn study_of(dir: &Path, run: &Path) -> Result<Study> {
                  folder; a study keeps it up to 256 MiB, and always with `--keep-plan always`",
         )
     };
-    let text = input_file::read(run, input_file::MAX_TABLE_BYTES)?;
+    let again = "run the study into this folder again";
+    let text = input_file::read_json(run, input_file::MAX_TABLE_BYTES, "the record of a study", again)?;
     let recorded: Recorded =
         serde_json::from_slice(&text).map_err(|e| wrong(format!("it is not the record of a study: {e}")))?;
     super::rerun::same_engine(recorded.engine).map_err(wrong)?;
@@ -255,6 +257,7 @@ pub(super) fn model(plan: &LanePlan, id: ModelId) -> Result<usize> {
 fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
     let names = &plan.blocks[key.block].variants;
     let mut variants = Vec::new();
+    refuse_repeats(|| Place::item("--compare"), compare.iter().map(|name| (name.trim(), name.trim())))?;
     for name in compare.iter().map(|name| name.trim()) {
         match names.iter().position(|n| n == name) {
             Some(at) => variants.push(at),

@@ -1,11 +1,12 @@
 //! `lanesweep cluster slurm`: a run as a Slurm job array.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::configured::command;
-use super::{Exit, console};
+use super::configured::{Configured, command};
+use super::{Exit, Verb, console};
 use crate::interop::cluster::{Resources, SlurmArray, SplitRun, shell_quoted};
 use crate::support::atomic_file::refuse_link;
 use crate::support::input_file::{MAX_SETTINGS_BYTES, read_text};
@@ -83,6 +84,7 @@ impl Slurm {
         let start = absolute("the present folder", Path::new("."))?;
         let array = SlurmArray { run, shards: self.array, out, scripts, start, program, resources: self.resources() };
         let texts = array.scripts()?;
+        check_plan(&array)?;
         let folder = Path::new(&array.scripts);
         if self.scripts.is_none() && folder.exists() && !folder.symlink_metadata().is_ok_and(|about| about.is_dir()) {
             refuse_link(folder)?;
@@ -108,7 +110,7 @@ impl Slurm {
         Ok(Exit::Ok)
     }
 
-    /// The run, checked as far as its flags go: a typing error is told here rather than by the cluster.
+    /// The run, without the flags that are the scripts' own.
     fn split_run(&self) -> Result<SplitRun> {
         let words = match &self.study {
             Some(config) => {
@@ -117,14 +119,7 @@ impl Slurm {
             }
             None => self.run.clone(),
         };
-        let run = SplitRun::new(&words)?;
-        if let Err(error) = command().try_get_matches_from(["lanesweep".to_owned()].into_iter().chain(words)) {
-            let message = error.to_string();
-            let problem = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-            let help = format!("see lanesweep {} --help", run.verb());
-            return Err(Error::usage(Place::item("the run"), problem, help));
-        }
-        Ok(run)
+        SplitRun::new(&words)
     }
 
     fn resources(&self) -> Resources {
@@ -138,6 +133,25 @@ impl Slurm {
             qos: self.qos.clone(),
             signal_before_s: self.signal_before,
         }
+    }
+}
+
+/// Checks the command that makes the plan as its verb would: an error is told here rather than by the cluster.
+fn check_plan(array: &SlurmArray) -> Result<()> {
+    let run = &array.run;
+    let own = ["--plan-only", "--out", &array.out];
+    let typed = ["lanesweep", run.verb()].into_iter().chain(run.arguments().iter().map(String::as_str));
+    let words: Vec<OsString> = typed.chain(own).map(OsString::from).collect();
+    let matches = command().try_get_matches_from(&words).map_err(|error| {
+        let message = error.to_string();
+        let problem = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        Error::usage(Place::item("the run"), problem, format!("see lanesweep {} --help", run.verb()))
+    })?;
+    let (cli, configured) = Configured::of(&matches, &words)?;
+    match &cli.verb {
+        Verb::Study(study) => study.check(&configured),
+        Verb::Sample(sample) => sample.planned().map(drop),
+        _ => Err(Error::Internal(format!("`{}` cannot be split", run.verb()))),
     }
 }
 

@@ -7,6 +7,7 @@ use clap::Args;
 use super::console::{self, Verbosity};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
+use crate::support::repeats::refuse_repeats;
 use crate::traffic::mining::{Collection, MiningOptions, mine_folder, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::traffic::trajectory::highd::{self, made_up};
@@ -35,6 +36,18 @@ impl Source {
             ),
         };
         labelled(text, synthetic)
+    }
+
+    /// Checks that the data can be read: all of a scenario file, the names of a folder's recordings.
+    ///
+    /// # Errors
+    /// As [`Source::load`].
+    pub fn check(&self, implausible: Implausible) -> Result<()> {
+        match self {
+            Source::Scenarios(path) => read_scenario_file(path, implausible).map(drop),
+            Source::Folder(dir) => highd::inventory(dir).map(drop),
+            Source::Generated(options) => options.validate(),
+        }
     }
 
     /// Reads or generates, and mines.
@@ -113,10 +126,10 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
             Error::usage(Place::item(flag), problem, "use cut-in, cut-out, lvd")
         })
     };
-    let mut list = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    list.sort();
-    list.dedup();
-    Ok(list)
+    let mut found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    refuse_repeats(|| Place::item(flag), found.iter().zip(list.iter().map(|text| text.trim())))?;
+    found.sort();
+    Ok(found)
 }
 
 /// What data are, in words that say so where they are made up.
@@ -124,17 +137,19 @@ pub fn labelled(data: String, synthetic: bool) -> String {
     if synthetic && !data.starts_with("SYNTHETIC DATA") { format!("SYNTHETIC DATA: {data}") } else { data }
 }
 
+/// The file that a path stands for, however it is written.
+pub fn file_of(path: &Path) -> PathBuf {
+    // Where a file does not exist yet, its folder still tells.
+    let of_folder = || {
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(parent.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(of_folder).unwrap_or_else(|| path.to_path_buf())
+}
+
 /// An output must not be one of these files.
 pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
-    // Where a file does not exist yet, its folder still tells.
-    let place_of = |path: &Path| {
-        path.canonicalize().ok().or_else(|| {
-            let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            Some(parent.canonicalize().ok()?.join(path.file_name()?))
-        })
-    };
-    let place_of = |path: &Path| place_of(path).unwrap_or_else(|| path.to_path_buf());
-    match others.iter().find(|other| place_of(other) == place_of(output)) {
+    match others.iter().find(|other| file_of(other) == file_of(output)) {
         Some(other) => Err(Error::usage(
             Place::item(flag),
             format!("{} would be overwritten: this run reads or writes it", other.display()),

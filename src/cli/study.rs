@@ -18,6 +18,7 @@ use super::{Exit, ProfileFlags, lists};
 use crate::Result;
 use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
+use crate::model::profile::Profile;
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
@@ -27,6 +28,9 @@ use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::counts_text;
+
+/// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
+const FORECAST_BYTES: u64 = 64 << 20;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -159,22 +163,40 @@ impl Study {
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
-    /// From data to a plan.
-    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
-        let mut config = configured.settings.clone();
-        config.score.seed = self.seed.unwrap_or(config.score.seed);
+    /// Checks what a plan is made of, but for recordings, which are not read: for who writes the command down.
+    ///
+    /// # Errors
+    /// Those that the run would end with.
+    pub(super) fn check(&self, configured: &Configured) -> Result<()> {
+        self.guard_inputs(configured)?;
+        check_folder(&self.out)?;
+        let (profile, options, source) = self.asked(configured)?;
+        profile.check_time_step(&options.models)?;
+        source.check(self.plausibility.policy())
+    }
+
+    /// What is studied, with what.
+    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions, Source)> {
         let profile = self.profile.load()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
             headways: lists::paper_or_headways(&self.thw)?,
-            parameterization: config.parameterization.clone(),
+            parameterization: configured.settings.parameterization.clone(),
         };
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(self.generator.options(configured)?),
         };
+        Ok((profile, options, source))
+    }
+
+    /// From data to a plan.
+    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
+        let mut config = configured.settings.clone();
+        config.score.seed = self.seed.unwrap_or(config.score.seed);
+        let (profile, options, source) = self.asked(configured)?;
         tracing::info!("{}", source.describe(false));
         let mut timings = Timings::default();
         let collection =
@@ -202,7 +224,7 @@ impl Study {
         let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let some = study.cases().thinned(WINDOW)?;
+        let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
         let mut forecast =
             forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
         forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
@@ -217,8 +239,9 @@ impl Study {
             parts: dry_run::parts(plan),
             units: "scenarios",
             is_at_most: false,
-            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum(),
-            more: "counts and bootstrap",
+            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum::<u64>()
+                + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
+            more: "counts, bootstrap and the series of a window",
             forecast: Some(forecast),
             backend: backend.describe(),
             before: before_s.map(|seconds| (seconds, "reading, mining and planning")),

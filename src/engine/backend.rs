@@ -86,6 +86,8 @@ pub struct Chunk {
     pub valued: Option<Vec<(u64, Outcome<f64>)>>,
     /// One per cell of the plan ([`LanePlan::cell`]) where counts were wanted, else empty.
     pub counts: Vec<CellCounts>,
+    /// Lanes that the fallback computed, and lanes that were computed again on the CPU and are equal. The executor sets both.
+    pub redone_and_rechecked: [u64; 2],
 }
 
 impl Chunk {

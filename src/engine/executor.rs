@@ -120,10 +120,12 @@ impl<'a> Executor<'a> {
                         value(&mut chunk);
                         if let Some(recheck) = recheck {
                             let name = backend.describe();
-                            summary.rechecked_lanes += recheck.check(&chunk, wanted, &name, by)?;
+                            let mut rechecked = recheck.check(&chunk, wanted, &name, by)?;
                             for sample in &samples {
-                                summary.rechecked_lanes += recheck.check_all(sample, &name, by)?;
+                                rechecked += recheck.check_all(sample, &name, by)?;
                             }
+                            chunk.redone_and_rechecked[1] = rechecked;
+                            summary.rechecked_lanes += rechecked;
                         }
                         summary.lanes += chunk.lanes();
                         each(chunk)?;
@@ -151,9 +153,12 @@ impl<'a> Executor<'a> {
             let mut chunk = session.run(range.clone(), wanted)?;
             chunk.check_asked(plan, &range, wanted)?;
             value(&mut chunk);
+            chunk.redone_and_rechecked[0] = chunk.lanes();
             if let Some(recheck) = recheck {
                 let by = fallback.rechecked_by(wanted);
-                summary.rechecked_lanes += recheck.check(&chunk, wanted, &fallback.describe(), by)?;
+                let rechecked = recheck.check(&chunk, wanted, &fallback.describe(), by)?;
+                chunk.redone_and_rechecked[1] = rechecked;
+                summary.rechecked_lanes += rechecked;
             }
             summary.redone_chunks += 1;
             summary.redone_lanes += chunk.lanes();

@@ -231,6 +231,23 @@ impl Partial {
         Ok(())
     }
 
+    /// Whether counts that were read from a file can be those of this plan.
+    ///
+    /// # Errors
+    /// What differs.
+    pub fn check_of(&self, plan: &LanePlan) -> std::result::Result<(), String> {
+        if self.plan_hash != plan.hash() {
+            return Err(format!("they belong to plan {}, not to {}", self.plan_hash, plan.hash()));
+        }
+        if !self.fits(plan) || !self.adds_up(plan) {
+            return Err("they do not fit the units, variants, models and headways of the plan".to_owned());
+        }
+        match self.worst.iter().find(|worst| worst.lane >= plan.lane_count()) {
+            Some(worst) => Err(format!("lane {} is not in the plan", worst.lane)),
+            None => Ok(()),
+        }
+    }
+
     /// Do the counts by headway add up to the failures of the units? The units must fit the plan.
     pub fn adds_up(&self, plan: &LanePlan) -> bool {
         (0..plan.blocks.len()).all(|block| self.block_adds_up(plan, block))

@@ -12,6 +12,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{Category, Tables};
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::generated::Generator;
@@ -51,6 +52,15 @@ impl Headway {
         match text.strip_suffix('s') {
             Some(seconds) => number(seconds).map(Headway::ThwS),
             None => number(text.strip_suffix('m')?).map(Headway::GapM),
+        }
+    }
+
+    /// What tells it from others: two that start every lane alike are one.
+    pub(crate) fn identity(self) -> (u8, u32) {
+        match self.start::<f32>() {
+            Start::Headway(s) => (0, s.to_bits()),
+            Start::Gap(m) => (1, m.to_bits()),
+            Start::MinFollowing => (2, 0),
         }
     }
 
@@ -148,6 +158,9 @@ impl LanePlan {
     }
 
     /// A plan whose hash is that of what its cases follow from.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without models or headways, for one that is there twice, and for too many lanes.
     pub(crate) fn with_hash(
         hash: String,
         profile: Profile,
@@ -159,6 +172,11 @@ impl LanePlan {
         let empty = [("driver models", models.is_empty()), ("headways", headways.is_empty())];
         if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
             return Err(Error::usage(Place::default(), format!("the sweep has no {what}"), "give at least one"));
+        }
+        refuse_repeats(|| Place::option("models"), models.iter().map(|model| (*model, model.name())))?;
+        refuse_repeats(|| Place::option("headways"), headways.iter().map(|headway| (headway.identity(), headway)))?;
+        for block in &blocks {
+            refuse_repeats(|| Place::item("variants"), block.variants.iter().map(|variant| (variant, variant)))?;
         }
         profile.check_time_step(&models)?;
         let (mut unit, mut lane) = (0_u64, 0_u64);

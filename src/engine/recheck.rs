@@ -367,7 +367,8 @@ mod tests {
             let keys: Vec<LaneKey> = lanes.map(|lane| self.plan.key(lane).unwrap()).collect();
             let mut verdicts = vec![Verdicts::default(); keys.len()];
             Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
-            Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), valued: None, counts: Vec::new() })
+            let (outcomes, counts) = (Vec::new(), Vec::new());
+            Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked: [0; 2] })
         }
     }
 

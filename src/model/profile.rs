@@ -10,6 +10,7 @@ use crate::model::criterion::CriteriaProfile;
 use crate::model::driver::{self, Bound, DriverProfile, ModelId};
 use crate::support::input_file;
 use crate::support::near_name::nearest;
+use crate::support::repeats::refuse_repeats;
 use crate::support::toml_file;
 use crate::{Error, Place, Result};
 
@@ -189,6 +190,10 @@ impl Profile {
                 "the chapter on profiles has the range of every key, configs/profiles/paper.toml usual values",
             ));
         }
+        for (key, list) in [("reg157", &self.reg157.always_unsafe), ("cchdm", &self.cchdm.always_unsafe)] {
+            let place = || place.clone().of(format!("`{key}.always_unsafe`"));
+            refuse_repeats(place, list.iter().map(|category| (*category, category.key())))?;
+        }
         if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
             return Err(Error::usage(
                 place.clone().of("`frame.dt_s`"),
@@ -245,6 +250,7 @@ mod tests {
     use crate::model::case::Category;
     use crate::model::driver::ModelId;
     use crate::stats::random::philox4x32_10;
+    use crate::support::plain_text::cut;
     use serde_json::Value;
 
     #[test]
@@ -348,7 +354,7 @@ mod tests {
             let error = Profile::parse(&text, &Place::file(Path::new("own.toml"))).unwrap_err().to_string();
             let bound =
                 Profile::load("paper").unwrap().bounds().into_iter().find(|(known, ..)| known == key).unwrap().2;
-            for part in ["own.toml", key, &value.to_string(), &bound.to_string()] {
+            for part in ["own.toml", key, &cut(&value.to_string()), &bound.to_string()] {
                 assert!(error.contains(part), "{part}: {error}");
             }
         }

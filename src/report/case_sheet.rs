@@ -93,6 +93,9 @@ impl CaseSheet<'_> {
             };
             list.push((parameter.label.to_owned(), text));
         }
+        if let Some(duration_s) = self.subject.duration_s() {
+            list.push(("Duration of the motions".to_owned(), format!("{} s", value(duration_s))));
+        }
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         match (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw)) {
             (Some(gap_m), _) if ego_mps > 0.0 => {
@@ -235,6 +238,7 @@ impl CaseSheet<'_> {
             .iter()
             .filter(|parameter| parameter.per_si == 1.0)
             .filter_map(|parameter| Some((parameter.key.to_owned(), json!(point.get(parameter.quantity)?))))
+            .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
             .collect();
         records::document(&json!({
             "program": program(),

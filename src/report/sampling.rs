@@ -11,7 +11,7 @@ use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::sampling::{BootstrapRecord, EstimateRow, Levels, RiskRate, SampleTally};
+use crate::run::sampling::{EstimateRow, Levels, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, StopReason};
@@ -151,10 +151,10 @@ pub struct EstimateFile {
     pub estimates: Vec<EstimateRow>,
     /// Levels of the adaptive estimators, one per model.
     pub levels: Vec<Levels>,
-    /// The share of the data in the uncertainty, where asked for.
-    pub bootstrap: Option<BootstrapRecord>,
     /// Files beside this one.
     pub files: Vec<String>,
+    /// SHA-256 of `worst.csv`, where there is one.
+    pub worst_sha256: Option<String>,
     /// The machine.
     pub host: HostRecord,
 }
@@ -203,8 +203,8 @@ impl EstimateFile {
             reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
             estimates,
             levels: Vec::new(),
-            bootstrap: None,
             files: Vec::new(),
+            worst_sha256: None,
             host,
         }
     }
@@ -306,9 +306,6 @@ impl EstimateFile {
         if let Some(rule) = self.exposure_rule() {
             let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         }
-        if let Some(record) = &self.bootstrap {
-            text.push_str(&bootstrap_text(record));
-        }
         let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
         let rule = format!(
             "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
@@ -361,20 +358,6 @@ impl EstimateRow {
     pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
-}
-
-/// The data's share of the uncertainty.
-fn bootstrap_text(record: &BootstrapRecord) -> String {
-    let header = ["model", "criterion", "P over resampled scenarios", "per hour", "per 1000 km"];
-    let mut rows = table(header.map(str::to_owned).to_vec());
-    let ends = |e: Option<[f64; 2]>| e.map_or("unknown".to_owned(), |[a, b]| format!("{} … {}", short(a), short(b)));
-    for row in &record.rows {
-        let names = [row.model.name().to_owned(), row.criterion.label().to_owned()];
-        let values = [Some(row.probability), row.per_hour, row.per_1000_km];
-        rows.add_row(names.into_iter().chain(values.map(ends)).collect::<Vec<_>>());
-    }
-    let how = format!("95 % of {} replicates of {} samples each:\n", count(record.replicates), count(record.samples));
-    how + &aligned(rows, 2)
 }
 
 /// Three digits.

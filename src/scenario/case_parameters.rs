@@ -1,16 +1,24 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, in a row of a table.
 
-use super::{Category, LATERAL_DISTANCE_M, PlainCase};
+use serde::Deserialize;
+
+use super::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway, missing_parameter};
 use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::{Error, Place, Result};
 
-/// What was given; speeds in m/s, lengths in m, accelerations in m/s². The names are the flags of `simulate`.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
+pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
+
+/// What was given; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of `simulate`.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default)]
 #[allow(missing_docs)] // see PlainCase
 pub struct CaseParameters {
     pub category: Option<String>,
     pub ego_speed: Option<f64>,
     pub speed: Option<f64>,
+    pub gap: Option<f64>,
+    pub thw: Option<f64>,
     pub lateral_speed: Option<f64>,
     pub lateral_distance: Option<f64>,
     pub acceleration: Option<f64>,
@@ -19,6 +27,7 @@ pub struct CaseParameters {
     pub ahead_gap: Option<f64>,
     pub length: Option<f64>,
     pub width: Option<f64>,
+    pub duration: Option<f64>,
 }
 
 impl CaseParameters {
@@ -27,7 +36,7 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] where it is missing or unknown.
     pub fn category(&self) -> Result<Category> {
-        let text = needed(self.category.as_ref(), "category", "cut-in, cut-out or lvd")?;
+        let text = self.category.as_ref().ok_or_else(|| missing("category"))?;
         Category::parse(text).ok_or_else(|| {
             Error::usage(
                 Place::item("category"),
@@ -55,7 +64,26 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] for a value beyond the physical range, unless such are accepted.
     pub fn judge(&self, doubts: &mut Doubts) -> Result<()> {
-        let given = [
+        for (key, quantity, value) in self.numbers() {
+            let Some(value) = value else { continue };
+            doubts
+                .judge(quantity, value, || key.to_owned())
+                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
+        }
+        Ok(())
+    }
+
+    /// The names of what was given.
+    pub fn given(&self) -> Vec<&'static str> {
+        let numbers = self.numbers().into_iter().filter_map(|(key, _, value)| value.map(|_| key));
+        self.category.iter().map(|_| "category").chain(numbers).collect()
+    }
+
+    /// Every number with a range of plausible values.
+    fn numbers(&self) -> [(&'static str, Quantity, Option<f64>); 12] {
+        [
+            ("gap", Quantity::Gap, self.gap),
+            ("thw", Quantity::Headway, self.thw),
             ("ego_speed", Quantity::Speed, self.ego_speed),
             ("speed", Quantity::Speed, self.speed),
             ("end_speed", Quantity::Speed, self.end_speed),
@@ -66,14 +94,7 @@ impl CaseParameters {
             ("ahead_gap", Quantity::Gap, self.ahead_gap),
             ("length", Quantity::Length, self.length),
             ("width", Quantity::Width, self.width),
-        ];
-        for (key, quantity, value) in given {
-            let Some(value) = value else { continue };
-            doubts
-                .judge(quantity, value, || key.to_owned())
-                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
-        }
-        Ok(())
+        ]
     }
 
     /// The case; vehicles have the size given here by default.
@@ -83,28 +104,38 @@ impl CaseParameters {
     pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
         self.refuse_of_other_categories(category)?;
-        let ego_speed_mps =
-            at_least(*needed(self.ego_speed.as_ref(), "ego_speed", "a speed in m/s")?, 0.0, "ego_speed")?;
+        let number =
+            |key: &str| self.numbers().into_iter().find_map(|(known, _, value)| value.filter(|_| known == key));
+        if let Some(key) = missing_parameter(category, |key| number(key).is_some()) {
+            return Err(missing(key));
+        }
+        let given = |key: &str| number(key).unwrap_or(0.0);
+        let ego_speed_mps = at_least(given("ego_speed"), 0.0, "ego_speed")?;
+        self.check_start()?;
         let length_m = above_zero(self.length.unwrap_or(length_m), "length")?;
         let width_m = above_zero(self.width.unwrap_or(width_m), "width")?;
         let speed_mps = at_least(self.speed.unwrap_or(ego_speed_mps), 0.0, "speed")?;
         let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
         let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
-        let lateral_distance_m =
-            at_least(self.lateral_distance.unwrap_or(LATERAL_DISTANCE_M), 0.0, "lateral_distance")?;
-        let lateral_speed_mps = match category {
-            Category::Lvd => 0.0,
-            Category::CutIn | Category::CutOut => {
-                let rate = *needed(self.lateral_speed.as_ref(), "lateral_speed", "a speed in m/s")?;
-                above_zero(rate, "lateral_speed")?
-            }
+        let (lateral_speed_mps, lateral_distance_m) = match category {
+            Category::Lvd => (0.0, LATERAL_DISTANCE_M),
+            Category::CutIn | Category::CutOut => (
+                above_zero(given("lateral_speed"), "lateral_speed")?,
+                above_zero(self.lateral_distance.unwrap_or(LATERAL_DISTANCE_M), "lateral_distance")?,
+            ),
         };
-        let (ahead_gap_m, ahead_speed_mps) = if category == Category::CutOut {
-            let gap_m = at_least(*needed(self.ahead_gap.as_ref(), "ahead_gap", "a gap in m")?, 0.0, "ahead_gap")?;
-            (gap_m, at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?)
-        } else {
-            (0.0, 0.0)
+        let (ahead_gap_m, ahead_speed_mps) = match category {
+            Category::CutOut => (
+                at_least(given("ahead_gap"), 0.0, "ahead_gap")?,
+                at_least(self.ahead_speed.unwrap_or(0.0), 0.0, "ahead_speed")?,
+            ),
+            Category::CutIn | Category::Lvd => (0.0, 0.0),
         };
+        let (shortest_s, longest_s) = DURATIONS_S;
+        if let Some(duration_s) = self.duration.filter(|s| !(shortest_s..=longest_s).contains(s)) {
+            let help = format!("give seconds of at least {shortest_s} and at most {longest_s}");
+            return Err(Error::usage(Place::item("duration"), format!("{duration_s} cannot be used"), help));
+        }
         Ok(PlainCase {
             category,
             ego_speed_mps,
@@ -117,7 +148,22 @@ impl CaseParameters {
             ahead_gap_m,
             length_m,
             width_m,
+            duration_s: self.duration,
         })
+    }
+
+    /// Checks the initial distance, where one is given.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a gap and a headway, for one out of range, and for a headway of an ego at rest.
+    pub fn check_start(&self) -> Result<()> {
+        if self.gap.is_some() && self.thw.is_some() {
+            let problem = "both gap and time headway are given";
+            return Err(Error::usage(Place::item("thw"), problem, "leave one of the two empty"));
+        }
+        self.gap.map_or(Ok(0.0), |gap_m| at_least(gap_m, 0.0, "gap"))?;
+        self.thw.map_or(Ok(0.0), |thw_s| at_least(thw_s, 0.0, "thw"))?;
+        self.ego_speed.map_or(Ok(()), |ego_speed_mps| check_headway(ego_speed_mps, self.thw))
     }
 
     /// Refuses parameters that the category does not have. 0 is accepted, as it means none.
@@ -138,21 +184,22 @@ impl CaseParameters {
     }
 }
 
-/// What a user has to give.
-fn needed<'a, T>(value: Option<&'a T>, key: &str, what: &str) -> Result<&'a T> {
-    value.ok_or_else(|| {
-        Error::usage(
-            Place::item(key),
-            "it is missing",
-            format!("give {what} with option `{key}` or as `{key}` in the file"),
-        )
-    })
+/// The complaint about what a user has to give.
+fn missing(key: &str) -> Error {
+    let what = match key {
+        "category" => "cut-in, cut-out or lvd",
+        "ahead_gap" => "a gap in m",
+        "acceleration" => "an acceleration in m/s², below 0 for a leader that brakes,",
+        _ => "a speed in m/s",
+    };
+    let help = format!("give {what} with option `{key}` or as `{key}` in the file");
+    Error::usage(Place::item(key), "it is missing", help)
 }
 
 /// Beyond this no speed, length or acceleration is physical.
 const MAX_MAGNITUDE: f64 = 1e6;
 
-pub(crate) fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
+fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
     if value.abs() <= MAX_MAGNITUDE && value >= least {
         return Ok(value);
     }

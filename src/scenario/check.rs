@@ -34,6 +34,15 @@ pub(super) struct Problem {
 /// What no type says: lengths, signs and what a category needs.
 pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
+    for (field, text) in [("id", &s.id), ("recording", &s.recording)] {
+        if text.len() > MAX_ID_BYTES {
+            return Err(Problem {
+                field: field.into(),
+                problem: format!("has {} bytes; expected at most {MAX_ID_BYTES}", text.len()),
+                help: "give it a shorter name",
+            });
+        }
+    }
     expect((MIN_RATE_HZ..=MAX_MAGNITUDE).contains(&s.fps), "fps", s.fps, "a number of at least 0.1 and at most 1e6")?;
     above_zero("lane_width", s.lane_width)?;
     at_least_zero("ego.v0", s.ego.v0)?;
@@ -84,6 +93,9 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     }
     Ok(())
 }
+
+/// Longest name of a scenario or a recording: that of a file with some words more.
+const MAX_ID_BYTES: usize = 512;
 
 /// Minimum sample rate, Hz: a lower one cannot resolve a motion.
 const MIN_RATE_HZ: f64 = 0.1;

@@ -18,12 +18,11 @@ mod table_reader;
 
 pub use crate::model::case::{Ahead, Case, Category, Participant};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
-pub use crate::model::plain_case::{LATERAL_DISTANCE_M, PlainCase};
+pub use crate::model::plain_case::{LATERAL_DISTANCE_M, PlainCase, check_headway, missing_parameter};
 pub use case_parameters::CaseParameters;
-pub(crate) use case_parameters::at_least;
 pub(crate) use check::problem_of;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios};
 pub use found::ScenarioFile;
 pub use jsonl::write_scenarios_to;
 pub use mined::{Ego, Other, Scenario, Side};
-pub(crate) use parameter_table::ParameterRows;
+pub(crate) use parameter_table::{ParameterRows, RowPlace};

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value};
 
-use super::case_parameters::{CaseParameters, at_least};
+use super::case_parameters::{CaseParameters, DURATIONS_S};
 use super::check::name;
 use super::columns::{Chosen, HELP, choose, number};
 use super::found::{ScenarioFile, ScenariosRead};
@@ -40,8 +40,8 @@ const WIDTH_M: f64 = 1.9;
 const RATE_HZ: f64 = 25.0;
 /// Default minimum duration of a scenario, s.
 const MIN_DEFAULT_DURATION_S: f64 = 1.0;
-/// Maximum duration, s: the time cap of the paper's profile.
-const MAX_CASE_DURATION_S: f64 = 120.0;
+/// Fewest and most samples per second.
+const RATES_HZ: (f64, f64) = (1.0, 1000.0);
 /// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
@@ -89,23 +89,76 @@ impl ParameterRows {
                 let problem = format!("is {value}; expected {expected}");
                 return Err(Error::input(self.table.place(row, None).column(&column.column), problem, HELP));
             }
+            let (least, most) = RATES_HZ;
+            if key == "rate" && !value.as_f64().is_some_and(|rate_hz| (least..=most).contains(&rate_hz)) {
+                let help = format!("give a number of at least {least} and at most {most}");
+                return Err(Error::input(
+                    self.table.place(row, None).column(&column.column),
+                    format!("{value} cannot be used"),
+                    help,
+                ));
+            }
             map.insert(key.to_owned(), value);
         }
         Ok(map)
     }
 
-    /// An error about a value, with file, row and column.
-    pub fn at_row(&self, row: u64, error: Error) -> Error {
-        let Error::Usage { place, problem, help } = error else { return error };
-        Error::input(self.place(row, &place.item.unwrap_or_default(), None), problem, help)
+    /// Where the values of a row stand.
+    pub fn row_place(&self, row: u64) -> RowPlace {
+        let column = |column: &Chosen| (COLUMNS[column.field].0, column.column.clone());
+        RowPlace {
+            row: self.table.place(row, None),
+            columns: self.chosen.iter().map(column).collect(),
+            replaced: Vec::new(),
+        }
+    }
+}
+
+/// Where the values of a row stand: its file and line, and the columns as the file names them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct RowPlace {
+    row: Place,
+    columns: Vec<(&'static str, String)>,
+    /// Columns whose values count no longer.
+    replaced: Vec<&'static str>,
+}
+
+impl RowPlace {
+    /// A value of the row.
+    fn of(&self, key: &str) -> Place {
+        let column = self.columns.iter().find(|(known, _)| *known == key).map_or(key, |(_, column)| column);
+        self.row.clone().column(column)
     }
 
-    /// A value of a row, with its column as the file names it.
-    fn place(&self, row: u64, key: &str, item: Option<String>) -> Place {
-        let is = |column: &&Chosen| COLUMNS[column.field].0 == key;
-        let column = self.chosen.iter().find(is).map_or(key, |column| &column.column);
-        self.table.place(row, item).column(column)
+    /// The same with the scenario that the row became.
+    fn of_scenario(&self, key: &str, item: &str) -> Place {
+        let place = self.of(key);
+        // Of Parquet the item has the row.
+        let item = place.item.as_ref().map_or(item.to_owned(), |row| format!("{row}, {item}"));
+        place.of(item)
     }
+
+    /// The same without values that something else replaces.
+    pub fn without(mut self, keys: &[&'static str]) -> RowPlace {
+        self.replaced.extend(keys);
+        self
+    }
+
+    /// An error about a value, with file, row and column.
+    pub fn locate(&self, error: Error) -> Error {
+        match error {
+            Error::Usage { place, problem, help } => match &place.item {
+                Some(key) if !self.replaced.contains(&key.as_str()) => Error::input(self.of(key), problem, help),
+                _ => Error::Usage { place, problem, help },
+            },
+            other => other,
+        }
+    }
+}
+
+/// What a row says of its case.
+fn parameters(row: &Map<String, Value>) -> Result<CaseParameters> {
+    serde_json::from_value(Value::Object(row.clone())).map_err(|e| Error::Internal(format!("a row of a table: {e}")))
 }
 
 /// Every row as a scenario.
@@ -125,16 +178,17 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
             return Err(Error::input(rows.table.place(row, None).column("duration_s"), problem, help));
         }
         let mut doubts = found.doubts();
-        let place = |key: &str| rows.place(row, key, None).to_string();
+        let at = rows.row_place(row);
+        let place = |key: &str| at.of(key).to_string();
         let scenario = map.and_then(|map| {
-            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| rows.at_row(row, error))
+            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| at.locate(error))
         });
         match scenario {
             Err(error) => found.refuse(error),
             Ok(scenario) => {
                 found.add_doubts(doubts);
-                let item = Some(name(&scenario.id));
-                found.take(scenario, row, rows.table.word(), |field| rows.place(row, key_of(field), item.clone()));
+                let item = name(&scenario.id);
+                found.take(scenario, row, rows.table.word(), |field| at.of_scenario(key_of(field), &item));
             }
         }
     }
@@ -167,51 +221,15 @@ fn of_row(
     place: &dyn Fn(&str) -> String,
 ) -> Result<Scenario> {
     let text = |key: &str| map.get(key).and_then(Value::as_str).map(str::to_owned);
-    let value = |key: &str| map.get(key).and_then(Value::as_f64);
-    let mut parameters = CaseParameters {
-        category: text("category"),
-        ego_speed: value("ego_speed"),
-        speed: value("speed"),
-        lateral_speed: value("lateral_speed"),
-        lateral_distance: value("lateral_distance"),
-        acceleration: value("acceleration"),
-        end_speed: value("end_speed"),
-        ahead_speed: value("ahead_speed"),
-        ahead_gap: value("ahead_gap"),
-        length: value("length"),
-        width: value("width"),
-    };
+    let mut parameters = parameters(map)?;
     parameters.settle(doubts, place);
     let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
-    let case = plain.case(MAX_CASE_DURATION_S)?;
-    let in_range = |key: &str, default: f64, least: f64, most: f64| match value(key) {
-        None => Ok(default),
-        Some(value) if (least..=most).contains(&value) => Ok(value),
-        Some(value) => {
-            let help = format!("give a number of at least {least} and at most {most}");
-            Err(Error::usage(Place::item(key), format!("{value} cannot be used"), help))
-        }
-    };
-    let rate_hz = in_range("rate", RATE_HZ, 1.0, 1000.0)?;
-    let duration_s = in_range("duration", case.horizon_s.max(MIN_DEFAULT_DURATION_S), 0.1, MAX_CASE_DURATION_S)?;
-    let (gap0, thw0) = match (value("gap"), value("thw")) {
-        (Some(_), Some(_)) => {
-            return Err(Error::usage(
-                Place::item("thw"),
-                "both gap and time headway are given",
-                "leave one of the two empty",
-            ));
-        }
-        (Some(gap_m), None) => {
-            let gap_m = at_least(gap_m, 0.0, "gap")?;
-            (Some(gap_m), (plain.ego_speed_mps > 0.0).then(|| gap_m / plain.ego_speed_mps))
-        }
-        (None, Some(thw_s)) => {
-            let thw_s = at_least(thw_s, 0.0, "thw")?;
-            (Some(thw_s * plain.ego_speed_mps), Some(thw_s))
-        }
-        (None, None) => (None, None),
-    };
+    let case = plain.case(DURATIONS_S.1)?;
+    let rate_hz = map.get("rate").and_then(Value::as_f64).unwrap_or(RATE_HZ);
+    let duration_s = plain.duration_s.unwrap_or(case.horizon_s.max(MIN_DEFAULT_DURATION_S));
+    let of_headway = parameters.thw.map(|thw_s| thw_s * plain.ego_speed_mps);
+    let of_gap = parameters.gap.filter(|_| plain.ego_speed_mps > 0.0).map(|gap_m| gap_m / plain.ego_speed_mps);
+    let (gap0, thw0) = (parameters.gap.or(of_headway), parameters.thw.or(of_gap));
     // Whole steps, so that the last sample is not before the end.
     let count = ((duration_s * rate_hz - 1e-9).ceil() + 1.0).max(2.0);
     *samples += count;

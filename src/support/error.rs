@@ -2,10 +2,11 @@
 //! *what* was found or expected, and *what to do about it*. Texts name an option by its field: option `dt`, or
 //! option `backend = cpu`. The command line shows these as flags.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::support::plain_text::shown_in_line;
+use crate::support::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -26,7 +27,7 @@ pub struct Place {
     pub row: Option<u64>,
     /// Column name as the header has it.
     pub column: Option<String>,
-    /// The thing inside the file: a vehicle, a scenario key, a lane key.
+    /// The thing inside the file, of at most 80 characters: a vehicle, a scenario key, a lane key.
     pub item: Option<String>,
 }
 
@@ -38,7 +39,7 @@ impl Place {
 
     /// Something that is in no file: a scenario, a lane, a flag.
     pub fn item(item: impl Into<String>) -> Self {
-        Place { item: Some(item.into()), ..Place::default() }
+        Place::default().of(item)
     }
 
     /// An option of the library, by its field. The command line shows it as its flag.
@@ -54,22 +55,36 @@ impl Place {
 
     /// Adds the column.
     pub fn column(mut self, column: impl Into<String>) -> Self {
-        self.column = Some(column.into());
+        self.column = Some(name(column.into()));
         self
     }
 
     /// Adds the thing inside the file.
     pub fn of(mut self, item: impl Into<String>) -> Self {
-        self.item = Some(item.into());
+        self.item = Some(name(item.into()));
         self
     }
+}
+
+/// A name of a length that a message can hold, whatever the input calls itself.
+fn name(text: String) -> String {
+    match cut(&text) {
+        Cow::Borrowed(_) => text,
+        Cow::Owned(short) => short,
+    }
+}
+
+/// A path as a message shows it; what is longer than any path of the system is cut as a name is.
+fn path_name(path: &Path) -> String {
+    let text = path.display().to_string();
+    if text.len() > MAX_PATH { shown_in_line(&cut(&text)) } else { shown_in_line(&text) }
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = Vec::new();
         if let Some(file) = &self.file {
-            parts.push(shown_in_line(&file.display().to_string()));
+            parts.push(path_name(file));
         }
         if let Some(row) = self.row {
             parts.push(format!("line {row}"));
@@ -108,7 +123,7 @@ pub enum Error {
         help: String,
     },
     /// The system refused to read or write, or to start a thread.
-    #[error("{path}: cannot {action}: {source}", path = shown_in_line(&path.display().to_string()))]
+    #[error("{path}: cannot {action}: {source}", path = path_name(path))]
     Io {
         /// File or folder; for threads, whose they are.
         path: PathBuf,
@@ -153,17 +168,18 @@ pub enum Error {
 impl Error {
     /// Bad data at `place`.
     pub fn input(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
-        Error::Input { place: Box::new(place), problem: problem.into(), help: help.into() }
+        Error::Input { place: Box::new(place), problem: cut_names(&problem.into()), help: help.into() }
     }
 
     /// A flag, key or profile that cannot be used.
     pub fn usage(place: Place, problem: impl Into<String>, help: impl Into<String>) -> Self {
-        Error::Usage { place: Box::new(place), problem: problem.into(), help: help.into() }
+        Error::Usage { place: Box::new(place), problem: cut_names(&problem.into()), help: help.into() }
     }
 
     /// A compute device that is missing or failed.
     pub fn device(device: impl Into<String>, problem: impl Into<String>, help: impl Into<String>) -> Self {
-        Error::Device { device: device.into().into(), problem: problem.into().into(), help: help.into() }
+        let (device, problem) = (name(device.into()), cut_names(&problem.into()));
+        Error::Device { device: device.into(), problem: problem.into(), help: help.into() }
     }
 
     /// The system's refusal, with the path and what was tried.
@@ -177,6 +193,9 @@ impl Error {
             Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => {
                 (!help.is_empty()).then(|| help.clone())
             }
+            Error::Io { source, .. } if is_limit_of_open_files(source) => Some(
+                "the limit of open files is reached: raise it (`ulimit -n`), or close programs that hold many".to_owned(),
+            ),
             Error::Io { action, source, .. } => Some(match source.kind() {
                 std::io::ErrorKind::NotFound => "check the path for typing errors".to_owned(),
                 std::io::ErrorKind::PermissionDenied => {
@@ -211,4 +230,11 @@ impl Error {
             Error::Interrupted { .. } => Some("run the same command again: it continues".to_owned()),
         }
     }
+}
+
+/// Did the system refuse to open one more file (EMFILE, ENFILE)? By its text too: an error that was given a reason has no
+/// number.
+fn is_limit_of_open_files(source: &std::io::Error) -> bool {
+    let text = source.to_string();
+    cfg!(unix) && ["(os error 23)", "(os error 24)"].iter().any(|number| text.contains(number))
 }

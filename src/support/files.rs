@@ -56,6 +56,16 @@ pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -
     file.stage()?.publish()
 }
 
+/// The same for a file in a folder that a run owns: a link in its place is refused, not followed.
+///
+/// # Errors
+/// [`Error::Input`] for a link; [`Error::Io`].
+pub(crate) fn write_inside(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+    let mut file = AtomicFile::create_inside(path)?;
+    produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
+    file.stage()?.publish()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,15 +3,17 @@
 //! A pipe without a writer would be waited on for ever, and a device such as `/dev/zero` never ends.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
 use crate::{Error, Place, Result};
 
-/// Largest file of settings (profiles, exposures): those that the program writes have a few kilobytes.
-pub(crate) const MAX_SETTINGS_BYTES: u64 = 4 << 20;
+/// Largest file of settings (configurations, profiles, exposures): those that the program writes have a few kilobytes.
+pub(crate) const MAX_SETTINGS_BYTES: u64 = 1 << 20;
+/// Largest XML file: an OpenSCENARIO file has a few kilobytes, and some more for every second of a trajectory.
+pub(crate) const MAX_XML_BYTES: u64 = 4 << 20;
 /// Largest table that is held in memory as a whole: a few million rows.
 pub(crate) const MAX_TABLE_BYTES: u64 = 256 << 20;
 
@@ -54,6 +56,35 @@ pub(crate) fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
         ));
     }
     Ok(content)
+}
+
+/// As [`read`], of a JSON object. What does not begin and end as one, such as a file that was cut off, is refused by its
+/// first and last bytes, whatever its size. `kind` is what it should be: `a density file`.
+///
+/// # Errors
+/// As [`read`]; [`Error::Input`] with `help` for anything but `{…}`.
+pub(crate) fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Result<Vec<u8>> {
+    let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
+    if begin.trim_ascii_start().first() != Some(&b'{') || end.trim_ascii_end().last() != Some(&b'}') {
+        let problem = format!("not {kind}: it does not begin with {{ and end with }}");
+        return Err(Error::input(Place::file(path), problem, help));
+    }
+    read(path, largest)
+}
+
+/// The first and the last bytes of a file, 256 at most; the file is at its beginning then.
+pub(crate) fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
+    const BYTES: u64 = 256;
+    let length = file.seek(SeekFrom::End(0))?;
+    let piece = |file: &mut File, at: u64| {
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(at))?;
+        file.by_ref().take(BYTES).read_to_end(&mut bytes)?;
+        std::io::Result::Ok(bytes)
+    };
+    let (end, begin) = (piece(file, length.saturating_sub(BYTES))?, piece(file, 0)?);
+    file.rewind()?;
+    Ok((begin, end))
 }
 
 /// As [`read`], as text.

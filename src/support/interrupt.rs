@@ -1,8 +1,8 @@
 //! Ending early in good order: what a signal (SIGINT, SIGTERM, SIGHUP) or a time limit does to a run.
 //!
 //! A run that keeps a journal says so with [`resumable`] and asks [`requested`] between its chunks: the first
-//! signal lets it end by itself. Any other run, and any run at the second signal, ends at once: its unfinished
-//! files are removed and the exit status is 128 + the signal's number, as a shell expects.
+//! signal lets it end by itself, within [`LONGEST_WAIT`]. Any other run, and any run at the second signal, ends at once:
+//! its unfinished files are removed and the exit status is 128 + the signal's number, as a shell expects.
 //!
 //! State of the process, as signals are: a library user who calls none of these is not affected.
 
@@ -13,6 +13,13 @@ use std::time::{Duration, Instant};
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static GUARDS: AtomicUsize = AtomicUsize::new(0);
 static DEADLINE: Mutex<Option<Instant>> = Mutex::new(None);
+
+/// Exit status of a run that was interrupted and continues when it is run again.
+pub const EXIT_STATUS: u8 = 75;
+
+/// Longest wait for a run to end by itself after a signal. What is in the journal by then is kept; the work on the present
+/// chunk, or before the first one, is given up.
+pub const LONGEST_WAIT: Duration = Duration::from_secs(4);
 
 /// While it lives, the first signal is only noted, for [`requested`].
 #[derive(Debug)]
@@ -95,12 +102,27 @@ fn receive() -> std::io::Result<()> {
         for signal in signals.forever() {
             if GUARDS.load(Ordering::SeqCst) > 0 && !REQUESTED.swap(true, Ordering::SeqCst) {
                 say("ending after the present chunk; again to end at once");
+                give_up_after(LONGEST_WAIT);
             } else {
                 end_at_once(signal);
             }
         }
     };
     std::thread::Builder::new().name("signals".to_owned()).spawn(receiver).map(drop)
+}
+
+/// Ends the process if the run has not ended by itself by then. A run that is not asked to end any more runs on.
+#[cfg(unix)]
+fn give_up_after(wait: Duration) {
+    let give_up = move || {
+        std::thread::sleep(wait);
+        if REQUESTED.load(Ordering::SeqCst) {
+            say("the present chunk takes too long and is given up; the same command continues from the last record");
+            end_with(EXIT_STATUS.into());
+        }
+    };
+    // Without a thread the run still ends after its chunk, and at once at the second signal.
+    let _ = std::thread::Builder::new().name("end".to_owned()).spawn(give_up);
 }
 
 /// Is a signal ignored, or is that unknown? The system's mask of ignored signals begins with signal 1.
@@ -120,8 +142,13 @@ fn say(line: &str) {
 
 #[cfg(unix)]
 fn end_at_once(signal: i32) -> ! {
+    end_with(128 + signal)
+}
+
+#[cfg(unix)]
+fn end_with(status: i32) -> ! {
     // Nobody begins another file until the end.
     let _live = crate::support::live_files::remove_live();
     // Without the exit handlers of libraries (a driver's, say) whose threads are at work.
-    signal_hook::low_level::exit(128 + signal)
+    signal_hook::low_level::exit(status)
 }

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use crate::support::atomic_file::{is_named, refuse_link};
 use crate::{Error, Place, Result};
 
+/// A process id and an end of line are shorter.
+const MAX_LOCK_BYTES: u64 = 32;
+
 /// The right to write what a lock file stands for; dropping it removes the file and releases the lock.
 #[derive(Debug)]
 pub(crate) struct FolderLock {
@@ -51,6 +54,7 @@ impl FolderLock {
             if !is_named(path, &file) {
                 continue;
             }
+            refuse_foreign(path, &mut file)?;
             // Those who share it are many: no number is written.
             if is_alone { write_pid(&mut file) } else { file.set_len(0) }
                 .map_err(|source| Error::io(path, "write", source))?;
@@ -92,6 +96,17 @@ fn is_folder(path: &Path) -> bool {
     path.as_os_str().is_empty() || path.is_dir()
 }
 
+/// Refuses a file that no lock wrote: it would lose its content. A lock file holds a process id or nothing.
+fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
+    let mut text = Vec::new();
+    file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
+    if text.len() as u64 > MAX_LOCK_BYTES || !text.trim_ascii().iter().all(u8::is_ascii_digit) {
+        let problem = "it would be overwritten, and it is no lock file of lanesweep";
+        return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+    }
+    Ok(())
+}
+
 /// For the message to those who come too late.
 fn write_pid(file: &mut File) -> std::io::Result<()> {
     file.set_len(0)?;
@@ -102,7 +117,7 @@ fn write_pid(file: &mut File) -> std::io::Result<()> {
 fn held(path: &Path, file: &mut File) -> Error {
     let mut text = String::new();
     // Where locks are mandatory the holder's file cannot be read: then it stays without a number.
-    let pid = file.take(32).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
+    let pid = file.take(MAX_LOCK_BYTES).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
     let who = pid.map_or(String::new(), |pid| format!(" (pid {pid})"));
     Error::Busy {
         place: Box::new(Place::file(path)),
@@ -136,7 +151,11 @@ mod tests {
     fn the_lock_file_of_a_killed_process_is_taken_over() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("run.lock");
-        fs::write(&path, "4000000000 and a longer text than any number\n").unwrap();
+        fs::write(&path, "my notes\n").unwrap();
+        let error = FolderLock::acquire(&path).unwrap_err();
+        assert!(error.to_string().contains("no lock file of lanesweep"), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "my notes\n");
+        fs::write(&path, "4000000000\n").unwrap();
         let lock = FolderLock::acquire(&path).unwrap();
         if cfg!(unix) {
             assert_eq!(fs::read_to_string(&path).unwrap().trim(), std::process::id().to_string());

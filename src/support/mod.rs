@@ -15,6 +15,7 @@ pub(crate) mod near_name;
 pub(crate) mod plain_text;
 pub mod plausibility;
 pub(crate) mod readable;
+pub(crate) mod repeats;
 pub(crate) mod round_step;
 pub mod run_dir;
 pub mod table;

@@ -1,7 +1,13 @@
 //! The known name that an unknown one was probably meant to be, for messages.
 
-/// The likeliest of some names, if its likeness, 0 to 1, is above `least`. Case and separators do not count.
+use super::plain_text::MAX_NAME;
+
+/// The likeliest of some names, if its likeness, 0 to 1, is above `least`. Case and separators do not count. A text that is
+/// longer than any name resembles none.
 pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
+    if wrong.len() > 4 * MAX_NAME {
+        return None;
+    }
     let plain = |text: &str| text.trim().to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
     let wrong = plain(wrong);
     let likeness = |name: &str| strsim::jaro_winkler(&wrong, &plain(name));

@@ -10,6 +10,50 @@ pub(crate) fn acts(c: char) -> bool {
         || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}')
 }
 
+/// Characters of a name in a message: an id, a key, a value.
+pub(crate) const MAX_NAME: usize = 80;
+/// Characters of a word in a message that may be a path, as systems bound it.
+pub(crate) const MAX_PATH: usize = 4096;
+/// Characters of a message.
+const MAX_MESSAGE: usize = 16_384;
+
+/// A name of at most [`MAX_NAME`] characters: of a longer one the beginning and the end.
+pub(crate) fn cut(name: &str) -> Cow<'_, str> {
+    cut_to(name, MAX_NAME)
+}
+
+fn cut_to(text: &str, most: usize) -> Cow<'_, str> {
+    // A character has at least a byte.
+    if text.len() <= most || text.chars().count() <= most {
+        return Cow::Borrowed(text);
+    }
+    let tail = most / 3;
+    let at = |(at, _): (usize, char)| at;
+    let end = text.char_indices().nth(most - tail - 1).map_or(text.len(), at);
+    let begin = text.char_indices().nth_back(tail - 1).map_or(0, at);
+    Cow::Owned(format!("{}\u{2026}{}", &text[..end], &text[begin..]))
+}
+
+/// A message that repeats no text of any size: what is quoted, and every word that is no path, is cut as a name is.
+pub(crate) fn cut_names(message: &str) -> String {
+    let mut out = String::with_capacity(message.len().min(MAX_MESSAGE));
+    let mut rest = message;
+    while let Some(at) = rest.find(['`', '"']) {
+        let (quote, inside) = (&rest[at..=at], &rest[at + 1..]);
+        let Some(end) = inside.find(quote) else { break };
+        out += &cut_words(&rest[..at]);
+        out.extend([quote, &cut(&inside[..end]), quote]);
+        rest = &inside[end + 1..];
+    }
+    out += &cut_words(rest);
+    cut_to(&out, MAX_MESSAGE).into_owned()
+}
+
+fn cut_words(text: &str) -> String {
+    let most = |word: &str| if word.contains(['/', '\\']) { MAX_PATH } else { MAX_NAME };
+    text.split_inclusive(char::is_whitespace).map(|word| cut_to(word, most(word))).collect()
+}
+
 fn escaped(text: &str, stays: &[char]) -> String {
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
@@ -66,6 +110,30 @@ mod tests {
             assert!(matches!(shown(plain), Cow::Borrowed(same) if same == plain), "{plain}");
         }
         assert_eq!(shown_in_line("a\nb"), "a\\nb");
+    }
+
+    #[test]
+    fn a_name_in_a_message_has_at_most_80_characters_and_a_sentence_stays() {
+        let long = format!("{}\u{e9}{}", "a".repeat(1 << 20), "z".repeat(1 << 20));
+        let short = cut(&long);
+        assert!(short.chars().count() == MAX_NAME && short.starts_with("aaa") && short.ends_with("zzz"), "{short}");
+        assert_eq!(cut(&"\u{e9}".repeat(MAX_NAME)), "\u{e9}".repeat(MAX_NAME));
+        let path = format!("/data/{}/tracks.csv", "folder/".repeat(30));
+        let plain =
+            format!("{path}: there is no `laneId`, expected \"x\" or `y` \u{2013} a sentence of any length stays ")
+                .repeat(20);
+        assert_eq!(cut_names(&plain), plain);
+        for hostile in [
+            format!("unknown field `{long}`, expected `a`"),
+            format!("invalid type: string \"{long}\", expected f64"),
+            format!("scenario {long} is not whole"),
+            format!("`{long}` of `{}` b`", long.replace('a', "a b`c ")),
+            format!("{long}/{long}"),
+        ] {
+            let told = cut_names(&hostile);
+            assert!(told.chars().count() <= MAX_MESSAGE, "{} characters of {told:.200}", told.len());
+        }
+        assert_eq!(cut_names(&format!("no `{long}` here")).chars().count(), MAX_NAME + 10);
     }
 
     #[test]

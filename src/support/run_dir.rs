@@ -1,9 +1,10 @@
 //! A run's folder: one run at a time writes it, and its record stands beside the files of one run only.
 //!
-//! Results are written under hidden names. Once all are on the disk, the former record goes, the results get their names in
-//! quick succession, and the new record gets its own last. From before the first change until after the last,
-//! `unfinished.json` lists every file that may be there: the next run removes what it does not write itself, and readers of
-//! files that stand for themselves (recordings) refuse the folder. What no record lists is never removed.
+//! `lanesweep-files.json` lists the files of every run in the folder, with a checksum. Nothing that it does not list is
+//! removed or replaced. Results are written under hidden names. Once all are on the disk, the list holds the former and the
+//! new files as incomplete, the former record goes, the results get their names in quick succession, the new record gets
+//! its own, and the list is complete. After a kill in between, the next run removes what it does not write itself, and
+//! readers of files that stand for themselves (recordings) refuse the folder.
 //!
 //! Parts of a run share the folder with one another and keep whole runs out: [`parts`](crate::run::parts).
 
@@ -12,9 +13,11 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::support::atomic_file::{AtomicFile, StagedFile, clear_stale, refuse_link, sync_folder};
-use crate::support::files::make_folder;
+use crate::support::files::{make_folder, write_inside};
+use crate::support::hex::hex;
 use crate::support::input_file;
 use crate::support::live_files::Live;
 use crate::support::lock::FolderLock;
@@ -37,17 +40,21 @@ const RECORDS: [&str; 5] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_R
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
 
-/// Lists the files that a run is giving their names, while it does so.
-const UNFINISHED: &str = "unfinished.json";
+/// Lists the files of the runs in a folder.
+const LIST: &str = "lanesweep-files.json";
 
-/// Endings of results: whatever a record lists, nothing else is removed.
-const ENDINGS: [&str; 10] = [".csv", ".svg", ".json", ".html", ".txt", ".jsonl", ".parquet", ".xosc", ".xodr", ".sh"];
+const LIST_VERSION: u64 = 1;
 
-#[derive(Serialize, Deserialize)]
-struct Unfinished {
-    /// Its record: once that is there, the files are whole.
-    record: String,
-    files: Vec<String>,
+/// Files that every run of a record writes. A file of the user's with such a name is found before the work starts.
+fn usual_files(record: &str) -> &'static [&'static str] {
+    match record {
+        STUDY_RECORD => &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"],
+        ESTIMATE_RECORD => &["estimates.csv", "report.html"],
+        MAP_RECORD => &["cells.csv", "report.html"],
+        COMPARE_RECORD => &["compare.csv", "compare.txt", "report.html"],
+        DOSSIER_RECORD => &["hidden.csv", "report.html"],
+        _ => &[],
+    }
 }
 
 /// The right to write a run's folder, until it is dropped.
@@ -66,12 +73,14 @@ impl OutputDir {
     /// hidden names is removed.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process writes it; [`Error::Usage`] where it holds another verb's run;
-    /// [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
+    /// [`Error::Busy`] where another process writes it; [`Error::Usage`] where it holds another verb's run, or files that
+    /// no run listed under the names of this run's; [`Error::Input`] for a link in the place of lock or record, or a damaged
+    /// list; [`Error::Io`].
     pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
         let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
         folder.enter_lock();
         folder.refuse_another_verb(record)?;
+        folder.refuse_foreign(usual_files(record).iter().copied().chain([record]))?;
         Ok(folder)
     }
 
@@ -99,7 +108,7 @@ impl OutputDir {
         let lock = Some(lock(&dir.join(LOCK))?);
         let live = if is_new { vec![Live::enter(dir.to_path_buf())] } else { Vec::new() };
         let folder = OutputDir { dir: dir.to_path_buf(), record, is_new, lock, live };
-        record.into_iter().chain([UNFINISHED]).try_for_each(|name| refuse_link(&dir.join(name)))?;
+        record.into_iter().chain([LIST]).try_for_each(|name| refuse_link(&dir.join(name)))?;
         clear_stale(dir, None);
         Ok(folder)
     }
@@ -121,27 +130,47 @@ impl OutputDir {
     pub fn results(&self) -> Result<Results<'_>> {
         // It was there before the work; where it vanished meanwhile, the result is worth another one.
         make_folder(&self.dir)?;
-        Ok(Results { folder: self, staged: Vec::new(), elsewhere: Vec::new(), kept: BTreeSet::new() })
+        let (kept, named) = (BTreeSet::new(), BTreeSet::new());
+        Ok(Results { folder: self, staged: Vec::new(), elsewhere: Vec::new(), kept, named })
     }
 
     fn refuse_another_verb(&self, record: &str) -> Result<()> {
-        let others = RECORDS.iter().filter(|other| RECORDS.contains(&record) && **other != record);
-        for other in others {
-            if Listed::read(&self.dir.join(other)).program.starts_with("lanesweep ") {
-                let problem = format!("it holds the results of another verb, those of {other}");
-                let help = "give another option `out`: both would write files of the same names";
-                return Err(Error::usage(Place::file(&self.dir), problem, help));
-            }
+        let of_another = |run: &&RunFiles| {
+            let other = run.record.as_deref().unwrap_or_default();
+            RECORDS.contains(&record) && RECORDS.contains(&other) && other != record
+        };
+        if let Some(run) = FileList::read(&self.dir)?.runs.iter().find(of_another) {
+            let other = run.record.as_deref().unwrap_or_default();
+            let problem = format!("it holds the results of another verb, those of {other}");
+            let help = "give another option `out`: both would write files of the same names";
+            return Err(Error::usage(Place::file(&self.dir), problem, help));
         }
         Ok(())
     }
 
-    /// What the former run left: the files of its record, and those of a run that ended while they got their names.
-    fn former(&self) -> BTreeSet<String> {
-        let mut files: BTreeSet<String> =
-            self.record.into_iter().flat_map(|name| listed(&self.dir.join(name))).collect();
-        files.extend(unfinished(&self.dir).into_iter().flatten());
-        files
+    /// Refuses to replace files that no run in this folder wrote.
+    fn refuse_foreign<'n>(&self, names: impl Iterator<Item = &'n str>) -> Result<()> {
+        let list = FileList::read(&self.dir)?;
+        let is_foreign = |name: &&str| !list.holds(name) && self.dir.join(name).symlink_metadata().is_ok();
+        let Some(name) = { names }.find(is_foreign) else { return Ok(()) };
+        refuse_link(&self.dir.join(name))?;
+        let problem = format!("it would be overwritten, and {LIST} does not list it as a result of an earlier run");
+        let help = "move it away, or give another option `out`";
+        Err(Error::usage(Place::file(self.dir.join(name)), problem, help))
+    }
+
+    /// What the former run left: its files, and those of a run that ended while they got their names.
+    fn former(&self) -> Result<BTreeSet<String>> {
+        Ok(FileList::read(&self.dir)?.take(self.record).files.into_iter().collect())
+    }
+
+    /// Lists the files of this folder's run.
+    fn list(&self, files: BTreeSet<String>, is_complete: bool) -> Result<()> {
+        let mut list = FileList::read(&self.dir)?;
+        list.take(self.record);
+        let record = self.record.map(str::to_owned);
+        list.runs.push(RunFiles { record, files: files.into_iter().collect(), is_complete });
+        list.write(&self.dir)
     }
 }
 
@@ -162,6 +191,8 @@ pub struct Results<'a> {
     staged: Vec<(String, StagedFile)>,
     elsewhere: Vec<StagedFile>,
     kept: BTreeSet<String>,
+    /// Files in this folder whose paths the user gave: they may replace any.
+    named: BTreeSet<String>,
 }
 
 impl Results<'_> {
@@ -198,15 +229,22 @@ impl Results<'_> {
         };
         let is_inside = folder_of(file.target()) == self.folder.dir.canonicalize().ok();
         match file.target().file_name().and_then(|name| name.to_str()) {
-            Some(name) if is_inside => self.staged.push((name.to_owned(), file)),
+            Some(name) if is_inside => {
+                self.named.insert(name.to_owned());
+                self.staged.push((name.to_owned(), file));
+            }
             _ => self.elsewhere.push(file),
         }
     }
 
     /// Keeps the former run's files of these names, as files of this one.
-    pub fn keep(&mut self, is_kept: impl Fn(&str) -> bool) {
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a damaged list of files.
+    pub fn keep(&mut self, is_kept: impl Fn(&str) -> bool) -> Result<()> {
         let is_there = |name: &String| is_kept(name) && self.folder.dir.join(name).is_file();
-        self.kept = self.folder.former().into_iter().filter(is_there).collect();
+        self.kept = self.folder.former()?.into_iter().filter(is_there).collect();
+        Ok(())
     }
 
     /// The names of all files in the folder, sorted: what the record lists.
@@ -218,11 +256,11 @@ impl Results<'_> {
     /// Puts the results, and the record as the last of them, in the place of the former run's.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for two files of one name.
+    /// [`Error::Io`]; [`Error::Usage`] for two files of one name, or a file in the way that no run listed.
     pub fn publish(mut self, record: &[u8]) -> Result<()> {
-        let names = self.names();
-        let dir = &self.folder.dir;
-        let Some(name) = self.folder.record else {
+        let names: BTreeSet<String> = self.names().into_iter().collect();
+        let (folder, dir) = (self.folder, &self.folder.dir);
+        let Some(name) = folder.record else {
             return Err(Error::Internal("a folder without a record was to get one".to_owned()));
         };
         let mut seen = BTreeSet::from([name]);
@@ -230,17 +268,12 @@ impl Results<'_> {
             let problem = "it would be overwritten: it is a result of this run";
             return Err(Error::usage(Place::file(dir.join(doubled)), problem, "choose another path"));
         }
+        self.refuse_foreign([name])?;
         let mut last = AtomicFile::create_inside(&dir.join(name))?;
         last.append(record)?;
         let last = last.stage()?;
-        let written: BTreeSet<&String> = names.iter().collect();
-        let stale: Vec<String> = self.folder.former().into_iter().filter(|file| !written.contains(file)).collect();
-        let files = names.iter().chain(&stale).cloned().collect();
-        let unfinished = serde_json::to_vec(&Unfinished { record: name.to_owned(), files })
-            .map_err(|e| Error::Internal(format!("{UNFINISHED} cannot be written: {e}")))?;
-        let mut list = AtomicFile::create_inside(&dir.join(UNFINISHED))?;
-        list.append(&unfinished)?;
-        list.stage()?.publish()?;
+        let stale: Vec<String> = folder.former()?.into_iter().filter(|file| !names.contains(file)).collect();
+        folder.list(names.iter().chain(&stale).cloned().collect(), false)?;
         remove(&dir.join(name))?;
         sync_folder(dir);
         stale.iter().try_for_each(|file| remove(&dir.join(file)))?;
@@ -248,17 +281,27 @@ impl Results<'_> {
         self.staged.drain(..).try_for_each(|(_, file)| file.place())?;
         sync_folder(dir);
         last.publish()?;
-        remove(&dir.join(UNFINISHED))
+        folder.list(names, true)
     }
 
-    /// Gives the files their names, without a record.
+    /// Gives the files their names beside those of earlier runs, without a record.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`]; [`Error::Usage`] for a file in the way that no run listed.
     pub fn publish_each(self) -> Result<()> {
+        self.refuse_foreign([])?;
+        let folder = self.folder;
+        let mut files = folder.former()?;
+        files.extend(self.names());
+        folder.list(files, true)?;
         self.staged.into_iter().try_for_each(|(_, file)| file.place())?;
-        sync_folder(&self.folder.dir);
+        sync_folder(&folder.dir);
         Ok(())
+    }
+
+    fn refuse_foreign<const N: usize>(&self, record: [&str; N]) -> Result<()> {
+        let staged = self.staged.iter().map(|(name, _)| name.as_str()).filter(|name| !self.named.contains(*name));
+        self.folder.refuse_foreign(staged.chain(record))
     }
 }
 
@@ -269,58 +312,89 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// What a record says of itself.
-#[derive(Default, Deserialize)]
-struct Listed {
-    #[serde(default)]
-    program: String,
-    #[serde(default)]
+/// The files of one run, or of all runs without a record.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunFiles {
+    /// Name of the run's record.
+    record: Option<String>,
+    /// Names of the other files.
     files: Vec<String>,
+    /// False while they get their names. Once the record is there, all are.
+    is_complete: bool,
 }
 
-impl Listed {
-    /// One that cannot be read says nothing.
-    fn read(record: &Path) -> Listed {
-        let text = input_file::read(record, input_file::MAX_TABLE_BYTES).unwrap_or_default();
-        serde_json::from_slice(&text).unwrap_or_default()
+/// The content of [`LIST`].
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileList {
+    lanesweep_files: u64,
+    runs: Vec<RunFiles>,
+    /// SHA-256 of the runs' text. It tells a list of this program from other files; it is no signature.
+    sha256: String,
+}
+
+impl FileList {
+    /// The list of a folder; empty where there is none.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that is no whole list; [`Error::Io`].
+    fn read(dir: &Path) -> Result<FileList> {
+        let path = dir.join(LIST);
+        if path.symlink_metadata().is_err() {
+            return Ok(FileList { lanesweep_files: LIST_VERSION, runs: Vec::new(), sha256: String::new() });
+        }
+        let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
+        let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|file| file == name.as_str());
+        let list = serde_json::from_slice::<FileList>(&text).ok().filter(|list| {
+            let mut names = list.runs.iter().flat_map(|run| run.files.iter().chain(&run.record));
+            let is_ours = list.lanesweep_files == LIST_VERSION && list.checksum().is_ok_and(|sum| sum == list.sha256);
+            is_ours && names.all(|name| is_plain(name) && !name.starts_with('.'))
+        });
+        list.ok_or_else(|| {
+            let problem = "this is no whole list of the files that lanesweep wrote here";
+            Error::input(
+                Place::file(path),
+                problem,
+                "move it away with the results beside it, or give another option `out`",
+            )
+        })
+    }
+
+    fn checksum(&self) -> Result<String> {
+        let text = serde_json::to_vec(&self.runs).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
+        Ok(hex(&Sha256::digest(text)))
+    }
+
+    fn write(mut self, dir: &Path) -> Result<()> {
+        self.runs.sort_by(|a, b| a.record.cmp(&b.record));
+        self.sha256 = self.checksum()?;
+        let text = serde_json::to_vec(&self).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
+        write_inside(&dir.join(LIST), |file| file.write_all(&text))
+    }
+
+    /// Whether some run has this file.
+    fn holds(&self, name: &str) -> bool {
+        self.runs.iter().any(|run| run.record.as_deref() == Some(name) || run.files.iter().any(|file| file == name))
+    }
+
+    /// Takes a run out of the list.
+    fn take(&mut self, record: Option<&str>) -> RunFiles {
+        let at = self.runs.iter().position(|run| run.record.as_deref() == record);
+        at.map_or_else(RunFiles::default, |at| self.runs.remove(at))
     }
 }
 
-/// The files beside a record that it lists: plain names of results only.
-fn listed(record: &Path) -> Vec<String> {
-    let files = if record.extension().is_some_and(|ending| ending == "csv") {
-        let text = input_file::read_text(record, input_file::MAX_TABLE_BYTES).unwrap_or_default();
-        let rows = csv::Reader::from_reader(text.as_bytes()).into_records().flatten();
-        rows.flat_map(|row| row.iter().take(2).map(str::to_owned).collect::<Vec<_>>()).collect()
-    } else {
-        Listed::read(record).files
-    };
-    files.into_iter().filter(|name| is_result_name(name)).collect()
-}
-
-fn is_result_name(name: &str) -> bool {
-    let is_plain = Path::new(name).file_name().is_some_and(|file| file == name) && !name.starts_with('.');
-    is_plain && ENDINGS.iter().any(|ending| name.ends_with(ending))
-}
-
-/// Does a record in this folder list the file, or is it a record?
+/// Is this a result of a run in the folder, or its record?
 pub fn is_listed(dir: &Path, name: &str) -> bool {
-    let is_of = |record: &str| {
-        let path = dir.join(record);
-        path.exists() && (name == record || listed(&path).iter().any(|file| file == name))
-    };
-    RECORDS.iter().any(|record| is_of(record))
+    FileList::read(dir).is_ok_and(|list| list.holds(name))
 }
 
-/// The files of a folder whose run ended while they got their names; `None` where none did.
+/// The files of runs that ended while their files got their names; `None` where all are whole.
 pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
-    let text = input_file::read(&dir.join(UNFINISHED), input_file::MAX_TABLE_BYTES).ok()?;
-    let found: Unfinished = serde_json::from_slice(&text).ok()?;
-    // Between the record's name and the end: all is there.
-    if is_result_name(&found.record) && dir.join(&found.record).exists() {
-        return None;
-    }
-    Some(found.files.into_iter().filter(|name| is_result_name(name)).collect())
+    let is_cut = |run: &RunFiles| !run.is_complete && run.record.as_ref().is_some_and(|name| !dir.join(name).exists());
+    let cut: Vec<RunFiles> = FileList::read(dir).ok()?.runs.into_iter().filter(is_cut).collect();
+    (!cut.is_empty()).then(|| cut.into_iter().flat_map(|run| run.files).collect())
 }
 
 #[cfg(test)]
@@ -354,23 +428,65 @@ mod tests {
         fs::write(out.join("map-of-germany.svg"), "mine").unwrap();
         publish(&folder(&out), &["a.csv", "b.svg"], "first");
         publish(&folder(&out), &["b.svg", "c.csv"], "second");
-        assert_eq!(names(&out), ["b.svg", "c.csv", "map-of-germany.svg", "map.json"]);
+        assert_eq!(names(&out), ["b.svg", "c.csv", LIST, "map-of-germany.svg", "map.json"]);
         assert_eq!(fs::read_to_string(out.join("b.svg")).unwrap(), "second");
         assert!(is_listed(&out, "b.svg") && is_listed(&out, "map.json") && !is_listed(&out, "map-of-germany.svg"));
     }
 
+    fn refusal(result: Result<OutputDir>) -> String {
+        let error = result.unwrap_err();
+        assert!(matches!(error, Error::Usage { .. } | Error::Input { .. }), "{error}");
+        error.to_string()
+    }
+
     #[test]
-    fn a_forged_record_removes_no_file_but_results_in_the_folder_itself() {
+    fn what_a_foreign_record_names_stays_and_the_record_is_refused_by_name() {
         let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        fs::create_dir_all(out.join("inner")).unwrap();
-        let others = [dir.path().join("a.csv"), out.join("inner/a.csv"), out.join("notes.md"), out.join(".a.csv")];
-        others.iter().for_each(|path| fs::write(path, "mine").unwrap());
-        let forged =
-            serde_json::json!({"files": ["../a.csv", "inner/a.csv", "notes.md", ".a.csv", dir.path().join("a.csv")]});
-        fs::write(out.join("map.json"), forged.to_string()).unwrap();
-        publish(&folder(&out), &["b.csv"], "text");
-        assert!(others.iter().all(|path| path.exists()));
+        let out = dir.path();
+        fs::write(out.join("a.csv"), "mine").unwrap();
+        for foreign in
+            [r#"{"program":"QGIS 3","files":["a.csv"]}"#, r#"{"program":"lanesweep 0.1.0","files":["a.csv"]}"#]
+        {
+            fs::write(out.join(MAP_RECORD), foreign).unwrap();
+            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(MAP_RECORD));
+            assert_eq!(fs::read_to_string(out.join(MAP_RECORD)).unwrap(), foreign);
+        }
+        fs::remove_file(out.join(MAP_RECORD)).unwrap();
+        fs::write(out.join("report.html"), "mine").unwrap();
+        assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains("report.html"), "before the work starts");
+        fs::remove_file(out.join("report.html")).unwrap();
+        let folder = folder(out);
+        let mut results = folder.results().unwrap();
+        results.add("a.csv", b"text").unwrap();
+        let error = results.publish(b"{}").unwrap_err();
+        assert!(error.to_string().contains("a.csv") && error.to_string().contains("does not list it"), "{error}");
+        assert_eq!(names(out), ["a.csv", LOCK]);
+        assert_eq!(fs::read_to_string(out.join("a.csv")).unwrap(), "mine");
+    }
+
+    #[test]
+    fn a_list_that_is_not_ours_or_damaged_removes_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        publish(&folder(out), &["a.csv", "b.csv"], "first");
+        let whole = fs::read_to_string(out.join(LIST)).unwrap();
+        for changed in
+            ["{}".to_owned(), whole.replace("a.csv", "c.csv"), whole.replace(":1,", ":2,"), whole[..40].to_owned()]
+        {
+            fs::write(out.join(LIST), &changed).unwrap();
+            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(LIST), "{changed}");
+            assert!(!is_listed(out, "a.csv") && unfinished(out).is_none());
+            assert_eq!(fs::read_to_string(out.join(LIST)).unwrap(), changed);
+        }
+        // Even with a checksum, a list leads to plain names in the folder only.
+        for name in ["../a.csv", "inner/a.csv", ".a.csv", ""] {
+            let run = RunFiles { record: None, files: vec![name.to_owned()], is_complete: true };
+            FileList { lanesweep_files: LIST_VERSION, runs: vec![run], sha256: String::new() }.write(out).unwrap();
+            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(LIST), "{name}");
+        }
+        fs::write(out.join(LIST), whole).unwrap();
+        publish(&folder(out), &["b.csv"], "second");
+        assert_eq!(names(out), ["b.csv", LIST, "map.json"]);
     }
 
     #[test]
@@ -378,17 +494,41 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         // As left by one that had begun to replace another: no record, files of both.
-        let list = Unfinished { record: "map.json".to_owned(), files: vec!["a.csv".to_owned(), "b.csv".to_owned()] };
+        let cut = || {
+            let files = vec!["a.csv".to_owned(), "b.csv".to_owned()];
+            let run = RunFiles { record: Some("map.json".to_owned()), files, is_complete: false };
+            FileList { lanesweep_files: LIST_VERSION, runs: vec![run], sha256: String::new() }.write(out).unwrap();
+        };
         for (name, text) in [("a.csv", "first"), ("b.csv", "second"), ("other.csv", "mine")] {
             fs::write(out.join(name), text).unwrap();
         }
-        fs::write(out.join(UNFINISHED), serde_json::to_vec(&list).unwrap()).unwrap();
+        cut();
         assert_eq!(unfinished(out).unwrap(), ["a.csv", "b.csv"]);
         publish(&folder(out), &["c.csv"], "third");
-        assert_eq!(names(out), ["c.csv", "map.json", "other.csv"]);
+        assert_eq!(names(out), ["c.csv", LIST, "map.json", "other.csv"]);
         // One that had its record already is whole.
-        fs::write(out.join(UNFINISHED), serde_json::to_vec(&list).unwrap()).unwrap();
+        cut();
         assert!(unfinished(out).is_none());
+    }
+
+    #[test]
+    fn files_without_a_record_stay_beside_one_another_and_replace_no_foreign_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        let add = |name: &str, text: &str| {
+            let folder = OutputDir::open_without_record(out).unwrap();
+            let mut results = folder.results().unwrap();
+            results.add(name, text.as_bytes()).unwrap();
+            results.publish_each()
+        };
+        add("a.json", "first").unwrap();
+        add("b.json", "second").unwrap();
+        add("a.json", "third").unwrap();
+        fs::write(out.join("c.json"), "mine").unwrap();
+        assert!(add("c.json", "fourth").unwrap_err().to_string().contains("c.json"));
+        let texts: Vec<String> =
+            ["a.json", "b.json", "c.json"].map(|n| fs::read_to_string(out.join(n)).unwrap()).into();
+        assert_eq!(texts, ["third", "second", "mine"]);
     }
 
     #[test]
@@ -424,7 +564,7 @@ mod tests {
         let (out, precious) = (dir.path().join("out"), dir.path().join("precious"));
         fs::create_dir(&out).unwrap();
         fs::write(&precious, "mine").unwrap();
-        for name in [LOCK, MAP_RECORD, UNFINISHED, "a.csv"] {
+        for name in [LOCK, MAP_RECORD, LIST, "a.csv"] {
             std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
             let refused = match OutputDir::open(&out, MAP_RECORD) {
                 Ok(folder) => folder.results().unwrap().add("a.csv", b"text").unwrap_err(),

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 
 use crate::support::input_file;
 use crate::support::near_name::nearest;
+use crate::support::plain_text::cut_names;
 use crate::{Error, Place, Result};
 
 /// The settings in a text; `place` is what errors name, `help` tells where the keys are described.
@@ -22,8 +23,9 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str, place: &Place, help: &str) 
                 place.item = key_before(text, span.start).map(|key| format!("`{key}`"));
             }
         }
-        let problem = in_words(e.message());
-        match meant(e.message()) {
+        let message = cut_names(e.message());
+        let problem = in_words(&message);
+        match meant(&message) {
             Some(name) => Error::usage(place, problem, format!("did you mean `{name}`? {help}")),
             None => Error::usage(place, problem, help),
         }

@@ -86,6 +86,7 @@ pub fn chunk(
         outcomes: if with_outcomes { lanes.iter().map(outcome).collect() } else { Vec::new() },
         valued: None,
         counts: Vec::new(),
+        redone_and_rechecked: [0; 2],
     }
 }
 

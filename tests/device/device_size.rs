@@ -56,7 +56,9 @@ fn plan(units: usize, variants: usize, headways: usize) -> LanePlan {
         first_unit: 0,
         first_lane: 0,
     }];
-    let headways = (0..headways).map(|h| Headway::GapM(if touches(h) { -1.0 } else { 5.0 })).collect();
+    // Each once: 1 m of overlap or 5 m of gap, and a tenth of a millimetre more for each.
+    let gap_m = |h: usize| if touches(h) { -1.0 } else { 5.0 } + 1e-4 * h as f64;
+    let headways = (0..headways).map(|h| Headway::GapM(gap_m(h))).collect();
     LanePlan::new(profile, ModelId::ALL.to_vec(), headways, blocks, Box::new(source)).unwrap()
 }
 

@@ -38,6 +38,7 @@ fn case(category: Category, ego_mps: f64, speed_mps: f64) -> PlainCase {
         ahead_gap_m: 0.0,
         length_m: 4.3,
         width_m: 1.9,
+        duration_s: None,
     }
 }
 

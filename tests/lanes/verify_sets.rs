@@ -241,7 +241,7 @@ fn empty_sets_and_categories_named_twice_are_refused() {
     let none = RandomOptions { lanes_per_model_and_category: 0, ..RandomOptions::default() };
     assert!(random_plan(&paper, &none).is_err());
     let twice = RandomOptions { categories: vec![Category::Lvd, Category::Lvd], ..RandomOptions::default() };
-    assert!(random_plan(&paper, &twice).err().unwrap().to_string().contains("LVD is named twice"));
+    assert!(random_plan(&paper, &twice).err().unwrap().to_string().contains("`LVD` is given twice"));
     let no_category = ThresholdOptions { categories: vec![], ..ThresholdOptions::default() };
     assert!(threshold_plan(&paper, &no_category).is_err());
     let no_unit = ThresholdOptions { units_per_threshold: 0, ..ThresholdOptions::default() };

@@ -170,3 +170,110 @@ fn what_holds_no_case_is_refused_with_what_to_give() {
         assert!((2..=3).contains(&code) && error.contains(says), "{args:?}: {code} {error}");
     }
 }
+
+#[test]
+fn a_check_of_lanes_with_too_many_steps_is_refused_in_seconds() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("cap.toml");
+    let profile = include_str!("../../configs/profiles/jrc-2021.toml");
+    assert!(profile.contains("time_cap_s = 34.9"));
+    let case = "check --category cut-in --ego-speed 30 --speed 20 --gap 36 --lateral-speed 1 --profiles";
+    // A cap that lost its point; then the longest one, whose lanes never settle.
+    for (cap, dt, expected) in [
+        ("34900.0", "0.1", "0.001 to 3600 s"),
+        ("3600.0", "0.01", "too many steps"),
+        ("3600.0", "0.002", "too many steps"),
+    ] {
+        let changed = profile
+            .replace("time_cap_s = 34.9", &format!("time_cap_s = {cap}"))
+            .replace("dt_s = 0.1", &format!("dt_s = {dt}"));
+        std::fs::write(&path, changed).unwrap();
+        let started = std::time::Instant::now();
+        let (code, _, error) = check(&case.split(' ').chain([text(&path)]).collect::<Vec<_>>());
+        // The drawing breaks long lines.
+        let error = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(code == 2 && error.contains(expected) && error.contains("time_cap_s"), "{cap}: {code} {error}");
+        assert!(started.elapsed() < std::time::Duration::from_secs(30), "{cap}: {:?}", started.elapsed());
+    }
+}
+
+/// Descriptions of a case as flags, and what is wrong with each: the key, and a part of the sentence.
+const CONTRADICTIONS: [(&str, &str, &str); 15] = [
+    ("lvd --ego-speed 30 --thw 1", "acceleration", "it is missing"),
+    ("lvd --ego-speed 30 --thw 1 --end-speed 0", "acceleration", "it is missing"),
+    ("lvd --ego-speed 30 --thw 1 --acceleration 0 --end-speed 0", "end_speed", "without an acceleration"),
+    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 40", "end_speed", "cannot be reached"),
+    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 30", "end_speed", "would have no effect"),
+    ("lvd --ego-speed 30 --thw 1 --acceleration 5 --end-speed 40", "acceleration", "leader of an LVD faster"),
+    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --ahead-gap 40", "ahead_gap", "no such parameter"),
+    ("lvd --ego-speed 0 --thw 1 --acceleration -5 --speed 20", "thw", "is no distance"),
+    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --end-speed 10", "end_speed", "without an acceleration"),
+    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --acceleration 2 --end-speed 10", "end_speed", "cannot be"),
+    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 0", "lateral_speed", "0 cannot be used"),
+    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --lateral-distance 0", "lateral_distance", "0 cannot be used"),
+    ("cut-in --ego-speed 30 --thw 1", "lateral_speed", "it is missing"),
+    ("cut-out --ego-speed 30 --thw 1 --lateral-speed 1", "ahead_gap", "it is missing"),
+    ("cut-out --ego-speed 30 --thw 1 --lateral-speed 1 --ahead-gap 40 --end-speed 9", "end_speed", "without"),
+];
+
+#[test]
+fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from_every_source() {
+    let dir = tempfile::tempdir().unwrap();
+    let (toml, table) = (dir.path().join("case.toml"), dir.path().join("case.csv"));
+    let out = dir.path().join("out");
+    for (case, key, problem) in CONTRADICTIONS {
+        let flags: Vec<&str> = std::iter::once("--category").chain(case.split(' ')).collect();
+        let pairs: Vec<(String, &str)> =
+            flags.chunks(2).map(|pair| (pair[0][2..].replace('-', "_"), pair[1])).collect();
+        let line = |(key, value): &(String, &str)| match key.as_str() {
+            "category" => format!("{key} = \"{value}\"\n"),
+            _ => format!("{key} = {value}\n"),
+        };
+        std::fs::write(&toml, pairs.iter().map(line).collect::<String>()).unwrap();
+        let [keys, values]: [Vec<&str>; 2] =
+            [pairs.iter().map(|(key, _)| key.as_str()).collect(), pairs.iter().map(|(_, value)| *value).collect()];
+        std::fs::write(&table, format!("{}\n{}\n", keys.join(","), values.join(","))).unwrap();
+        let xosc = ["export", "xosc", "--out", text(&out)];
+        for (args, is_of_table) in [
+            ([&["check"], &flags[..]].concat(), false),
+            ([&["simulate"], &flags[..]].concat(), false),
+            ([&xosc[..], &flags[..]].concat(), false),
+            (vec!["check", text(&toml)], false),
+            (vec!["simulate", "--case-file", text(&toml)], false),
+            ([&xosc[..], &["--case-file", text(&toml)]].concat(), false),
+            (vec!["check", text(&table)], true),
+            (vec!["simulate", "--table", text(&table)], true),
+            (vec!["study", "--dry-run", "--scenarios", text(&table)], true),
+        ] {
+            let (code, _, error) = check(&args);
+            let said = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+            assert_eq!(code, if is_of_table { 3 } else { 2 }, "{args:?}: {said}");
+            let place = if is_of_table { format!("line 2, column `{key}`: ") } else { format!("{key}: ") };
+            assert!(said.contains(&place) && said.contains(problem), "{args:?}: {said}");
+        }
+    }
+    assert!(!out.exists());
+    // A cell of a map is a case.
+    for (values, problem) in [
+        ("--x deceleration_mps2=0..9/1 --set end_speed_kmh=0", "without an acceleration"),
+        ("--x deceleration_mps2=1..9/1 --set end_speed_kmh=200", "cannot be reached"),
+        ("--x end_speed_kmh=0..60/10", "needs the leader's deceleration"),
+    ] {
+        let map = "map lvd --y ego_speed_kmh=60,120 --set thw_s=1 --out";
+        let args: Vec<&str> = map.split(' ').chain([text(&out)]).chain(values.split(' ')).collect();
+        let (code, _, error) = check(&args);
+        let said = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(code == 2 && said.contains(problem), "{values}: {said}");
+    }
+    // A value that was typed is not of the table.
+    std::fs::write(&table, "category,ego_speed,thw,acceleration\nlvd,30,1,-5\n").unwrap();
+    let (code, _, error) = check(&["check", text(&table), "--end-speed", "40"]);
+    assert!(code == 2 && error.contains("end_speed: 40 m/s cannot be reached"), "{error}");
+}
+
+#[test]
+fn an_end_speed_a_perturbation_away_from_the_initial_one_is_still_a_case() {
+    let case = "check --category lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 29.99 --profiles paper";
+    let (code, out, error) = check(&case.split(' ').collect::<Vec<_>>());
+    assert!(code == 0 && out.contains("preventable"), "{error}");
+}

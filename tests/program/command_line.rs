@@ -220,9 +220,29 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--threads", "0"], 2, "use at least 1"),
         (&["study", "--scenarios", "no-such-file.jsonl"], 6, "no-such-file.jsonl"),
         (&["simulate", "--category", "cutin"], 2, "use cut-in, cut-out or lvd"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--gap", "5", "--models", "XYZ"], 2, "Reg157, CCHDM"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--models", "RSS"], 2, "at least 0"),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--models", "RSS"], 2, "--thw"),
+        (
+            &[
+                "simulate",
+                "--category",
+                "lvd",
+                "--ego-speed",
+                "20",
+                "--gap",
+                "5",
+                "--acceleration",
+                "-6",
+                "--models",
+                "XYZ",
+            ],
+            2,
+            "Reg157, CCHDM",
+        ),
+        (
+            &["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--acceleration", "-6"],
+            2,
+            "at least 0",
+        ),
+        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--acceleration", "-6"], 2, "--thw"),
         (&["conformance"], 2, "nothing to compare"),
         (&["conformance", &no_table], 3, "no conformance table"),
     ];
@@ -232,6 +252,61 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         assert_eq!(code(&output), expected, "{args:?}: {said}");
         assert!(said.contains(hint), "{args:?} should say `{hint}`: {said}");
         assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn a_list_with_a_value_twice_is_refused_with_the_value() {
+    let lane = "01_cut_in_81_74_836/S/0.6s/RSS";
+    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
+    let export = ["export", "xosc", "--scenarios", text(&scenarios), "--lane", lane, "--lane"];
+    let case = "--category lvd --ego-speed 20 --gap 20 --acceleration -6 --models FSM,fsm";
+    let case: Vec<&str> = case.split(' ').collect();
+    let lists: [(&[&str], &str); 18] = [
+        (&["study", "--thw", "0.6,0.6"], "--thw: `0.6` is given twice"),
+        (&["study", "--thw", "0.6,1, 0.60"], "--thw: `0.60` repeats `0.6`"),
+        (&["study", "--thw", "0.6,0.6000000001"], "--thw: `0.6000000001` repeats `0.6`"),
+        (&["study", "--thw", "r157,1,r157"], "--thw: `r157` is given twice"),
+        (&["compare", "--thw", "1,1.0"], "--thw: `1.0` repeats `1`"),
+        (&["justify", "--parameterization", "2", "--models", "FSM", "--thw", "1,1"], "--thw: `1` is given twice"),
+        (&["study", "--models", "FSM,RSS,FSM"], "--models: `FSM` is given twice"),
+        (&["study", "--models", "FSM", "--models", "all"], "--models: `all` repeats `FSM`"),
+        (&["study", "--categories", "lvd,cut-in,cut_in"], "--categories: `cut_in` repeats `cut-in`"),
+        (&["fit", "--parameterizations", "2,i,2"], "--parameterizations: `2` is given twice"),
+        (&["compare", "--parameterizations", "all,2"], "--parameterizations: `2` repeats `all`"),
+        (&["map", "lvd", "--preset", "r157", "--models", "RSS,RSS"], "--models: `RSS` is given twice"),
+        (&["conformance", "a.csv", "./a.csv"], "FILE: `./a.csv` repeats `a.csv`"),
+        (
+            &["sample", "a.json", "--estimator", "is", "--proposal", "p.json", "--proposal", "p.json"],
+            "--proposal: `p.json` is given twice",
+        ),
+        (&[&["simulate"], &case[..]].concat(), "models: `fsm` repeats `FSM`"),
+        (&[&["export", "xosc"], &case[..]].concat(), "models: `fsm` repeats `FSM`"),
+        (
+            &[
+                "check",
+                "--category",
+                "lvd",
+                "--ego-speed",
+                "20",
+                "--gap",
+                "9",
+                "--acceleration",
+                "-6",
+                "--profiles",
+                "paper,paper",
+            ],
+            "--profiles: `paper` is given twice",
+        ),
+        (&[&export[..], &["01_cut_in_81_74_836/S/0.60s/RSS"]].concat(), "01_cut_in_81_74_836/S/0.6s/RSS"),
+    ];
+    for (args, expected) in lists {
+        let output = lanesweep(args);
+        // The drawing breaks long lines.
+        let said = stderr(&output);
+        let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert_eq!(code(&output), 2, "{args:?}: {said}");
+        assert!(said.contains(expected) && said.contains("give every value once"), "{args:?}: {said}");
     }
 }
 
@@ -346,16 +421,112 @@ fn an_error_stream_that_takes_nothing_does_not_end_the_work() {
     assert_eq!(run("study --synth-recordings"), Some(2));
 }
 
+/// Runs the case in a shell with a limit.
 #[cfg(unix)]
+fn limited(limit: &str, args: &str) -> Output {
+    let script = format!("ulimit {limit}; exec \"$0\" {args}");
+    std::process::Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_lanesweep")]).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
 #[test]
-fn threads_that_the_system_does_not_give_are_no_defect_of_the_program() {
-    for limit in ["ulimit -v 3000000", "ulimit -v 1500000"] {
-        let script = format!("{limit}; exec \"$0\" {CASE} --thw 1 --threads 4096");
-        let output = std::process::Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_lanesweep")]).output();
-        let output = output.unwrap();
-        assert_eq!(code(&output), 6, "{limit}: {}", stderr(&output));
-        assert!(stderr(&output).contains("--threads 4096: cannot start"), "{limit}: {}", stderr(&output));
+fn an_address_space_that_is_too_small_is_told_with_its_limit_and_is_no_crash() {
+    // Below, the system's loader does not get as far as the program.
+    let is_loaded = |kib: &u32| limited(&format!("-v {kib}"), "--version").status.success();
+    let mut limits = (20_000..400_000).step_by(1000).skip_while(|kib| !is_loaded(kib)).step_by(2).take(25);
+    let (mut done, mut refused) = (0, 0);
+    assert!(limits.all(|kib| {
+        let output = limited(&format!("-v {kib}"), &format!("{CASE} --thw 1 --threads 4096"));
+        let said = stderr(&output);
+        match output.status.code() {
+            Some(0) => done += 1,
+            Some(6) => refused += 1,
+            other => panic!("{kib} KiB: {other:?} {:?} {said}", output.status),
+        }
+        assert!(output.status.success() || said.contains("ulimit -v"), "{kib} KiB: {said}");
+        true
+    }));
+    println!("{done} runs were done, {refused} were refused");
+    assert!(refused > 0);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_stack_that_a_shell_allows_does_not_matter() {
+    for kib in [16, 64, 100, 1000] {
+        let output = limited(&format!("-s {kib}"), &format!("{CASE} --thw 1"));
+        assert!(output.status.success(), "{kib} KiB: {:?} {}", output.status, stderr(&output));
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn too_many_open_files_are_answered_with_their_limit() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
+    let mut refused = 0;
+    for files in 4..12 {
+        let study = format!("study --scenarios {} --backend cpu --out {}", text(&scenarios), text(dir.path()));
+        let output = limited(&format!("-n {files}"), &study);
+        let said = stderr(&output);
+        assert!([0, 6].contains(&code(&output)), "{files}: {said}");
+        if code(&output) == 6 {
+            assert!(said.contains("ulimit -n") && !said.contains("disk"), "{files}: {said}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 0);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_standard_output_does_not_take_is_no_success() {
+    let run = |args: &str, to: std::process::Stdio| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+        command.args(args.split(' ')).stdout(to).output().unwrap()
+    };
+    let help = ["--help", "-h", "--version", "help", "study --help", "config -h", "help study"];
+    let printed =
+        ["config completions bash", "config init -", "config show", "config schema", &format!("{CASE} --thw 1")];
+    for args in help.into_iter().chain(printed) {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = run(args, full.into());
+        assert!(code(&output) == 6 && stderr(&output).contains("standard output"), "{args}: {}", stderr(&output));
+        // A reader that goes away is no error.
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        assert_eq!(code(&run(args, writer.into())), 0, "{args}");
+    }
+}
+
+#[test]
+fn threads_beyond_the_useful_number_are_not_started_and_said_once() {
+    let (one, many) = (["--threads", "1"], ["--threads", "4096"]);
+    let case: Vec<&str> = CASE.split(' ').chain(["--thw", "1"]).collect();
+    let (one, many) = (lanesweep(&[&case[..], &one].concat()), lanesweep(&[&case[..], &many].concat()));
+    assert_eq!((code(&one), code(&many)), (0, 0), "{}", stderr(&many));
+    assert!(one.stdout == many.stdout && !stderr(&one).contains("--threads"));
+    assert_eq!(stderr(&many).matches("--threads 4096: ").count(), 1, "{}", stderr(&many));
+    let dir = tempfile::tempdir().unwrap();
+    let fit =
+        ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--valid-draws"];
+    let density = dir.path().join("d.json");
+    assert_eq!(code(&lanesweep(&[&fit[..], &["1000", "--no-comparison", "--out", text(&density)]].concat())), 0);
+    let estimate = |threads: &str| {
+        let out = dir.path().join(threads);
+        let flags =
+            ["--samples", "1000", "--models", "FSM", "--backend", "cpu", "--threads", threads, "--out", text(&out)];
+        let sample = lanesweep(&[&["-q", "sample", text(&density)], &flags[..]].concat());
+        assert_eq!(code(&sample), 0, "{}", stderr(&sample));
+        let mut record: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(out.join("estimate.json")).unwrap()).unwrap();
+        let host = record.as_object_mut().unwrap().remove("host").unwrap();
+        (host["threads"].as_u64().unwrap(), record)
+    };
+    let ((_, one), (threads, many)) = (estimate("1"), estimate("2048"));
+    let cores = std::thread::available_parallelism().unwrap().get() as u64;
+    assert!(threads <= 4 * cores, "{threads} threads on {cores} cores");
+    assert_eq!(one, many);
 }
 
 #[test]

@@ -125,7 +125,7 @@ fn spellings_of_the_release_before_are_understood() {
         "compare --parameterization i",
         "simulate --category lvd --model all --plot a.svg --until 3",
         "export xosc --category lvd --model FSM",
-        "sample d.json --until 0.1 --pilot 500 --worst-share 0.1 --broad 0 --defence 0 --bootstrap-samples 100",
+        "sample d.json --until 0.1 --pilot 500 --worst-share 0.1 --broad 0 --defence 0",
         "verify --lanes 10",
         "conformance --scenarios s.jsonl --lanes lanes.csv",
         "merge result",

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 fn lanesweep(folder: &Path, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
@@ -26,6 +27,19 @@ fn scripts(folder: &Path, out: &str, args: &[&str]) -> [(PathBuf, String); 3] {
         assert!(stdout.contains(&format!("{}: ", path.display())), "{stdout}");
         let text = std::fs::read_to_string(&path).unwrap();
         (path, text)
+    })
+}
+
+/// A density of synthetic cut-ins.
+fn density() -> &'static [u8] {
+    static DENSITY: OnceLock<Vec<u8>> = OnceLock::new();
+    DENSITY.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let fit = "-q fit --synth-recordings 3 --synth-duration 300 --categories cut-in --parameterizations 2 \
+                   --no-comparison --valid-draws 1000 --out d.json";
+        let made = lanesweep(dir.path(), &fit.split_whitespace().collect::<Vec<_>>());
+        assert!(made.status.success(), "{}", said(&made.stderr));
+        std::fs::read(dir.path().join("d.json")).unwrap()
     })
 }
 
@@ -73,6 +87,8 @@ fn any_path_gives_valid_shell() {
     for (k, out) in ["plain", "my runs", "it's", "a\"b", "$HOME", "50%", "`id`", "a;b&c", "#1"].iter().enumerate() {
         let program = format!("./{out}/lanesweep {k}");
         let run = ["--", "sample", "densities/cut in $1's.json", "--samples", "1000000000"];
+        std::fs::create_dir_all(dir.path().join("densities")).unwrap();
+        std::fs::write(dir.path().join(run[2]), density()).unwrap();
         let args = [&["slurm", "--array", "3", "--program", &program, "--out", out], &run[..]].concat();
         for (path, _) in scripts(dir.path(), out, &args) {
             let parsed = Command::new("bash").arg("-n").arg(&path).output().unwrap();
@@ -97,6 +113,7 @@ fn submit_gives_the_program_the_arguments_as_typed() {
     std::fs::write(&echo, "#!/bin/sh\nfor a in \"$@\"; do echo \"<$a>\"; done\nexit 1\n").unwrap();
     std::fs::set_permissions(&echo, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
     let run = ["--", "sample", "it's $HOME \"x\".json", "--samples=5", "--thw", "1.2,0.4"];
+    std::fs::write(dir.path().join(run[2]), density()).unwrap();
     let args = [&["slurm", "--array", "3", "--program", "./echo args", "--out", "o"], &run[..]].concat();
     let [_, _, (submit, _)] = scripts(dir.path(), "o", &args);
     let ended = Command::new("bash").arg(submit).current_dir("/").output().unwrap();
@@ -198,4 +215,52 @@ fn what_cannot_work_is_refused_and_nothing_is_written() {
         assert_eq!(lanesweep(dir.path(), &["slurm", "s.toml", "--array", tasks, "--out", "o"]).status.code(), Some(2));
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, content) in [
+        ("broken.toml", &b"[score\n"[..]),
+        ("wrong.toml", b"[score]\nbootstrap_drawz = 5\n"),
+        ("profile.toml", b"[run]\nprofile = \"papr\"\n"),
+        ("scenarios.csv", b"category,ego_speed\nlvd,30\n"),
+        ("d.json", density()),
+    ] {
+        std::fs::write(dir.path().join(name), content).unwrap();
+    }
+    let before = std::fs::read_dir(dir.path()).unwrap().count();
+    let start = ["cluster", "slurm", "--array", "3", "--out", "o"];
+    for (run, told) in [
+        ("-- study --profile papr", "did you mean `paper`"),
+        ("-- study --models XYZ", "--models: there is no driver model `XYZ`"),
+        ("-- study --thw nonsense", "--thw: `nonsense` is not a time headway"),
+        ("-- study --thw 1,1.0", "`1.0` repeats `1`"),
+        ("-- study --categories cutin", "there is no category `cutin`"),
+        ("-- study --dt 0", "--dt"),
+        ("-- study --config score.seed=x", "`x` cannot be used"),
+        ("-- study --rows lanes.csv", "--plan-only"),
+        ("-- study --synth-recordings 0", "outside 1 to 99"),
+        ("-- study --scenarios scenarios.csv", "column `acceleration`: it is missing"),
+        ("-- study --scenarios nothing.jsonl", "nothing.jsonl: cannot read"),
+        ("-- study nothing", "nothing"),
+        ("broken.toml", "broken.toml"),
+        ("wrong.toml", "bootstrap_drawz"),
+        ("profile.toml", "papr"),
+        ("-- sample d.json --models XYZ", "--models: there is no driver model `XYZ`"),
+        ("-- sample d.json --thw 0.6,0.6", "`0.6` is given twice"),
+        ("-- sample d.json --estimator subset", "cannot be split"),
+        ("-- sample d.json --given nothing=3", "nothing"),
+        ("-- sample d.json --level 2", "--level"),
+        ("-- sample nothing.json", "nothing.json: cannot read"),
+        ("-- sample scenarios.csv", "scenarios.csv"),
+    ] {
+        let refused = lanesweep(dir.path(), &start.into_iter().chain(run.split(' ')).collect::<Vec<_>>());
+        let stderr = said(&refused.stderr);
+        assert!(refused.status.code().is_some_and(|code| [2, 3, 6].contains(&code)), "{run}: {stderr}");
+        assert!(stderr.contains(told), "{run}: {stderr}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), before, "{run} wrote something");
+    }
+    let good = lanesweep(dir.path(), &start.into_iter().chain("-- sample d.json".split(' ')).collect::<Vec<_>>());
+    assert!(good.status.success(), "{}", said(&good.stderr));
 }

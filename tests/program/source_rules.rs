@@ -1,7 +1,9 @@
 //! Rules for the repository's own sources: every combination of features is checked by CI, and the places that leave the
 //! compiler's guarantees say why. Licences, origins and duplicates of other crates are `cargo deny`'s (`deny.toml`).
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// How far above an unsafe place its `SAFETY` comment may begin, lines.
 const SAFETY_WITHIN: usize = 5;
@@ -23,6 +25,35 @@ fn every_combination_of_features_is_built() {
     assert_eq!(features, ["default", "gpu", "parquet"], "build each new combination in .ci/run (none, each one, all)");
     let run = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
     assert!(run.contains("for features in \"\" gpu parquet; do"), "none and each one are not built");
+}
+
+/// Packages with their features in the dependency tree of these edges.
+fn features_of(edges: &str) -> BTreeMap<String, String> {
+    let cargo = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args(["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p}|{f}", "--edges", edges])
+        .output()
+        .expect("cargo");
+    assert!(cargo.status.success(), "{}", String::from_utf8_lossy(&cargo.stderr));
+    let text = String::from_utf8(cargo.stdout).expect("text");
+    let package = |line: &str| {
+        let (name, features) = line.trim_end_matches(" (*)").split_once('|')?;
+        Some((name.to_owned(), features.to_owned()))
+    };
+    text.lines().filter_map(package).collect()
+}
+
+/// A crate with other features is compiled again, and all that stands on it: the README's second command took as long as
+/// its first.
+#[test]
+fn tests_reuse_the_crates_that_the_program_was_built_with() {
+    let (program, tests) = (features_of("normal,build"), features_of("normal,build,dev"));
+    let other: Vec<String> = program
+        .iter()
+        .filter(|(package, features)| tests.get(*package) != Some(*features))
+        .map(|(package, features)| format!("{package}: {features}; with tests {:?}", tests.get(package)))
+        .collect();
+    assert!(program.len() > 100 && other.is_empty(), "ask for these features in [dependencies] too: {other:#?}");
 }
 
 /// The Rust files below a folder.

@@ -122,6 +122,67 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     code
 }
 
+/// Ten scenarios of 100 s, as a file.
+fn long_scenarios(dir: &Path) -> PathBuf {
+    let golden = std::fs::read_to_string(crate::common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let mut scenario: serde_json::Value = serde_json::from_str(golden.lines().next().unwrap()).unwrap();
+    let samples = 2500;
+    let speeds: Vec<f64> = (0..samples).map(|k| 25.0 + f64::from(k % 100) / 100.0).collect();
+    let lateral: Vec<f64> = (0..samples).map(|k| 3.5 - 3.5 * f64::from(k) / f64::from(samples)).collect();
+    (scenario["kept"], scenario["reason"]) = (true.into(), "".into());
+    (scenario["frame0"], scenario["frame1"]) = (0.into(), (samples - 1).into());
+    (scenario["target"]["v"], scenario["target"]["y"]) = (speeds.into(), lateral.into());
+    let line = |k: i32| {
+        scenario["id"] = format!("long-{k}").into();
+        format!("{scenario}\n")
+    };
+    let scenarios = dir.join("long.jsonl");
+    std::fs::write(&scenarios, (0..10).map(line).collect::<String>()).unwrap();
+    scenarios
+}
+
+#[test]
+fn a_dry_run_makes_the_series_of_few_of_many_long_scenarios() {
+    let dir = tempfile::tempdir().unwrap();
+    let scenarios = long_scenarios(dir.path());
+    // All series have 1.7 GB at this time step, those of one scenario 0.2 GB.
+    let script =
+        "ulimit -v 700000; exec \"$0\" -q --threads 1 study --dry-run --backend cpu --dt 0.0001 --scenarios \"$1\"";
+    let run = Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_lanesweep")]).arg(scenarios).output().unwrap();
+    let (said, told) = (String::from_utf8_lossy(&run.stderr), String::from_utf8_lossy(&run.stdout));
+    assert_eq!(run.status.code(), Some(0), "{said}");
+    // What the run itself will hold is told all the same.
+    let peak = told.split("Memory  about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().replace(',', "");
+    assert!(peak.parse::<f64>().unwrap() > 1000.0, "{told}");
+}
+
+#[test]
+fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
+    let dir = tempfile::tempdir().unwrap();
+    // The first chunk alone, a scenario, takes 15 s.
+    let mut study = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
+        .args(["-q", "--threads", "1", "study", "--reference", "--dt", "0.0001", "--scenarios"])
+        .args([&long_scenarios(dir.path()), Path::new("--out"), &dir.path().join("out")])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_until("the folder is locked", || {
+        assert!(study.try_wait().unwrap().is_none(), "the study ended before it was interrupted");
+        dir.path().join("out/run.lock").exists()
+    });
+    // The first chunk begins.
+    std::thread::sleep(Duration::from_millis(500));
+    send("TERM", study.id());
+    let sent = Instant::now();
+    let code = ended(&mut study);
+    let waited = sent.elapsed();
+    let said = std::io::read_to_string(study.stderr.take().unwrap()).unwrap();
+    // A second for a machine that is busy with other tests.
+    assert!(waited < Duration::from_secs(6), "{waited:?}: {said}");
+    assert!(code == Some(75) && said.contains("the same command continues"), "{code:?}: {said}");
+    assert!(!dir.path().join("out/run.lock").exists(), "the lock goes");
+}
+
 #[test]
 fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
@@ -227,7 +288,8 @@ impl Session for AskedSession<'_> {
     fn run(&mut self, units: Range<u64>, _: Wanted) -> lanesweep::Result<Chunk> {
         let first_lane = self.0.first_lane_of(units.start);
         let verdicts = vec![Verdicts::default(); (self.0.first_lane_of(units.end) - first_lane) as usize];
-        Ok(Chunk { units, first_lane, verdicts, outcomes: Vec::new(), valued: None, counts: Vec::new() })
+        let (outcomes, counts) = (Vec::new(), Vec::new());
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked: [0; 2] })
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {

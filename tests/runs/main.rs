@@ -9,6 +9,7 @@ mod interrupted;
 mod justify;
 mod kills;
 mod map;
+mod mutations;
 mod nothing_is_lost;
 mod parts;
 mod reruns;

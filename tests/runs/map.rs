@@ -159,7 +159,7 @@ fn every_cell_is_the_lane_that_its_numbers_say() {
         },
         GridParts {
             fixed: vec![value(lvd, "thw_s", 0.8), value(lvd, "end_speed_kmh", 20.0)],
-            ..parts(lvd, "deceleration_mps2=0..9/1", "ego_speed_kmh=30..130/20")
+            ..parts(lvd, "deceleration_mps2=1..9/1", "ego_speed_kmh=30..130/20")
         },
         GridParts { native_gap: true, ..parts(lvd, "deceleration_mps2=5..10/0.5", "ego_speed_kmh=30..130/20") },
     ];
@@ -427,6 +427,7 @@ fn the_same_files_come_from_any_number_of_threads() {
             "cut_in_fsm.svg",
             "cut_in_fsm_against_jrc-2021.svg",
             "differences.csv",
+            "lanesweep-files.json",
             "map.json",
             "report.html",
         ]
@@ -578,7 +579,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     for cell in 0..map.cell_count() {
         let point = grid.point(cell);
         let gap_m = point.get(MapQuantity::Gap).unwrap();
-        let subject = Subject::plain(&point.plain_case(Category::CutIn, &profile), Headway::GapM(gap_m));
+        let subject = Subject::plain(&point.plain_case(Category::CutIn, &profile).unwrap(), Headway::GapM(gap_m));
         let check = Check { subject, profiles: vec![profile.clone()], models: vec![ModelId::Cchdm] };
         let flips = &check.run().unwrap()[0].models[0].flips;
         assert_eq!(!flips.is_empty(), map.is_undecided(0, cell, Criterion::Collision), "cell {cell}: {flips:?}");

@@ -100,6 +100,103 @@ fn files_that_no_record_lists_stay_whatever_they_are_called() {
     }
 }
 
+#[test]
+fn files_that_a_foreign_record_names_stay_and_the_record_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = text(dir.path());
+    let at = |name: &str| dir.path().join(name);
+    let kept = |names: &[(&str, &str)]| {
+        for (name, content) in names {
+            assert_eq!(&std::fs::read_to_string(at(name)).unwrap(), content, "{name}");
+            std::fs::remove_file(at(name)).unwrap();
+        }
+    };
+    let lvd = ["export", "xosc", "--category", "lvd", "--models", "FSM", "--ego-speed", "30", "--thw", "1"];
+    let export = [&lvd[..], &["--acceleration=-5", "--out", out]].concat();
+    let map = [
+        "map",
+        "lvd",
+        "--x",
+        "deceleration_mps2=2,4",
+        "--y",
+        "ego_speed_kmh=60,90",
+        "--set",
+        "thw_s=1.2",
+        "--out",
+        out,
+    ];
+    let foreign = r#"{"program":"QGIS 3","files":["a.csv"]}"#;
+    for (run, record, content) in [(&export[..], "index.csv", "file,label\na.csv,1\n"), (&map, "map.json", foreign)] {
+        std::fs::write(at("a.csv"), "mine").unwrap();
+        std::fs::write(at(record), content).unwrap();
+        refused(run, record);
+        kept(&[("a.csv", "mine"), (record, content)]);
+    }
+    // A result's own name, and a name that only this run of the verb has.
+    for (run, name) in [(&export[..], "001-lvd_S_1s_FSM.xosc"), (&map, "report.html"), (&map, "map-FSM-collision.svg")]
+    {
+        std::fs::write(at(name), "mine").unwrap();
+        let output = lanesweep(run);
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(output.status.code() == Some(2) && said.contains(name), "{said}");
+        }
+        kept(&[(name, "mine")]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pilot_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
+    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&at("d.json"))]].concat()).status.success());
+    let density = at("d.json");
+    let sample = ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000", "--pilot", "2000"];
+    let out = at("out");
+    let sample = [&sample[..], &["--models", "RSS", "--thw", "0.6", "--out", text(&out)]].concat();
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("pilot.json"), "mine").unwrap();
+    refused(&sample, "pilot.json");
+    assert_eq!(std::fs::read_to_string(out.join("pilot.json")).unwrap(), "mine");
+    std::fs::write(at("precious"), "mine").unwrap();
+    let link = |path: &Path| {
+        let _ = std::fs::remove_file(path);
+        std::os::unix::fs::symlink(at("precious"), path).unwrap();
+    };
+    link(&out.join("pilot.json"));
+    std::fs::create_dir(at("man1")).unwrap();
+    link(&at("man1/lanesweep-study.1"));
+    for run in [&sample[..], &["config", "man", text(&at("man1"))]] {
+        let output = lanesweep(run);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(3) && said.contains("this is a link"), "{said}");
+        assert_eq!(std::fs::read_to_string(at("precious")).unwrap(), "mine");
+    }
+}
+
+#[test]
+fn worst_lanes_of_a_changed_table_are_not_exported() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let (density, out, exported) = (at("d.json"), at("out"), at("exported"));
+    let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
+    assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
+    let sample =
+        ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--models", "FSM", "--worst", "3"];
+    assert!(lanesweep(&[&sample[..], &["--out", text(&out)]].concat()).status.success());
+    let export = ["-q", "export", "xosc", "--from", text(&out), "--worst", "1", "--out", text(&exported)];
+    assert!(lanesweep(&export).status.success());
+    let table = std::fs::read_to_string(out.join("worst.csv")).unwrap();
+    let mut lines: Vec<&str> = table.lines().collect();
+    lines.swap(1, 2);
+    std::fs::write(out.join("worst.csv"), lines.join("\n") + "\n").unwrap();
+    let output = lanesweep(&export);
+    let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(output.status.code() == Some(3) && said.contains("worst.csv") && said.contains("checksum"), "{said}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
@@ -114,7 +211,7 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     let map = ["-q", "map", "lvd", "--x", "deceleration_mps2=2,4", "--y", "ego_speed_kmh=60,90", "--set", "thw_s=1.2"];
     let part = [&study[..], &["--shard", "0/1"]].concat();
     let links: [(&[&str], &[&str]); 5] = [
-        (&study, &["run.lock", "run.json", "f1.csv", "run-plan.json", "unfinished.json"]),
+        (&study, &["run.lock", "run.json", "f1.csv", "run-plan.json", "lanesweep-files.json"]),
         (&part, &["run.lock", "part-00000-of-00001.lock", "part-00000-of-00001.journal"]),
         (&sample, &["run.lock", "estimate.json", "estimates.csv"]),
         (&map, &["run.lock", "map.json", "cells.csv"]),

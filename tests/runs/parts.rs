@@ -8,13 +8,13 @@ use std::path::Path;
 use assert_cmd::Command;
 
 /// Runs the program in a folder: exit code, stdout, stderr.
-fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
+pub fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
     let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }
 
-fn done(dir: &Path, args: &[&str]) -> String {
+pub fn done(dir: &Path, args: &[&str]) -> String {
     let (code, out, err) = lanesweep(dir, args);
     assert_eq!(code, 0, "{args:?}: {err}");
     out
@@ -25,12 +25,12 @@ fn flat(text: &str) -> String {
 }
 
 /// Names and content of a folder's results; of the records only what does not belong to the machine.
-fn results(dir: &Path) -> Vec<(String, String)> {
+pub fn results(dir: &Path) -> Vec<(String, String)> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if ["plan.json", "run-plan.json"].contains(&name.as_str())
+        if ["plan.json", "run-plan.json", "lanesweep-files.json"].contains(&name.as_str())
             || (name.starts_with("part-") && name.ends_with(".json"))
         {
             continue;
@@ -65,15 +65,21 @@ fn same(a: &Path, b: &Path) {
     }
 }
 
-const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
+pub const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
 
-fn density(dir: &Path) {
+pub fn density(dir: &Path) {
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
 }
 
-const SAMPLE: [&str; 9] =
+pub const SAMPLE: [&str; 9] =
     ["-q", "sample", "densities/cut-in-2.json", "--samples", "30000", "--thw", "0.6", "--backend", "cpu"];
+
+/// Importance sampling that can be split: with a proposal of a run before.
+pub fn weighted(dir: &Path) -> Vec<&'static str> {
+    done(dir, &[&SAMPLE[..], &["--estimator", "is", "--pilot", "2000", "--models", "RSS", "--out", "pilot"]].concat());
+    [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal-RSS.json", "--models", "RSS,FSM"]].concat()
+}
 
 #[test]
 fn a_study_in_shards_is_the_study_in_one_piece() {
@@ -237,6 +243,57 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
     done(dir, &lane);
     edit(&dir.join("sample/estimate.json"), "\"engine\": 2", "\"engine\": 3");
     refused(dir, &lane, "of engine 3, this program has engine 2");
+}
+
+/// A checksum can be made anew: what a part counts must still be of its run.
+#[test]
+fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let is = weighted(dir);
+    type Change = fn(&mut serde_json::Value);
+    let of_study: [(&str, Change); 2] = [
+        ("belong to plan", |part| part["segments"][0]["plan_hash"] = "00".into()),
+        ("do not fit", |part| part["segments"][0]["units"][0]["capped"] = serde_json::json!([0])),
+    ];
+    let of_sample: [(&str, Change); 3] = [
+        ("worst lane", |part| part["segments"][0]["worst"][0][0]["lane"] = 123_456_789_012_u64.into()),
+        ("other models or headways", |part| {
+            for (key, count) in [("failures", 3), ("squares", 3), ("capped", 1), ("worst", 1)] {
+                part["segments"][0][key].as_array_mut().unwrap().truncate(count);
+            }
+            part["segments"][0]["by_kernel"] = serde_json::Value::Null;
+            part["segments"][0]["worst"] = serde_json::json!([[]]);
+            part["segments"][0]["map"] = serde_json::Value::Null;
+        }),
+        ("belongs to plan", |part| part["segments"][0]["plan_sha256"] = "00".into()),
+    ];
+    let of_is: [(&str, Change); 1] = [("other driver models", |part| {
+        part["segments"][0]["sums"].as_array_mut().unwrap().truncate(1);
+    })];
+    let runs: [(&[&str], &str, &[(&str, Change)]); 3] =
+        [(&STUDY, "study", &of_study), (&SAMPLE, "sample", &of_sample), (&is, "is", &of_is)];
+    for (run, name, changes) in runs {
+        for shard in ["0/2", "1/2"] {
+            done(dir, &[run, &["--shard", shard, "--out", name]].concat());
+        }
+        let path = dir.join(name).join("part-00000-of-00002.json");
+        let whole = std::fs::read(&path).unwrap();
+        for (said, change) in changes {
+            let mut sealed: serde_json::Value = serde_json::from_slice(&whole).unwrap();
+            change(&mut sealed["content"]);
+            std::fs::write(&path, lanesweep::run::parts::seal("part", &sealed["content"]).unwrap().0).unwrap();
+            let (code, _, err) = lanesweep(dir, &["-q", "cluster", "merge", name]);
+            let err = flat(&err);
+            assert!(
+                code == 3 && err.contains("part-00000-of-00002.json") && err.contains(said),
+                "{said}: {code} {err}"
+            );
+        }
+        std::fs::write(&path, &whole).unwrap();
+        done(dir, &["-q", "cluster", "merge", name]);
+    }
 }
 
 #[test]

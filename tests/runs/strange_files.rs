@@ -239,6 +239,113 @@ fn files_beyond_what_their_kind_can_be_are_not_read_to_their_end() {
     }
 }
 
+/// Of a file of 1 GiB the beginning and the end are looked at: memory for its content is not there.
+#[test]
+fn plans_parts_journals_and_densities_that_are_zeros_or_cut_off_are_refused_without_being_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &str| {
+        let script = "ulimit -v 400000; exec \"$0\" -q --threads 1 $1";
+        let started = Instant::now();
+        let program = env!("CARGO_BIN_EXE_lanesweep");
+        let ran = Command::new("sh").current_dir(dir.path()).args(["-c", script, program, args]).output().unwrap();
+        let said = String::from_utf8_lossy(&ran.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        (ran.status.code().unwrap_or(-1), said, started.elapsed())
+    };
+    let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --out d.json";
+    let sample = "sample d.json --samples 1000 --thw 0.6 --models FSM --backend cpu --out out";
+    let study = "study --synth-recordings 1 --categories cut-in --backend cpu --out study";
+    for args in [fit, &format!("{sample} --shard 0/2"), &format!("{study} --shard 0/2")] {
+        let (code, said, _) = run(args);
+        assert_eq!(code, 0, "{args}: {said}");
+    }
+    let zeros = |path: &Path| std::fs::OpenOptions::new().write(true).open(path).unwrap().set_len(1 << 30).unwrap();
+    let cut = |path: &Path| {
+        let length = std::fs::metadata(path).unwrap().len();
+        std::fs::OpenOptions::new().write(true).open(path).unwrap().set_len(length - 10).unwrap();
+    };
+    let cases = [
+        ("d.json", "sample d.json --samples 10 --out other"),
+        ("out/plan.json", "cluster merge out"),
+        ("out/part-00000-of-00002.json", &*format!("{sample} --shard 0/2")),
+        ("study/plan.json", "study --plan study/plan.json --backend cpu --shard 1/2 --out study"),
+        ("study/part-00000-of-00002.json", "study --plan study/plan.json --backend cpu --shard 0/2 --out study"),
+    ];
+    for (name, args) in cases {
+        let path = dir.path().join(name);
+        let whole = std::fs::read(&path).unwrap();
+        // A file of zeros, one with zeros behind what was written, one that was cut off.
+        for damage in [0, 1, 2] {
+            match damage {
+                0 => std::fs::write(&path, "").map(|()| zeros(&path)).unwrap(),
+                1 => zeros(&path),
+                _ => cut(&path),
+            }
+            let (code, said, took) = run(args);
+            assert!(code == 3 && said.contains(name.rsplit('/').next().unwrap()), "{name} {damage}: {code} {said}");
+            assert!(took < Duration::from_secs(2), "{name} {damage}: {took:?}");
+            std::fs::write(&path, &whole).unwrap();
+        }
+    }
+    // A journal that goes on in zeros keeps its records; zeros alone are none.
+    let journal = dir.path().join("out/part-00001-of-00002.journal");
+    std::fs::write(&journal, "").unwrap();
+    zeros(&journal);
+    let (code, said, took) = run(&format!("{sample} --shard 1/2"));
+    assert!(code == 3 && said.contains("no journal of lanesweep") && took < Duration::from_secs(2), "{code} {said}");
+    assert_eq!(std::fs::metadata(&journal).unwrap().len(), 1 << 30, "a foreign file stays");
+}
+
+#[test]
+fn no_message_repeats_a_text_of_any_size() {
+    let dir = tempfile::tempdir().unwrap();
+    let long = "k".repeat(900_000);
+    let golden = std::fs::read_to_string(common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
+    let mut scenario: serde_json::Value = serde_json::from_str(golden.lines().next().unwrap()).unwrap();
+    scenario["id"] = long.clone().into();
+    for (name, text) in [
+        ("key.toml", format!("{long} = 1\n")),
+        ("table.toml", format!("[{long}]\na = 1\n")),
+        ("value.toml", format!("[run]\nbackend = \"{long}\"\n")),
+        ("huge.toml", format!("# {long}{long}\n")),
+        ("id.jsonl", format!("{scenario}\n")),
+        ("columns.csv", format!("id,{long}\na,1\n")),
+        ("cell.csv", format!("id,category\na,{long}\n")),
+    ] {
+        std::fs::write(dir.path().join(name), text).unwrap();
+    }
+    let word = "w".repeat(100_000);
+    for (args, code, expected) in [
+        ("config check key.toml", 2, "this key has 900000 bytes"),
+        ("config check table.toml", 2, "bytes"),
+        ("config check value.toml", 2, "line 2"),
+        ("config check huge.toml", 3, "more than 1 MiB"),
+        ("study --config key.toml", 2, "key.toml, line 1"),
+        ("study --profile key.toml", 2, "key.toml, line 1"),
+        ("study --scenarios id.jsonl --out o", 3, "expected at most 512"),
+        ("study --scenarios columns.csv --out o", 3, "columns.csv"),
+        ("study --scenarios cell.csv --out o", 3, "cell.csv"),
+        ("check columns.csv", 2, "columns.csv"),
+        ("check cell.csv", 2, ""),
+        ("study --categories @", 2, "no category"),
+        ("study --config @=1", 2, "key"),
+        ("study --dt @", 2, "--dt"),
+        ("study @", 6, "cannot read"),
+        ("study --device @", 2, "--device"),
+        ("verify --backend cpu --lane @", 2, "lane"),
+        ("study --@", 2, "unexpected argument"),
+        ("@", 2, "unrecognized subcommand"),
+        ("simulate --scenarios id.jsonl --lane @", 3, "id.jsonl"),
+    ] {
+        let args: Vec<String> = args.split(' ').map(|arg| arg.replace('@', &word)).collect();
+        let started = Instant::now();
+        let (status, said) = lanesweep(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>());
+        let args = args.join(" ").chars().take(60).collect::<String>();
+        assert!(said.len() < 3000, "{args}: {} bytes: {said:.300}", said.len());
+        assert!([code, 2, 3, 7].contains(&status) && said.contains(expected), "{args}: {status} {said}");
+        assert!(started.elapsed() < Duration::from_secs(3), "{args}: {:?}", started.elapsed());
+    }
+}
+
 /// An id that acts on a terminal, forges a line of a message, turns the direction of reading, and is a formula.
 const HOSTILE: &str = "=1+1\u{1b}[2J\u{9b}31m\u{202e}b\rc\u{7f}";
 

@@ -174,9 +174,48 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         assert!(text.contains(place) && text.contains(problem), "{new}: {text}");
         assert!(error.help().unwrap().contains(help), "{new}: {:?}", error.help());
     }
-    let rows: String = (0..6000).map(|_| "lvd,20,120,1000\n").collect();
-    let error = of("p.csv", &format!("category,ego_speed,duration_s,rate_hz\n{rows}")).unwrap_err();
+    let rows: String = (0..6000).map(|_| "lvd,20,-1,120,1000\n").collect();
+    let error = of("p.csv", &format!("category,ego_speed,acceleration,duration_s,rate_hz\n{rows}")).unwrap_err();
     assert!(error.to_string().contains("too many for this number of rows"), "{error}");
+}
+
+#[test]
+fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| said(dir.path(), args);
+    let header = "id,category,ego_speed_mps,speed_mps,thw,lateral_speed_mps,acceleration_mps2,duration_s\n";
+    let braking = |duration: &str| file(dir.path(), "a.csv", &format!("{header}a,lvd,30,30,0.6,,-8,{duration}\n"));
+    for (duration, collides) in [("0.5", false), ("", true)] {
+        braking(duration);
+        let (code, text) = run(&["check", "a.csv", "--profiles", "paper"]);
+        assert_eq!(code, i32::from(collides), "{text}");
+        let of = |args: &[&str]| run(args).1.contains("collision FAIL");
+        let study = ["simulate", "--scenarios", "a.csv", "--lane", "a/S/0.6s/FSM"];
+        let row = ["simulate", "--table", "a.csv", "--models", "FSM"];
+        assert_eq!((of(&study), of(&row)), (collides, collides), "duration {duration:?}");
+    }
+    // A lane change that ends half way: the series of the row is that of its scenario.
+    file(dir.path(), "a.csv", &format!("{header}a,cut-in,30,20,1.2,1,-2,1.2\n"));
+    let row = lanesweep(dir.path(), &["simulate", "--table", "a.csv", "--models", "FSM"]);
+    let lane = lanesweep(dir.path(), &["simulate", "--scenarios", "a.csv", "--lane", "a/S/1.2s/FSM"]);
+    let numbers = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
+    };
+    let (row, lane) = (numbers(&row), numbers(&lane));
+    assert!(row.len() > 200, "{}", row.len());
+    assert!(row.iter().zip(&lane).all(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + a.abs())));
+    // What is no duration is refused by all of them, with its place.
+    for duration in ["0", "-1", "1e9", "nan", "0.01"] {
+        braking(duration);
+        for args in [
+            &["check", "a.csv"][..],
+            &["simulate", "--table", "a.csv"],
+            &["study", "--scenarios", "a.csv", "--dry-run"],
+        ] {
+            let (code, text) = run(args);
+            assert!(code == 3 && text.contains("a.csv, line 2, column `duration_s`"), "{args:?}, {duration}: {text}");
+        }
+    }
 }
 
 fn texts(values: &[&str]) -> ArrayRef {
@@ -425,7 +464,9 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert_eq!(of_parquet(-0.49).unwrap()[1].target.v, [1.0, 0.0]);
     assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
 
-    let lvd = |speed: &str| ["simulate --category lvd --models FSM --ego-speed 30 --gap 30 --speed", speed].join(" ");
+    let lvd = |speed: &str| {
+        ["simulate --category lvd --models FSM --ego-speed 30 --gap 30 --acceleration 0 --speed", speed].join(" ")
+    };
     let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
     let (code, text) = simulate(&lvd("-0.01"));
     assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");

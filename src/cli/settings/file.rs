@@ -9,7 +9,11 @@ use toml::de::{DeTable, DeValue};
 use super::keys::{Key, nearest};
 use super::value::{Wrong, check, from_toml};
 use crate::support::input_file;
+use crate::support::plain_text::cut;
 use crate::{Error, Place, Result};
+
+/// No key is longer, its tables included.
+const MAX_KEY_BYTES: usize = 200;
 
 /// A value of a file.
 #[derive(Debug)]
@@ -66,7 +70,11 @@ impl Reader<'_> {
     }
 
     fn entry(&self, name: &str, value: &Spanned<DeValue>, row: u64, lines: &mut Vec<Line>) -> Result<()> {
-        let place = || self.place.clone().row(row).of(format!("`{name}`"));
+        let place = || self.place.clone().row(row).of(format!("`{}`", cut(name)));
+        if name.len() > MAX_KEY_BYTES {
+            let problem = format!("this key has {} bytes; the longest one has {MAX_KEY_BYTES}", name.len());
+            return Err(Error::usage(place(), problem, "`lanesweep config show` lists all keys"));
+        }
         let below = format!("{name}.");
         if self.keys.iter().any(|key| key.name.starts_with(&below)) {
             let DeValue::Table(inner) = value.get_ref() else {

@@ -160,12 +160,6 @@ pub struct SampleSettings {
     /// Defensive mixture weight: of the density in the proposals of is and ce; 0 is the published form.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub defensive_weight: f64,
-    /// Replicates over resampled scenarios (mc); 0: none.
-    #[schemars(range(max = 1_048_576))]
-    pub bootstrap: u32,
-    /// Samples of each replicate.
-    #[schemars(range(min = 100, max = 1_099_511_627_776_u64))]
-    pub bootstrap_samples: u64,
     /// Seed of the draws.
     pub seed: u64,
 }
@@ -186,8 +180,6 @@ impl Default for SampleSettings {
             elite_fraction: 0.02,
             broad_weight: 0.2,
             defensive_weight: 0.1,
-            bootstrap: 0,
-            bootstrap_samples: 10_000,
             seed: 157,
         }
     }

@@ -39,7 +39,9 @@ pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
 }
 
 fn lanes_of_steps(steps_per_thread: u64, step_cap: u32) -> u64 {
-    let threads = rayon::current_num_threads() as u64;
+    // Threads beyond the cores make no chunk faster, and a run is interrupted between chunks.
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = rayon::current_num_threads().min(cores) as u64;
     (steps_per_thread.saturating_mul(threads) / u64::from(step_cap.max(1))).clamp(1, CHUNK_LANES)
 }
 
@@ -278,6 +280,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
         if wanted == Wanted::Counts {
             counts.resize(plan.cell_count(), CellCounts::EMPTY);
         }
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts })
+        let redone_and_rechecked = [0; 2];
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked })
     }
 }

@@ -189,6 +189,7 @@ impl<'p> GpuSession<'p> {
             outcomes: Vec::new(),
             valued: None,
             counts: Vec::new(),
+            redone_and_rechecked: [0; 2],
         };
         match wanted {
             Wanted::Counts => chunk.counts = vec![CellCounts::EMPTY; plan.cell_count()],

@@ -21,15 +21,14 @@ pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
 pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
 
 use crate::scenario::Category;
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Refuses an empty list of categories and one that names a category twice: keys would stand for two lanes.
 fn check_categories(categories: &[Category]) -> Result<()> {
-    let twice = categories.iter().enumerate().find(|(k, c)| categories[..*k].contains(c));
-    let problem = match (categories.is_empty(), twice) {
-        (true, _) => "the set has no category".to_owned(),
-        (false, Some((_, category))) => format!("{} is named twice", category.label()),
-        (false, None) => return Ok(()),
-    };
-    Err(Error::usage(Place::item("categories"), problem, "name each of cut_in, cut_out, lvd at most once"))
+    let place = || Place::item("categories");
+    if categories.is_empty() {
+        return Err(Error::usage(place(), "the set has no category", "name at least one of cut_in, cut_out, lvd"));
+    }
+    refuse_repeats(place, categories.iter().map(|category| (*category, category.label())))
 }

@@ -155,7 +155,7 @@ impl DistributionSamples {
             for (parameter, value) in self.fixed.iter().copied().chain(random) {
                 point.set(parameter, value);
             }
-            match point.plain_case(self.category, profile).case(profile.frame.time_cap_s) {
+            match point.plain_case(self.category, profile).and_then(|case| case.case(profile.frame.time_cap_s)) {
                 Ok(case) => return Ok((Sampled { values, tries: attempt }, point, case)),
                 Err(error) => reason = Some(error),
             }

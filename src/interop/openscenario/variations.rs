@@ -3,6 +3,7 @@
 use super::distribution_file::{Deterministic, DistributionFile, Distributions};
 use super::parameters::Names;
 use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter};
+use crate::support::repeats::{GIVE_ONCE, repeated};
 use crate::{Error, Place, Result};
 
 /// What a deterministic file varies.
@@ -34,12 +35,11 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
             Deterministic::Values { name, line, values } => {
                 let found = names.find(name, *line)?;
                 let values = values.iter().map(|v| names.value(found, *v, *line)).collect::<Result<Vec<_>>>()?;
-                let sorted = rising(&values);
-                if sorted.len() < values.len() {
+                if let Some(problem) = repeated(values.iter().map(|v| (v.to_bits(), v))) {
                     let place = Place::file(&file.path).row(*line).of(format!("parameter `{name}`"));
-                    return Err(Error::input(place, "a value is there twice", "give every value once"));
+                    return Err(Error::input(place, problem, GIVE_ONCE));
                 }
-                all.axes.push(GridAxis { parameter: found.0, values: sorted });
+                all.axes.push(GridAxis { parameter: found.0, values: rising(&values) });
             }
             Deterministic::Sets { names: of_set, line, rows } => {
                 let found: Vec<(&'static MapParameter, f64)> =
@@ -48,6 +48,11 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
                     found.iter().zip(row).map(|(f, v)| names.value(*f, *v, *line)).collect::<Result<Vec<f64>>>()
                 };
                 let rows = rows.iter().map(row).collect::<Result<Vec<_>>>()?;
+                let text = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+                if let Some(problem) = repeated(rows.iter().map(text).map(|row| (row.clone(), row))) {
+                    let place = Place::file(&file.path).row(*line).of("value sets");
+                    return Err(Error::input(place, problem, GIVE_ONCE));
+                }
                 if all.set_rows.len().saturating_mul(rows.len()) > MAX_PANELS {
                     let place = Place::file(&file.path).row(*line);
                     let help = format!("a map has {MAX_PANELS} panels at most: give fewer sets");

@@ -37,7 +37,7 @@ const NOT_XML: &str =
 /// As [`input_file::read_text`]; [`Error::Input`] with the line for what is not well-formed, too deep, too large, or has
 /// a document type.
 pub(super) fn read_tree(path: &Path) -> Result<Node> {
-    let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
+    let text = input_file::read_text(path, input_file::MAX_XML_BYTES)?;
     parse_tree(&text, path)
 }
 

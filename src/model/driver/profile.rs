@@ -33,8 +33,8 @@ impl Bound {
     pub const DELAY: Bound = Bound::TIME.or_zero();
     /// A time step, s.
     pub const TIME_STEP: Bound = Bound::new("s", 1e-6, 1.0);
-    /// The longest a run may take, s.
-    pub const TIME_CAP: Bound = Bound::new("s", 0.001, 1e5);
+    /// The longest a run may take, s: an hour, where encounters last seconds.
+    pub const TIME_CAP: Bound = Bound::new("s", 0.001, 3600.0);
     /// A length or width of a vehicle, m.
     pub const SIZE: Bound = Bound::new("m", 0.1, 100.0);
     /// A distance that may be none, m.

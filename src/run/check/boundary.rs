@@ -3,7 +3,7 @@
 //! of the scan and back is missed.
 
 use super::subject::Subject;
-use super::{REFERENCE_DRIVERS, collides};
+use super::{REFERENCE_DRIVERS, StepBudget};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -49,7 +49,7 @@ pub struct Boundary {
 }
 
 /// The boundaries along all numbers of a case.
-pub(super) fn boundaries(subject: &Subject, profile: &Profile) -> Result<Vec<Boundary>> {
+pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudget) -> Result<Vec<Boundary>> {
     let mut found = Vec::new();
     for (key, least, most, resolution) in VARIED {
         let Some(parameter) = PARAMETERS.iter().find(|parameter| parameter.key == key) else { continue };
@@ -59,7 +59,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile) -> Result<Vec<Bou
             continue;
         }
         let value = si * parameter.per_si;
-        let verdicts = |value: f64| verdicts(subject, profile, parameter, value);
+        let verdicts = |value: f64| verdicts(subject, profile, parameter, value, budget);
         let side = |end: f64| -> Vec<(f64, Vec<bool>)> {
             let step = (end - value) / f64::from(SCANNED);
             // The first is the case itself; a value that makes no case ends the scan.
@@ -88,13 +88,23 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile) -> Result<Vec<Bou
             preventable: change(&|verdicts| REFERENCE_DRIVERS.iter().any(|&model| !verdicts[position(model)])),
             models: ModelId::ALL.iter().map(|&model| change(&|verdicts| verdicts[position(model)])).collect(),
         });
+        budget.check()?;
     }
     Ok(found)
 }
 
-/// Does each model collide with another value of one parameter?
-fn verdicts(subject: &Subject, profile: &Profile, parameter: &MapParameter, value: f64) -> Option<Vec<bool>> {
+/// Does each model collide with another value of one parameter? `None` too where no more steps may be made.
+fn verdicts(
+    subject: &Subject,
+    profile: &Profile,
+    parameter: &MapParameter,
+    value: f64,
+    budget: &StepBudget,
+) -> Option<Vec<bool>> {
+    if budget.is_spent() {
+        return None;
+    }
     let point = subject.point().with(parameter.quantity, parameter.si(value));
     let lane = subject.lane(profile, &point).ok()?;
-    Some(ModelId::ALL.map(|model| collides(&lane.run(profile, subject.category(), model))).to_vec())
+    Some(super::verdicts(&lane, profile, subject.category(), budget))
 }

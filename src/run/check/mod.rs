@@ -8,6 +8,8 @@ mod boundary;
 mod clauses;
 mod subject;
 
+use std::cell::Cell;
+
 use rayon::prelude::*;
 
 pub use boundary::{Boundary, Change};
@@ -19,7 +21,9 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Perturbation, Point};
-use crate::{Place, Result};
+use crate::scenario::Category;
+use crate::support::repeats::refuse_repeats;
+use crate::{Error, Place, Result};
 
 /// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
 pub const REFERENCE_DRIVERS: [ModelId; 2] = [ModelId::Cchdm, ModelId::Fsm];
@@ -101,16 +105,69 @@ impl Judgement {
     }
 }
 
-pub(super) fn collides(outcome: &Outcome<f64>) -> bool {
+/// Does each model collide?
+fn verdicts(lane: &Lane, profile: &Profile, category: Category, budget: &StepBudget) -> Vec<bool> {
+    let collides = |model| {
+        let outcome = lane.run(profile, category, model);
+        budget.take(&outcome);
+        collides(&outcome)
+    };
+    ModelId::ALL.map(collides).to_vec()
+}
+
+fn collides(outcome: &Outcome<f64>) -> bool {
     outcome.verdicts.failed(Criterion::Collision)
+}
+
+/// Steps of the lanes of a check under one profile: seconds. A common check needs some millions.
+const MAX_STEPS: u64 = 1 << 28;
+/// Steps that are kept for sheet and table under one profile, 0.2 kB each.
+const MAX_TRACED_STEPS: u64 = 1 << 20;
+
+/// The steps that the lanes of a check may still make under a profile.
+struct StepBudget<'p> {
+    profile: &'p Profile,
+    left: Cell<u64>,
+}
+
+impl StepBudget<'_> {
+    /// Takes the steps of a lane.
+    fn take(&self, outcome: &Outcome<f64>) {
+        self.left.set(self.left.get().saturating_sub(u64::from(outcome.end_step) + 1));
+    }
+
+    fn is_spent(&self) -> bool {
+        self.left.get() == 0
+    }
+
+    /// # Errors
+    /// [`Error::Usage`] once it is spent.
+    fn check(&self) -> Result<()> {
+        if self.is_spent() { Err(too_many_steps(self.profile)) } else { Ok(()) }
+    }
+}
+
+fn too_many_steps(profile: &Profile) -> Error {
+    let frame = &profile.frame;
+    Error::usage(
+        Place::item(format!("profile `{}`", profile.name)),
+        format!(
+            "a check runs thousands of lanes, and these have too many steps: {} s each, until {} s",
+            frame.dt_s, frame.time_cap_s
+        ),
+        "use a longer `frame.dt_s` or a shorter `frame.time_cap_s` (120 s with 0.04 s, for instance)",
+    )
 }
 
 impl Check {
     /// Runs every model under every profile.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] for a case that cannot be made, or a time step that is too long for it.
+    /// [`Error::Usage`] for a case that cannot be made, a time step that is too long for it, lanes with too many steps, and a
+    /// profile or model that is there twice.
     pub fn run(&self) -> Result<Vec<Judgement>> {
+        refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
+        refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
         self.profiles.par_iter().map(|profile| self.under(profile)).collect()
     }
 
@@ -119,7 +176,13 @@ impl Check {
         profile.check_time_step(&self.models)?;
         check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
         let trace = |model| lane.trace(profile, self.subject.category(), model);
-        let changed = self.perturbed(profile)?;
+        let budget = StepBudget { profile, left: Cell::new(MAX_STEPS) };
+        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model);
+        let traced: u64 = self.models.iter().map(|model| u64::from(run(model).end_step) + 1).sum();
+        if traced > MAX_TRACED_STEPS {
+            return Err(too_many_steps(profile));
+        }
+        let changed = self.perturbed(profile, &budget)?;
         let flips = |avoids: &dyn Fn(&[bool]) -> bool| {
             let nominal = avoids(&changed[0].1);
             let differs = |(_, verdicts): &&(&'static str, Vec<bool>)| avoids(verdicts) != nominal;
@@ -140,15 +203,16 @@ impl Check {
             avoided_by,
             flips: flips(&|verdicts| references.iter().any(|&at| !verdicts[at])),
             readings: clauses::readings(profile, self.subject.category(), &trace),
-            boundaries: boundary::boundaries(&self.subject, profile)?,
+            boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
         })
     }
 
     /// Does each model collide, in the case and under each perturbation? The case itself comes first.
-    fn perturbed(&self, profile: &Profile) -> Result<Vec<(&'static str, Vec<bool>)>> {
+    fn perturbed(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<(&'static str, Vec<bool>)>> {
         let verdicts = |profile: &Profile, point: &Point| -> Result<Vec<bool>> {
+            budget.check()?;
             let lane = self.subject.lane(profile, point)?;
-            Ok(ModelId::ALL.map(|model| collides(&lane.run(profile, self.subject.category(), model))).to_vec())
+            Ok(verdicts(&lane, profile, self.subject.category(), budget))
         };
         let mut all = vec![("", verdicts(profile, self.subject.point())?)];
         for perturbation in Perturbation::ALL {

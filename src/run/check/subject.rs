@@ -11,8 +11,8 @@ use crate::{Error, Place, Result};
 /// A concrete case.
 #[derive(Debug, Clone)]
 pub enum Subject {
-    /// Constant speeds, one deceleration, a lane change at constant lateral speed.
-    Plain(Category, Point),
+    /// Constant speeds, one deceleration, a lane change at constant lateral speed: the case, and its numbers.
+    Plain(PlainCase, Point),
     /// A scenario whose other vehicles follow their series; the point has the ego's speed, the first speed of the
     /// other vehicle and the initial gap.
     Recorded(Box<Scenario>, Point),
@@ -53,7 +53,7 @@ impl Subject {
             point =
                 point.with(MapQuantity::AheadSpeed, case.ahead_speed_mps).with(MapQuantity::AheadGap, case.ahead_gap_m);
         }
-        Subject::Plain(case.category, point)
+        Subject::Plain(*case, point)
     }
 
     /// From a recorded scenario; it starts as it was recorded unless a headway is given.
@@ -81,8 +81,16 @@ impl Subject {
     /// Kind of scenario.
     pub fn category(&self) -> Category {
         match self {
-            Subject::Plain(category, _) => *category,
+            Subject::Plain(case, _) => case.category,
             Subject::Recorded(scenario, _) => scenario.category,
+        }
+    }
+
+    /// Duration after which the other vehicles keep their speed and lateral position, where one was given, s.
+    pub fn duration_s(&self) -> Option<f64> {
+        match self {
+            Subject::Plain(case, _) => case.duration_s,
+            Subject::Recorded(..) => None,
         }
     }
 
@@ -96,10 +104,10 @@ impl Subject {
     /// The case with the numbers of a point, ready to run.
     ///
     /// # Errors
-    /// [`Error::Usage`] where an end speed cannot be reached; [`Error::Input`] for a cut-out without a vehicle ahead.
+    /// [`Error::Usage`] for numbers that contradict one another; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
         let case = match self {
-            Subject::Plain(category, _) => plain(*category, point, profile)?,
+            Subject::Plain(case, _) => plain(case, point, profile)?,
             Subject::Recorded(scenario, recorded) => {
                 let mut case = recorded_case(scenario, TimeGrid::of(profile))?;
                 move_to(&mut case, recorded, point);
@@ -124,10 +132,13 @@ fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
     }
 }
 
-fn plain(category: Category, point: &Point, profile: &Profile) -> Result<Case> {
-    let mut case = point.plain_case(category, profile);
-    // A map has decelerations alone.
-    case.acceleration_mps2 = point.get(MapQuantity::Deceleration).map_or(0.0, |a| 0.0 - a);
+fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
+    let case = PlainCase {
+        // A map has decelerations alone, and no durations.
+        acceleration_mps2: point.get(MapQuantity::Deceleration).map_or(0.0, |a| 0.0 - a),
+        duration_s: of.duration_s,
+        ..point.plain_case(of.category, profile)?
+    };
     case.case(profile.frame.time_cap_s)
 }
 

@@ -2,7 +2,8 @@
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, Category};
+use crate::scenario::{Case, Category, missing_parameter};
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
@@ -83,6 +84,9 @@ impl Grid {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
                 return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
             }
+        }
+        for axis in axes() {
+            refuse_repeats(|| Place::item(axis.parameter.key), axis.values.iter().map(|v| (v.to_bits(), v)))?;
         }
         let has = |quantity| given.iter().any(|p| p.quantity == quantity);
         check_complete(category, native_gap, &has, FOR_A_MAP)?;
@@ -236,7 +240,7 @@ impl Grid {
     /// The case of a cell.
     ///
     /// # Errors
-    /// [`Error::Usage`] where an end speed cannot be reached.
+    /// [`Error::Usage`] for values that contradict one another, as [`PlainCase::case`](crate::scenario::PlainCase::case).
     pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
         let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
         let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
@@ -244,7 +248,7 @@ impl Grid {
         let other_mps = value(MapQuantity::OtherSpeed, ego_mps);
         let lateral_mps = value(MapQuantity::LateralSpeed, 0.0);
         if self.style == CaseStyle::Plain {
-            return point.plain_case(self.category, profile).case(profile.frame.time_cap_s);
+            return point.plain_case(self.category, profile)?.case(profile.frame.time_cap_s);
         }
         Ok(match self.category {
             Category::CutIn => {
@@ -306,6 +310,8 @@ fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     if rows.iter().any(|row| row.len() != axes.len()) {
         return Err(Error::Internal("a panel has another number of values than there are parameters".to_owned()));
     }
+    let text = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    refuse_repeats(|| Place::item("panels"), rows.iter().map(text).map(|row| (row.clone(), row)))?;
     Ok(rows)
 }
 
@@ -324,17 +330,19 @@ pub(crate) fn check_complete(
         Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
     };
     let has_gap = has(MapQuantity::Gap) || has(MapQuantity::Thw);
-    if !has(MapQuantity::EgoSpeed) {
-        return missing("the ego's speed", "ego_speed_kmh=60");
-    }
-    if category != Category::Lvd && !has(MapQuantity::LateralSpeed) {
-        return missing("the lateral speed", "lateral_speed_mps=1");
-    }
-    if category == Category::Lvd && !has(MapQuantity::Deceleration) {
-        return missing("the leader's deceleration", "deceleration_mps2=6");
-    }
-    if category == Category::CutOut && !has(MapQuantity::AheadGap) {
-        return missing("the gap to the vehicle ahead", "ahead_gap_m=50");
+    let has_parameter = |key: &str| match key {
+        "ego_speed" => has(MapQuantity::EgoSpeed),
+        "lateral_speed" => has(MapQuantity::LateralSpeed),
+        "acceleration" => has(MapQuantity::Deceleration),
+        "ahead_gap" => has(MapQuantity::AheadGap),
+        _ => true,
+    };
+    match missing_parameter(category, has_parameter) {
+        None => {}
+        Some("ego_speed") => return missing("the ego's speed", "ego_speed_kmh=60"),
+        Some("lateral_speed") => return missing("the lateral speed", "lateral_speed_mps=1"),
+        Some("acceleration") => return missing("the leader's deceleration", "deceleration_mps2=6"),
+        Some(_) => return missing("the gap to the vehicle ahead", "ahead_gap_m=50"),
     }
     if has(MapQuantity::Gap) && has(MapQuantity::Thw) || native_gap && has_gap {
         let problem = "the initial distance is given twice".to_owned();

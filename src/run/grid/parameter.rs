@@ -1,7 +1,7 @@
 //! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
 
 use crate::model::profile::Profile;
-use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase};
+use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway};
 use crate::support::near_name::nearest;
 use crate::support::plausibility::{self, Doubts};
 use crate::{Error, Place, Result};
@@ -260,11 +260,15 @@ impl Point {
     }
 
     /// The plain case of these values; what they do not set has the value that `simulate` gives it.
-    pub fn plain_case(&self, category: Category, profile: &Profile) -> PlainCase {
+    ///
+    /// # Errors
+    /// As [`check_headway`].
+    pub fn plain_case(&self, category: Category, profile: &Profile) -> Result<PlainCase> {
         let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
         let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
         let deceleration = value(MapQuantity::Deceleration, 0.0);
-        PlainCase {
+        check_headway(ego_speed_mps, self.get(MapQuantity::Thw))?;
+        Ok(PlainCase {
             category,
             ego_speed_mps,
             speed_mps: value(MapQuantity::OtherSpeed, ego_speed_mps),
@@ -277,6 +281,7 @@ impl Point {
             ahead_gap_m: value(MapQuantity::AheadGap, 0.0),
             length_m: value(MapQuantity::Length, profile.frame.default_length_m),
             width_m: value(MapQuantity::Width, profile.frame.default_width_m),
-        }
+            duration_s: None,
+        })
     }
 }

@@ -2,11 +2,11 @@
 //! lanes share one case; otherwise a unit is a cell and its gap is part of its case. Models that start at distances of
 //! their own have plans of their own.
 
-use crate::Result;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::Tables;
+use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
 use super::grid::Grid;
@@ -120,7 +120,8 @@ impl GridPart {
         let mut names = Vec::new();
         for unit in 0..grid.cell_count() / headways.len() {
             let cell = layout.cell(grid, unit, 0);
-            let mut case = LaneCase::encode(&grid.case(cell, profile)?, profile, &mut source.tables);
+            let case = grid.case(cell, profile).map_err(|error| of_cell(grid, cell, error))?;
+            let mut case = LaneCase::encode(&case, profile, &mut source.tables);
             let of_cell = layout == Layout::Cells && fixed.is_none();
             let gap_m = if of_cell { models.first().map_or(0.0, |m| grid.gap_m(cell, *m, profile)) } else { 0.0 };
             for other in &mut case.others {
@@ -159,6 +160,14 @@ impl Layout {
             Layout::HeadwaysUp => grid.cell(unit / nx, unit % nx, headway),
         }
     }
+}
+
+/// An error about a case names its cell.
+fn of_cell(grid: &Grid, cell: usize, error: Error) -> Error {
+    let Error::Usage { place, problem, help } = error else { return error };
+    let values = grid.values(cell).into_iter().map(|(parameter, value)| format!("{}={value}", parameter.key));
+    let cell = values.collect::<Vec<_>>().join(",");
+    Error::usage(Place::item(format!("cell {cell}, {place}")), problem, help)
 }
 
 fn is_distance(parameter: &MapParameter) -> bool {

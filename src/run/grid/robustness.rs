@@ -74,7 +74,8 @@ impl Perturbation {
         }
     }
 
-    /// The same point with other speeds; a vehicle without a speed of its own has the ego's.
+    /// The same point with other speeds; a vehicle without a speed of its own has the ego's. A speed stays where its change
+    /// would make the case a contradiction.
     pub fn of_speeds(self, mut point: Point) -> Point {
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         let (quantity, by_mps) = match self {
@@ -86,8 +87,14 @@ impl Perturbation {
         };
         let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
         point = point.with(MapQuantity::OtherSpeed, other_mps);
-        let speed_mps = point.get(quantity).unwrap_or(0.0) + by_mps;
-        point.with(quantity, speed_mps.max(0.0))
+        let from_mps = point.get(quantity).unwrap_or(0.0);
+        let to_mps = (from_mps + by_mps).max(0.0);
+        // Beyond its end speed, or with a headway at rest, it would be no case.
+        let is_none = match quantity {
+            MapQuantity::EgoSpeed => to_mps == 0.0,
+            _ => point.get(MapQuantity::EndSpeed).is_some_and(|end| (from_mps - end) * (to_mps - end) <= 0.0),
+        };
+        if is_none { point } else { point.with(quantity, to_mps) }
     }
 
     /// The same point with another gap or other speeds; a time headway becomes longer or shorter by the centimetre.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::ledger::Countable;
+use super::ledger::{Countable, Fits};
 use super::part::{Part, read_part};
 use super::shard::Shard;
 use crate::{Error, Place, Result};
@@ -61,10 +61,11 @@ pub fn read_parts<T: Countable>(
     run_sha256: &str,
     units: u64,
     again: &dyn Fn(Shard) -> String,
+    fits: &Fits<T>,
 ) -> Result<Vec<Part<T>>> {
     let found = collect(dir, units, again)?;
     let read = |(shard, path): &(Shard, PathBuf)| {
-        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &again(*shard))?;
+        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &again(*shard), fits)?;
         let wrong = |problem: &str| {
             let help = format!("delete it and make it again: {}", again(*shard));
             Error::input(Place::file(path), problem, help)

@@ -2,7 +2,7 @@
 //! run and which interval. A torn or damaged record ends what is believed; all after it is computed again.
 
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,6 +12,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::sealed::json_line;
 use crate::engine::ENGINE_VERSION;
 use crate::support::atomic_file::{is_named, refuse_link};
 use crate::support::hex::hex;
@@ -21,6 +22,10 @@ use crate::{Error, Place, Result};
 const MIN_WAIT: Duration = Duration::from_millis(250);
 /// A record waits this many times as long as the last one took to reach the disk, so that journals cost at most 1 %.
 const PATIENCE: u32 = 100;
+/// Longest first line.
+const MAX_HEAD_BYTES: u64 = 4096;
+/// A larger file without a whole first line is no journal that was torn while it was begun.
+const MAX_FIRST_BYTES: u64 = 16 << 20;
 /// Largest journal that is read.
 const MAX_BYTES: u64 = 4 << 30;
 /// Characters of a checksum in hexadecimal.
@@ -60,7 +65,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// [`Error::Io`]; [`Error::Input`] where the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let engine = ENGINE_VERSION;
-        let head = Head { lanesweep_journal: 2, engine, run_sha256: run_sha256.to_owned(), units };
+        let head = Head { lanesweep_journal: 3, engine, run_sha256: run_sha256.to_owned(), units };
         let due = Instant::now() + MIN_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
@@ -78,12 +83,14 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             let help = "move it away; what it holds is then computed again";
             return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
         }
-        let mut text = Vec::new();
-        file.read_to_end(&mut text).map_err(io)?;
-        let (records, whole) = journal.parse(&text)?;
-        let torn = whole < text.len();
+        let (records, whole) = journal.parse(&mut BufReader::with_capacity(1 << 16, &file))?;
+        if whole == 0 && (about.len() > MAX_FIRST_BYTES || !begins_as_journal(&file).map_err(io)?) {
+            let help = "move it away: it holds nothing that a run could continue from";
+            return Err(Error::input(Place::file(path), "this is no journal of lanesweep", help));
+        }
+        let torn = whole < about.len();
         let io = |e| Error::io(path, "write", e);
-        file.set_len(whole as u64).map_err(io)?;
+        file.set_len(whole).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
         if whole > 0 {
             journal.file = Some(file);
@@ -94,11 +101,12 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         Ok((journal, Records { records, torn }))
     }
 
-    /// The whole records and where they end.
-    fn parse(&self, text: &[u8]) -> Result<(Vec<T>, usize)> {
+    /// The whole records and where they end; a line at a time is in memory.
+    fn parse(&self, file: &mut impl BufRead) -> Result<(Vec<T>, u64)> {
         let (mut records, mut whole) = (Vec::new(), 0);
-        for line in text.split_inclusive(|&byte| byte == b'\n') {
-            let Some(body) = checked(line) else { break };
+        let longest = |whole: u64| if whole == 0 { MAX_HEAD_BYTES } else { MAX_BYTES };
+        while let Some(line) = json_line(file, longest(whole)).map_err(|e| Error::io(&self.path, "read", e))? {
+            let Some(body) = checked(&line) else { break };
             if whole == 0 {
                 let help = "move it away, or finish that run first: give the command that it was begun with";
                 let Ok(head) = serde_json::from_slice::<Head>(body) else {
@@ -121,7 +129,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
                 let Ok(record) = serde_json::from_slice(body) else { break };
                 records.push(record);
             }
-            whole += line.len();
+            whole += line.len() as u64;
         }
         Ok((records, whole))
     }
@@ -217,6 +225,14 @@ fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
     Ok(line)
 }
 
+/// Whether a file may be a journal that was torn while it was begun: as far as it goes, it begins with a checksum.
+fn begins_as_journal(mut file: &File) -> std::io::Result<bool> {
+    let mut begin = Vec::new();
+    file.rewind()?;
+    file.take(CHECKSUM as u64).read_to_end(&mut begin)?;
+    Ok(begin.iter().all(|byte| byte.is_ascii_hexdigit()))
+}
+
 /// The content of a whole line.
 fn checked(line: &[u8]) -> Option<&[u8]> {
     let line = line.strip_suffix(b"\n")?;
@@ -307,11 +323,15 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), before);
         // Of another engine, whose version is part of the head and its checksum; and as earlier versions began.
         let units = 0..10;
-        let head = Head { lanesweep_journal: 2, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
+        let head = Head { lanesweep_journal: 3, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
         let earlier =
             serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
-        for (text, said) in [(line_of(&head), "of engine "), (line_of(&earlier), "another version")] {
-            let text = text.unwrap();
+        let mine = b"notes of a user\n".to_vec();
+        for (text, said) in [
+            (line_of(&head).unwrap(), "of engine "),
+            (line_of(&earlier).unwrap(), "another version"),
+            (mine, "no journal of lanesweep"),
+        ] {
             std::fs::write(&path, &text).unwrap();
             let error = Journal::<Vec<u32>>::open(&path, "run", 0..10).err().unwrap();
             assert!(error.to_string().contains(said), "{error}");

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
 use crate::support::interrupt;
@@ -25,6 +25,16 @@ pub trait Countable: Sized + Clone + Serialize + DeserializeOwned {
     fn check(&self) -> std::result::Result<(), String>;
 }
 
+/// A record of a journal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Counted<T> {
+    /// Counts of some units.
+    pub counts: T,
+    /// Of their lanes, those that the fallback computed, and those that were computed again.
+    pub redone_and_rechecked: [u64; 2],
+}
+
 /// Finished counts of an interval of units. Where the interval has cuts (the checkpoints of a sampling run), counts on
 /// the two sides of a cut stay apart.
 pub struct Ledger<T> {
@@ -33,11 +43,13 @@ pub struct Ledger<T> {
     ends: Vec<u64>,
     /// Counts per segment.
     segments: Vec<Option<T>>,
+    /// Lanes of the segments: those that the fallback computed, and those that were computed again.
+    redone_and_rechecked: [u64; 2],
     /// The newest counts, all of one segment.
-    pending: Option<T>,
+    pending: Option<Counted<T>>,
     /// Counts of segments that are not in the journal yet.
-    unwritten: Vec<T>,
-    journal: Option<Journal<T>>,
+    unwritten: Vec<Counted<T>>,
+    journal: Option<Journal<Counted<T>>>,
 }
 
 impl<T: Countable> Ledger<T> {
@@ -48,15 +60,17 @@ impl<T: Countable> Ledger<T> {
         ends.sort_unstable();
         ends.dedup();
         let segments = ends.iter().map(|_| None).collect();
-        Ledger { units, ends, segments, pending: None, unwritten: Vec::new(), journal: None }
+        let (pending, unwritten, journal) = (None, Vec::new(), None);
+        Ledger { units, ends, segments, redone_and_rechecked: [0; 2], pending, unwritten, journal }
     }
 
-    /// Takes over what a journal holds and writes on in it. Returns the number of units that need not be computed.
+    /// Takes over what a journal holds and writes on in it. Returns the number of units that need not be computed. `fits`
+    /// says what is wrong with counts that are not the run's.
     ///
     /// # Errors
-    /// [`Error::Input`] where a record's counts cannot be, or fit no segment of the interval: its checksum is whole all
-    /// the same.
-    pub fn resume(&mut self, journal: Journal<T>, found: Records<T>) -> Result<u64> {
+    /// [`Error::Input`] naming the journal where a record's counts cannot be, are there twice, or fit no segment of the
+    /// interval: its checksum is whole all the same.
+    pub fn resume(&mut self, journal: Journal<Counted<T>>, found: Records<Counted<T>>, fits: &Fits<T>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
         }
@@ -65,12 +79,12 @@ impl<T: Countable> Ledger<T> {
                 let help = "move the journal away; what it holds is then computed again";
                 Error::input(Place::file(journal.path()), format!("its counts cannot be: {problem}"), help)
             };
-            record.check().map_err(refused)?;
-            let covered = record.covered();
+            record.counts.check().and_then(|()| fits(&record.counts)).map_err(refused)?;
+            let covered = record.counts.covered();
             if !covered.is_empty() && self.segment_holding(&covered).is_none() {
                 return Err(refused(format!("units {covered:?} fit no segment of {:?}", self.units)));
             }
-            self.place(record)?;
+            self.place(record).map_err(|error| refused(error.to_string()))?;
         }
         self.journal = Some(journal);
         Ok(self.done())
@@ -87,7 +101,12 @@ impl<T: Countable> Ledger<T> {
         (first.start >= self.units.start && last.end <= *self.ends.get(segment)?).then_some(segment)
     }
 
-    fn place(&mut self, counts: T) -> Result<()> {
+    /// First unit of the segment of a unit.
+    pub(crate) fn segment_start(&self, unit: u64) -> u64 {
+        self.segment_of(unit).checked_sub(1).map_or(self.units.start, |before| self.ends[before])
+    }
+
+    fn place(&mut self, Counted { counts, redone_and_rechecked }: Counted<T>) -> Result<()> {
         let covered = counts.covered();
         if covered.is_empty() {
             return Ok(());
@@ -100,16 +119,18 @@ impl<T: Countable> Ledger<T> {
             Some(before) => before.join(counts)?,
             None => counts,
         });
+        add(&mut self.redone_and_rechecked, redone_and_rechecked);
         Ok(())
     }
 
-    /// Adds the counts of a chunk, which crosses no cut; now and then they go to the journal.
+    /// Adds the counts of a chunk, which crosses no cut, with [`Chunk::redone_and_rechecked`](crate::engine::Chunk); now and then they go to the
+    /// journal.
     ///
     /// # Errors
     /// [`Error::Io`] of the journal; [`Error::Interrupted`] once an end was asked for: then everything is in it.
-    pub fn add(&mut self, counts: T) -> Result<()> {
+    pub fn add(&mut self, counts: T, redone_and_rechecked: [u64; 2]) -> Result<()> {
         let start = |counts: &T| counts.covered().first().map(|range| range.start);
-        let is_same = match (self.pending.as_ref().and_then(start), start(&counts)) {
+        let is_same = match (self.pending.as_ref().and_then(|pending| start(&pending.counts)), start(&counts)) {
             (Some(a), Some(b)) => self.segment_of(a) == self.segment_of(b),
             _ => true,
         };
@@ -117,8 +138,11 @@ impl<T: Countable> Ledger<T> {
             self.settle()?;
         }
         self.pending = Some(match self.pending.take() {
-            Some(before) => before.join(counts)?,
-            None => counts,
+            Some(mut before) => {
+                add(&mut before.redone_and_rechecked, redone_and_rechecked);
+                Counted { counts: before.counts.join(counts)?, ..before }
+            }
+            None => Counted { counts, redone_and_rechecked },
         });
         if self.journal.as_ref().is_some_and(Journal::is_due) {
             self.flush()?;
@@ -161,6 +185,14 @@ impl<T: Countable> Ledger<T> {
     /// Number of units counted, pending ones left out.
     fn done(&self) -> u64 {
         self.segments.iter().flatten().flat_map(Countable::covered).map(|range| range.end - range.start).sum()
+    }
+
+    /// Lanes of everything counted, by this process and by earlier ones: those that the fallback computed, and those that
+    /// were computed again.
+    pub fn redone_and_rechecked(&self) -> [u64; 2] {
+        let mut sum = self.redone_and_rechecked;
+        self.pending.iter().for_each(|pending| add(&mut sum, pending.redone_and_rechecked));
+        sum
     }
 
     /// The interval.
@@ -231,10 +263,17 @@ impl<T: Countable> Ledger<T> {
     ///
     /// # Errors
     /// Of [`Countable::join`].
-    pub fn finish(mut self) -> Result<(Vec<T>, Option<Journal<T>>)> {
+    pub fn finish(mut self) -> Result<(Vec<T>, Option<Journal<Counted<T>>>)> {
         self.settle()?;
         Ok((self.segments.into_iter().flatten().collect(), self.journal))
     }
+}
+
+/// Says what is wrong with counts that are not of the run at hand, whatever their checksum.
+pub type Fits<'f, T> = dyn Fn(&T) -> std::result::Result<(), String> + 'f;
+
+fn add(sum: &mut [u64; 2], more: [u64; 2]) {
+    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum = sum.saturating_add(more));
 }
 
 #[cfg(test)]
@@ -254,7 +293,8 @@ mod tests {
         fn join(mut self, other: Self) -> Result<Self> {
             self.0.extend(other.0);
             self.0.sort_unstable();
-            Ok(self)
+            let is_twice = self.0.windows(2).any(|pair| pair[0] == pair[1]);
+            if is_twice { Err(Error::Internal("a unit is there twice".to_owned())) } else { Ok(self) }
         }
 
         fn check(&self) -> std::result::Result<(), String> {
@@ -266,41 +306,60 @@ mod tests {
         Units(range.collect())
     }
 
+    /// What a ledger says of a journal with these records; it names the journal.
+    fn refused(path: &std::path::Path, records: &[Units], fits: &Fits<Units>) -> String {
+        let mut journal = Journal::open(path, "run", 10..100).unwrap().0;
+        for record in records {
+            let record = Counted { counts: record.clone(), redone_and_rechecked: [0; 2] };
+            journal.append(std::slice::from_ref(&record)).unwrap();
+        }
+        let (journal, found) = Journal::open(path, "run", 10..100).unwrap();
+        let error = Ledger::new(10..100, &[20, 40]).resume(journal, found, fits).unwrap_err();
+        std::fs::remove_file(path).unwrap();
+        assert!(matches!(error, Error::Input { .. }), "{error}");
+        let error = error.to_string();
+        assert!(error.contains(&path.display().to_string()), "{error}");
+        error
+    }
+
     #[test]
     fn what_a_journal_holds_is_not_missing_and_segments_stay_apart() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("journal");
         let open = |ledger: &mut Ledger<Units>| {
             let (journal, found) = Journal::open(&path, "run", 10..100).unwrap();
-            ledger.resume(journal, found).unwrap()
+            ledger.resume(journal, found, &|_| Ok(())).unwrap()
         };
         let mut ledger = Ledger::new(10..100, &[5, 20, 40, 100, 400]);
         assert_eq!(open(&mut ledger), 0);
         assert_eq!(ledger.missing(10..100).unwrap(), [10..20, 20..40, 40..100]);
         for range in [10..15, 15..20, 20..30, 50..60] {
-            ledger.add(units(range)).unwrap();
+            ledger.add(units(range), [1, 10]).unwrap();
         }
+        assert_eq!(ledger.redone_and_rechecked(), [4, 40]);
         ledger.flush().unwrap();
         drop(ledger);
 
         let mut ledger = Ledger::new(10..100, &[20, 40]);
         assert_eq!(open(&mut ledger), 30);
+        assert_eq!(ledger.redone_and_rechecked(), [4, 40], "those of the process before are not lost");
         assert_eq!(ledger.missing(10..100).unwrap(), [30..40, 40..50, 60..100]);
         assert_eq!(ledger.missing(0..35).unwrap(), [0..10, 30..35]);
         for range in ledger.missing(10..100).unwrap() {
-            ledger.add(units(range)).unwrap();
+            ledger.add(units(range), [0, 1]).unwrap();
         }
+        assert_eq!(ledger.redone_and_rechecked(), [4, 43]);
         assert_eq!(ledger.counts(10..40).unwrap(), Some(units(10..40)));
         // A record that is whole but of other units, or of two segments: the file's fault.
         for strange in [units(15..25), units(0..11), units(99..101)] {
             let path = dir.path().join("strange");
-            let mut journal = Journal::<Units>::open(&path, "run", 10..100).unwrap().0;
-            journal.append(&[strange]).unwrap();
-            let (journal, found) = Journal::<Units>::open(&path, "run", 10..100).unwrap();
-            let error = Ledger::new(10..100, &[20, 40]).resume(journal, found).unwrap_err();
-            assert!(matches!(error, Error::Input { .. }) && error.to_string().contains("no segment"), "{error}");
-            std::fs::remove_file(path).unwrap();
+            let error = refused(&path, &[strange], &|_| Ok(()));
+            assert!(error.contains("no segment"), "{error}");
         }
+        // The same units twice, and counts of another run.
+        let path = dir.path().join("twice");
+        assert!(refused(&path, &[units(20..30), units(25..27)], &|_| Ok(())).contains("twice"));
+        assert!(refused(&path, &[units(20..30)], &|_| Err("of another run".to_owned())).contains("of another run"));
         let (segments, journal) = ledger.finish().unwrap();
         assert_eq!(segments, [units(10..20), units(20..40), units(40..100)]);
         journal.unwrap().remove().unwrap();

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::ledger::Countable;
+use super::ledger::{Countable, Fits};
 use super::sealed::{read_sealed, seal};
-use crate::support::atomic_file::AtomicFile;
+use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
 
 /// Largest part that is read.
@@ -32,16 +32,22 @@ pub struct Part<T> {
 /// # Errors
 /// [`Error::Io`].
 pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
-    let mut file = AtomicFile::create_inside(path)?;
-    file.append(&seal("part", part)?.0)?;
-    file.stage()?.publish()
+    let text = seal("part", part)?.0;
+    write_inside(path, |file| file.write_all(&text))
 }
 
-/// Reads a part of a run. `again` is the command that makes it.
+/// Reads a part of a run. `again` is the command that makes it; `fits` says what is wrong with counts that are not the
+/// run's.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
-pub fn read_part<T: Countable>(path: &Path, run_sha256: &str, units: &Range<u64>, again: &str) -> Result<Part<T>> {
+pub fn read_part<T: Countable>(
+    path: &Path,
+    run_sha256: &str,
+    units: &Range<u64>,
+    again: &str,
+    fits: &Fits<T>,
+) -> Result<Part<T>> {
     let redo = format!("delete it and make it again: {again}");
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
     let wrong = |problem: String, help: &str| Error::input(Place::file(path), problem, help);
@@ -54,7 +60,10 @@ pub fn read_part<T: Countable>(path: &Path, run_sha256: &str, units: &Range<u64>
         return Err(wrong(problem, &redo));
     }
     for segment in &part.segments {
-        segment.check().map_err(|problem| wrong(format!("its counts cannot be: {problem}"), &redo))?;
+        segment
+            .check()
+            .and_then(|()| fits(segment))
+            .map_err(|problem| wrong(format!("its counts cannot be: {problem}"), &redo))?;
     }
     Ok(part)
 }

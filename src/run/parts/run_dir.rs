@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::journal::Journal;
-use super::ledger::{Countable, Ledger};
+use super::ledger::{Countable, Fits, Ledger};
 use super::part::{Part, read_part, write_part};
 use super::shard::Shard;
-use crate::support::files::{make_folder, write_atomically_with};
+use crate::support::files::{make_folder, write_inside};
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::count;
@@ -67,16 +67,16 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
-    pub fn is_done<T: Countable>(&self) -> Result<bool> {
+    pub fn is_done<T: Countable>(&self, fits: &Fits<T>) -> Result<bool> {
         let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
-        read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again").map(|_| true)
+        read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again", fits).map(|_| true)
     }
 
     /// Takes the place: no other process computes the same. What an earlier one left is taken over, cut at `cuts`.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process is at it; [`Error::Io`].
-    pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool) -> Result<RunState<T>> {
+    /// [`Error::Busy`] where another process is at it; [`Error::Io`]; as [`Ledger::resume`].
+    pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool, fits: &Fits<T>) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
             None => (OutputDir::open(&self.out, self.record)?, None),
@@ -93,7 +93,7 @@ impl RunDir {
             let run = &self.run_sha256[..16.min(self.run_sha256.len())];
             let name = stem.map_or(format!("run-{run}.journal"), |s| format!("{s}.journal"));
             let (journal, found) = Journal::open(&self.out.join(name), &self.run_sha256, units.clone())?;
-            let done = ledger.resume(journal, found)?;
+            let done = ledger.resume(journal, found, fits)?;
             if done > 0 {
                 let (done, all) = (count(done), count(units.end - units.start));
                 tracing::info!("{done} of {all} units are done already: this run continues");
@@ -123,16 +123,17 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] where the ledger is not complete.
-    pub fn finish<T: Countable>(&self, mut state: RunState<T>, lanes: [u64; 2]) -> Result<()> {
+    pub fn finish<T: Countable>(&self, mut state: RunState<T>) -> Result<()> {
         let Some(path) = self.part() else { return Err(Error::Internal("the whole run is no part".to_owned())) };
         if !state.ledger.missing(state.units.clone())?.is_empty() {
             return Err(Error::Internal("a part is not complete".to_owned()));
         }
+        let lanes_redone_and_rechecked = state.ledger.redone_and_rechecked();
         let (segments, journal) = state.ledger.finish()?;
         let run_sha256 = self.run_sha256.clone();
         // It was there before the work; where it vanished meanwhile, the part is worth another one.
         make_folder(&self.out)?;
-        write_part(&path, &Part { run_sha256, units: state.units, lanes_redone_and_rechecked: lanes, segments })?;
+        write_part(&path, &Part { run_sha256, units: state.units, lanes_redone_and_rechecked, segments })?;
         journal.map_or(Ok(()), Journal::remove)?;
         drop((state.part, state.folder));
         tracing::info!("part written to {}", path.display());
@@ -167,7 +168,7 @@ pub fn leave_plan(out: &Path, line: &[u8], rest: &[u8]) -> Result<()> {
         }
         tracing::warn!("{} was damaged: it is written again", path.display());
     }
-    write_atomically_with(&path, |file| file.write_all(line).and_then(|()| file.write_all(rest)))
+    write_inside(&path, |file| file.write_all(line).and_then(|()| file.write_all(rest)))
 }
 
 /// Copies a plan file into a run's folder, or finds the same one there. A shard reads neither in whole: readers find
@@ -187,7 +188,7 @@ pub fn copy_plan(out: &Path, from: &Path) -> Result<()> {
         }
         tracing::warn!("{} was damaged: it is written again", path.display());
     }
-    write_atomically_with(&path, |file| {
+    write_inside(&path, |file| {
         file.write_all(&line)?;
         std::io::copy(&mut plan, file).map(drop)
     })

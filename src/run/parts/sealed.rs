@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::engine::ENGINE_VERSION;
 use crate::support::hex::hex;
+use crate::support::input_file::{ends, open, read};
 use crate::{Error, Place, Result};
 
 const VERSION: u64 = 2;
@@ -60,15 +61,8 @@ fn unwritable(kind: &str, e: &serde_json::Error) -> Error {
 /// [`Error::Input`] for another kind or version, or anything but the bytes that were written.
 pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again: &str) -> Result<(T, String)> {
     let wrong = |problem: String| Error::input(place.clone(), problem, again);
-    if let Some(head) = head_of(text).filter(|head| head.kind == kind) {
-        head.check().map_err(wrong)?;
-    }
+    check_begin(kind, text).map_err(wrong)?;
     let sealed: Sealed = serde_json::from_slice(text).map_err(|e| wrong(format!("this is no whole {kind}: {e}")))?;
-    if sealed.lanesweep != kind {
-        return Err(wrong(format!("this is a `{}`, where a `{kind}` is needed", sealed.lanesweep)));
-    }
-    let head = Head { kind: sealed.lanesweep, version: sealed.version, engine: Some(sealed.engine) };
-    head.check().map_err(wrong)?;
     if checksum(kind, sealed.content) != sealed.sha256 {
         return Err(wrong("its checksum does not fit: it was changed or damaged".to_owned()));
     }
@@ -77,12 +71,19 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
     Ok((content, sealed.sha256))
 }
 
-/// Reads a sealed file of at most so many bytes.
+/// Reads a sealed file of at most so many bytes. Whether it is one, and not cut off, is known by its first and last bytes
+/// before all is read.
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
 pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, max_bytes: u64, again: &str) -> Result<(T, String)> {
-    unseal(kind, &crate::support::input_file::read(path, max_bytes)?, &Place::file(path), again)
+    let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
+    let wrong = |problem: String| Error::input(Place::file(path), problem, again);
+    check_begin(kind, &begin).map_err(wrong)?;
+    if !end.ends_with(b"}\n") {
+        return Err(wrong(format!("this is no whole {kind}: it was cut off or added to")));
+    }
+    unseal(kind, &read(path, max_bytes)?, &Place::file(path), again)
 }
 
 /// What a sealed file calls itself before its content.
@@ -107,6 +108,15 @@ impl Head {
             )),
             None => Err("it does not tell its engine".to_owned()),
         }
+    }
+}
+
+/// Whether a text begins as a sealed file of this kind that this program may use.
+fn check_begin(kind: &str, text: &[u8]) -> std::result::Result<(), String> {
+    match head_of(text) {
+        None => Err(format!("this is no whole {kind}")),
+        Some(head) if head.kind != kind => Err(format!("this is a `{}`, where a `{kind}` is needed", head.kind)),
+        Some(head) => head.check(),
     }
 }
 
@@ -137,17 +147,33 @@ pub fn read_sealed_line<T: DeserializeOwned>(
     max_bytes: u64,
     again: &str,
 ) -> Result<(T, String, BufReader<File>)> {
-    let mut file = BufReader::new(crate::support::input_file::open(path)?);
+    let mut file = BufReader::new(open(path)?);
     let io = |e| Error::io(path, "read", e);
     let wrong = |problem: String| Error::input(Place::file(path), problem, again);
-    // Of another version all may be one line.
-    if let Some(head) = head_of(file.fill_buf().map_err(io)?).filter(|head| head.kind == kind) {
-        head.check().map_err(wrong)?;
-    }
-    let mut line = Vec::new();
-    file.by_ref().take(max_bytes).read_until(b'\n', &mut line).map_err(io)?;
+    check_begin(kind, file.fill_buf().map_err(io)?).map_err(wrong)?;
+    let line = json_line(&mut file, max_bytes).map_err(io)?;
+    let line = line.ok_or_else(|| wrong(format!("this is no whole {kind}: its first line has no end")))?;
     let (content, sha256) = unseal(kind, &line, &Place::file(path), again)?;
     Ok((content, sha256, file))
+}
+
+/// Reads a line of JSON with its end; `None` where a file has none of at most so many bytes. JSON has no control characters:
+/// the first one ends the reading, so that foreign bytes are not held in memory.
+pub(super) fn json_line(file: &mut impl BufRead, max_bytes: u64) -> std::io::Result<Option<Vec<u8>>> {
+    let mut line = Vec::new();
+    loop {
+        let piece = file.fill_buf()?;
+        let end = piece.iter().position(|byte| byte.is_ascii_control());
+        if piece.is_empty() || end.is_some_and(|at| piece[at] != b'\n') || line.len() as u64 > max_bytes {
+            return Ok(None);
+        }
+        let length = end.map_or(piece.len(), |at| at + 1);
+        line.extend_from_slice(&piece[..length]);
+        file.consume(length);
+        if end.is_some() {
+            return Ok(Some(line));
+        }
+    }
 }
 
 /// The kind of a sealed file, without reading its content.
@@ -156,7 +182,7 @@ pub fn read_sealed_line<T: DeserializeOwned>(
 /// [`Error::Io`]; [`Error::Input`] for what is not sealed.
 pub fn kind_of(path: &Path) -> Result<String> {
     let mut text = Vec::new();
-    let file = crate::support::input_file::open(path)?;
+    let file = open(path)?;
     file.take(MAX_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;
     head_of(&text).map(|head| head.kind).ok_or_else(|| {
         let help = "give a file or folder that a run in parts has written";

@@ -1,6 +1,7 @@
 //! A density given the values of some parameters, as a mixture that lanes draw from.
 
 use crate::stats::density::{DensityModel, Mixture};
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Spread of a given parameter, in spreads of its kernels: nothing in the lane arithmetic, and not zero.
@@ -21,6 +22,7 @@ pub struct Conditional {
 /// [`Error::Usage`] for a name that is no parameter, one that comes twice, all of them given, or a value outside the
 /// valid range.
 pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Conditional> {
+    refuse_repeats(|| Place::option("given"), given.iter().map(|(name, _)| (name, name)))?;
     let mut places: Vec<(usize, f64)> = Vec::new();
     for (name, value) in given {
         let at = density.space.index_of(name)?;
@@ -28,10 +30,6 @@ pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Co
         if !parameter.holds(*value) {
             let problem = format!("`{name}` = {value} is not valid: {}", parameter.bounds_text());
             return Err(Error::usage(Place::option("given"), problem, "give a value inside the bounds"));
-        }
-        if places.iter().any(|(known, _)| *known == at) {
-            let problem = format!("`{name}` is given twice");
-            return Err(Error::usage(Place::option("given"), problem, "give every parameter once"));
         }
         places.push((at, *value));
     }

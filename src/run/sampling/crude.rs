@@ -82,7 +82,8 @@ pub fn sample_crude(
     options: &CrudeOptions,
     each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
-    let mut ledger = Ledger::new(range, &checkpoints(plan.unit_count()));
+    let cuts = cuts(plan.unit_count(), &range);
+    let mut ledger = Ledger::new(range, &cuts);
     sample_into(plan, &mut ledger, executor, counting, options, false, each)
 }
 
@@ -92,7 +93,12 @@ pub fn checkpoints(samples: u64) -> Vec<u64> {
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }
 
-/// The same, as far as the ledger does not hold it already; its cuts must be the plan's [`checkpoints`]. With
+/// Where the counts of an interval are cut: at the checkpoints, and where lanes begin to be watched for other values.
+pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
+    checkpoints(samples).into_iter().chain(watch::ends(range)).collect()
+}
+
+/// The same, as far as the ledger does not hold it already; its cuts must be those of [`cuts`]. With
 /// `every_value` the chunks that `each` takes have the outcome of every lane.
 ///
 /// # Errors
@@ -130,22 +136,23 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
-            for piece in watch::pieces(missing, range.start) {
-                let wanted = match (every_value, counting.worst) {
-                    (true, _) => Wanted::Outcomes,
-                    (false, 0) => Wanted::Verdicts,
-                    (false, _) => {
-                        let known = ledger.counts(range.start..piece.start)?;
-                        known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, counting))
-                    }
-                };
-                let part = executor.sweep(plan, piece, wanted, |chunk| {
-                    each(&chunk)?;
-                    ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?)
-                })?;
-                summary.add(&part);
-            }
+            let wanted = match (every_value, counting.worst) {
+                (true, _) => Wanted::Outcomes,
+                (false, 0) => Wanted::Verdicts,
+                (false, _) => {
+                    // Whole segments only: a run that resumes in a segment wants of it what the first one wanted.
+                    let known = ledger.counts(range.start..ledger.segment_start(missing.start))?;
+                    known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, counting))
+                }
+            };
+            let part = executor.sweep(plan, missing, wanted, |chunk| {
+                each(&chunk)?;
+                ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?, chunk.redone_and_rechecked)
+            })?;
+            summary.add(&part);
         }
+        // What earlier processes checked is in the journal.
+        [summary.redone_lanes, summary.rechecked_lanes] = ledger.redone_and_rechecked();
         if let Some(counts) = ledger.counts(at..next)? {
             tally = tally.merge(counts)?;
         }

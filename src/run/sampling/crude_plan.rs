@@ -10,7 +10,7 @@ use super::crude::CrudeOptions;
 use super::generator::SampleSource;
 use super::map::MapAxes;
 use super::plan::{SampleHeadways, SamplePlanOptions, plan_samples};
-use super::tally::TallyOptions;
+use super::tally::{SampleTally, TallyOptions};
 use crate::engine::{Headway, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -105,6 +105,15 @@ impl CrudePlan {
         TallyOptions { worst: self.facts.worst, criterion: self.facts.criterion, map: self.facts.map.clone() }
     }
 
+    /// Whether counts that were read from a file can be those of this run.
+    ///
+    /// # Errors
+    /// What differs.
+    pub fn check(&self, tally: &SampleTally) -> std::result::Result<(), String> {
+        let joined = SampleTally::empty(&self.plan, &self.counting()).merge(tally.clone());
+        joined.map(drop).map_err(|error| error.to_string())
+    }
+
     /// How estimates are made of counts.
     pub fn options(&self, stop: StopRule) -> CrudeOptions<'_> {
         CrudeOptions {
@@ -146,8 +155,7 @@ impl CrudeFacts {
         }
     }
 
-    /// As the bootstrap takes them.
-    pub fn plan_options(&self) -> SamplePlanOptions {
+    fn plan_options(&self) -> SamplePlanOptions {
         SamplePlanOptions {
             samples: self.samples,
             seed: self.seed,

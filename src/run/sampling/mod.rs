@@ -3,7 +3,6 @@
 //! [`Sample`] is the way in: it plans a run of any estimator, runs it whole or in shards, resumes and merges it. Densities
 //! and estimators come from [`crate::stats`], lanes run in [`crate::engine`].
 
-mod bootstrap;
 mod compare;
 mod conditional;
 mod crude;
@@ -28,14 +27,13 @@ mod weighted;
 pub(crate) mod weighted_plan;
 mod weighted_tally;
 
-pub use bootstrap::{BootstrapRecord, BootstrapRow, bootstrap};
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
 pub use conditional::{Conditional, conditional, mixture_of};
 pub use crude::{
-    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, sample_crude, sample_into,
+    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into,
 };
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;

@@ -11,6 +11,8 @@ use crate::{Error, Place, Result};
 
 const VERSION: u64 = 1;
 
+const AGAIN: &str = "write it again with `lanesweep sample --estimator ce` or `is`";
+
 /// The mixture of a proposal over the parameters of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -62,7 +64,7 @@ pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
 pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
-    proposal_from_text(&input_file::read(path, MAX_FILE_BYTES)?, density, &Place::file(path))
+    proposal_from_text(&input_file::read_json(path, MAX_FILE_BYTES, "a proposal", AGAIN)?, density, &Place::file(path))
 }
 
 /// A proposal for a density from the text of a file.
@@ -70,8 +72,7 @@ pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
 /// # Errors
 /// [`Error::Input`] at `place`, as [`read_proposal`].
 pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) -> Result<Mixture> {
-    let again = "write it again with `lanesweep sample --estimator ce` or `is`";
-    let wrong = |problem: String| Error::input(place.clone(), problem, again);
+    let wrong = |problem: String| Error::input(place.clone(), problem, AGAIN);
     let value: serde_json::Value = serde_json::from_slice(text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
     match value.get("lanesweep_proposal").map(serde_json::Value::as_u64) {
         None => return Err(wrong("it is no proposal: `lanesweep_proposal` is missing".to_owned())),

@@ -3,15 +3,14 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::bootstrap::{BootstrapRecord, bootstrap};
-use super::crude::{CrudeRun, checkpoints, crude_of_segments, sample_into};
+use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
 use super::sample::{Sample, SampleKind};
 use super::sample_result::SampleResult;
 use super::tally::SampleTally;
 use super::weighted_plan::PILOT_FILE;
 use super::weighted_tally::WeightedTally;
-use crate::engine::{Chunk, Executor, SweepSummary};
-use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts};
+use crate::engine::{Chunk, Executor};
+use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
 use crate::stats::estimate::StopRule;
 use crate::support::interrupt;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
@@ -43,7 +42,7 @@ impl Sample {
         match &self.0 {
             SampleKind::Crude(plan, stop) => {
                 let units = plan.plan.unit_count();
-                let (mut ledger, counting) = (Ledger::new(0..units, &checkpoints(units)), plan.counting());
+                let (mut ledger, counting) = (Ledger::new(0..units, &cuts(units, &(0..units))), plan.counting());
                 let options = plan.options(*stop);
                 let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, false, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
@@ -70,16 +69,25 @@ impl Sample {
     pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
         let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
-        let state = if matches!(self.0, SampleKind::Crude(..)) {
-            if run_dir.is_done::<SampleTally>()? {
-                return Ok(None);
+        let state = match &self.0 {
+            SampleKind::Crude(plan, _) => {
+                let fits = |tally: &SampleTally| plan.check(tally);
+                if run_dir.is_done(&fits)? {
+                    return Ok(None);
+                }
+                let cuts = cuts(unit_count, &units_of(shard, unit_count));
+                State::Crude(Box::new(run_dir.begin(&cuts, is_journalled, &fits)?))
             }
-            State::Crude(Box::new(run_dir.begin(&checkpoints(unit_count), is_journalled)?))
-        } else {
-            if run_dir.is_done::<WeightedTally>()? {
-                return Ok(None);
+            SampleKind::Weighted(plan) => {
+                let fits = |tally: &WeightedTally| plan.check(tally);
+                if run_dir.is_done(&fits)? {
+                    return Ok(None);
+                }
+                State::Weighted(Box::new(run_dir.begin(&[], is_journalled, &fits)?))
             }
-            State::Weighted(Box::new(run_dir.begin(&[], is_journalled)?))
+            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
+                return Err(Error::Internal("a run that cannot be split was opened in a folder".to_owned()));
+            }
         };
         Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
     }
@@ -110,7 +118,7 @@ impl Sample {
         let result = match &sample.0 {
             SampleKind::Crude(planned, _) => {
                 let (plan, counting) = (&planned.plan, planned.counting());
-                let parts = read_parts::<SampleTally>(out, &run_sha256, plan.unit_count(), again)?;
+                let parts = read_parts(out, &run_sha256, plan.unit_count(), again, &|tally| planned.check(tally))?;
                 let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
                 let count = parts.len();
                 let segments = parts.into_iter().flat_map(|part| part.segments).collect();
@@ -123,7 +131,8 @@ impl Sample {
                 SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
             }
             SampleKind::Weighted(planned) => {
-                let parts = read_parts::<WeightedTally>(out, &run_sha256, planned.facts.samples, again)?;
+                let samples = planned.facts.samples;
+                let parts = read_parts(out, &run_sha256, samples, again, &|tally| planned.check(tally))?;
                 let count = parts.len();
                 let mut segments = parts.into_iter().flat_map(|part| part.segments);
                 let first = segments.next();
@@ -135,25 +144,6 @@ impl Sample {
             }
         };
         Ok((sample, result))
-    }
-
-    /// Replicates of crude Monte Carlo over resampled scenarios: the data's share of the uncertainty.
-    ///
-    /// # Errors
-    /// As [`bootstrap`]; [`Error::Usage`] for another estimator.
-    pub fn bootstrap(
-        &self,
-        executor: &Executor,
-        replicates: u32,
-        samples: u64,
-        progress: impl FnMut(),
-    ) -> Result<BootstrapRecord> {
-        let SampleKind::Crude(plan, _) = &self.0 else {
-            let help = "use crude Monte Carlo, or leave it out";
-            return Err(Error::usage(Place::item("bootstrap"), "this belongs to crude Monte Carlo", help));
-        };
-        let options = plan.facts.plan_options();
-        bootstrap(&plan.density, &plan.facts.profile, &options, executor, replicates, samples, progress)
     }
 }
 
@@ -225,11 +215,9 @@ impl SampleRun<'_> {
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] where samples are missing or the run is no shard.
     pub fn write_part(self) -> Result<()> {
-        let summary = self.crude.map_or(SweepSummary::default(), |crude| crude.summary);
-        let lanes = [summary.redone_lanes, summary.rechecked_lanes];
         match self.state {
-            State::Crude(state) => self.run_dir.finish(*state, lanes),
-            State::Weighted(state) => self.run_dir.finish(*state, lanes),
+            State::Crude(state) => self.run_dir.finish(*state),
+            State::Weighted(state) => self.run_dir.finish(*state),
         }
     }
 

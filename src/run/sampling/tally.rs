@@ -272,6 +272,7 @@ impl SampleTally {
             (self.squares.len() != models * criteria || self.failures.len() != cells * criteria, "lengths differ"),
             (models == 0 || cells == 0 || !cells.is_multiple_of(models), "no whole number of headways per model"),
             (self.worst.iter().any(|lanes| lanes.len() > self.worst_limit), "more worst lanes than are kept"),
+            (!self.holds_its_worst(), "a worst lane is not among the lanes that were counted"),
             (self.voids > samples, "more void samples than samples"),
             (self.failures.iter().chain(&self.capped).any(|n| *n > samples), "more failures than samples"),
         ];
@@ -285,6 +286,18 @@ impl SampleTally {
             problems.push((!adds_up, "the counts by kernel do not add up"));
         }
         problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
+    }
+
+    /// Does every worst lane belong to its model and to a sample that was counted? A sample has its lanes in a row, headway
+    /// by headway and within it model by model.
+    fn holds_its_worst(&self) -> bool {
+        let (models, lanes_per_sample) = (self.worst.len() as u64, self.capped.len() as u64);
+        self.worst.iter().zip(0..).all(|(lanes, model)| {
+            lanes.iter().all(|worst| {
+                let sample = worst.lane / lanes_per_sample.max(1);
+                worst.lane % models == model && self.covered.iter().any(|range| range.contains(&sample))
+            })
+        })
     }
 
     /// Worst lanes kept per model.

@@ -14,13 +14,13 @@ const FIRST_SAMPLES: u64 = 4096;
 /// verdicts.
 const MARKED_ONE_IN: f64 = 1000.0;
 
-/// Splits samples into pieces: each is as long as all before it, so that a list of worst lanes finds as many new lanes
-/// in one piece as in the next.
-pub(super) fn pieces(range: Range<u64>, first: u64) -> impl Iterator<Item = Range<u64>> {
-    let end = range.end;
-    let next = move |from: u64| Some((first + FIRST_SAMPLES.max(2 * (from - first))).min(end)).filter(|to| *to > from);
-    let ends = std::iter::successors(next(range.start), move |to| next(*to));
-    ends.scan(range.start, |from, to| Some(std::mem::replace(from, to)..to))
+/// Ends of pieces of an interval of samples. Each is as long as all before it, so that a list of worst lanes finds as many
+/// new lanes in one piece as in the next.
+pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
+    let (first, end) = (range.start, range.end);
+    std::iter::successors(Some(FIRST_SAMPLES), |length| length.checked_mul(2))
+        .map(move |length| first.saturating_add(length))
+        .take_while(move |to| *to < end)
 }
 
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all

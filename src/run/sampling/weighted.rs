@@ -87,7 +87,7 @@ impl WeightedPlan {
                     Ok((model, importance_sums(&nominal, proposal, &lanes, facts.seed, at..next)?))
                 };
                 let pairs = facts.models.iter().zip(proposals.iter().cycle());
-                ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? })?;
+                ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? }, [0; 2])?;
                 progress(next - at);
                 at = next;
             }

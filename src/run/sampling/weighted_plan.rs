@@ -7,14 +7,16 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::{SampleHeadways, plan_points};
 use super::proposal_file::{proposal_from_text, proposal_text};
+use super::weighted_tally::WeightedTally;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::parts::{read_sealed, seal};
+use crate::run::parts::{kind_of, read_sealed, seal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{Pilot, PilotCheck};
-use crate::support::files::{make_folder, write_atomically};
+use crate::support::atomic_file::refuse_link;
+use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Place, Result};
 
 /// What a run with a pilot of its own keeps until it ends.
@@ -122,11 +124,18 @@ impl WeightedPlan {
         search: impl FnOnce(&WeightedPlan) -> Result<(Vec<Mixture>, Vec<PilotCheck>)>,
     ) -> Result<WeightedPlan> {
         let path = out.map(|out| out.join(PILOT_FILE));
-        if let Some(Ok((kept, _))) = path.as_deref().map(WeightedPlan::read) {
-            let asked = WeightedFacts { proposals: Vec::new(), pilots: Vec::new(), ..kept.facts.clone() };
-            if seal(KIND, &asked)?.1 == self.seal()?.1 {
-                tracing::info!("the pilot is done already");
-                return Ok(kept);
+        if let Some(path) = path.as_deref().filter(|path| path.symlink_metadata().is_ok()) {
+            refuse_link(path)?;
+            if !kind_of(path).is_ok_and(|kind| kind == KIND) {
+                let problem = "it would be overwritten, and it is no pilot of an interrupted run";
+                return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
+            }
+            if let Ok((kept, _)) = WeightedPlan::read(path) {
+                let asked = WeightedFacts { proposals: Vec::new(), pilots: Vec::new(), ..kept.facts.clone() };
+                if seal(KIND, &asked)?.1 == self.seal()?.1 {
+                    tracing::info!("the pilot is done already");
+                    return Ok(kept);
+                }
             }
         }
         let (proposals, pilots) = search(&self)?;
@@ -134,9 +143,22 @@ impl WeightedPlan {
         let planned = WeightedPlan::new(self.density, proposals, self.facts)?;
         if let (Some(out), Some(path)) = (out, path) {
             make_folder(out)?;
-            write_atomically(&path, &planned.seal()?.0)?;
+            let text = planned.seal()?.0;
+            write_inside(&path, |file| file.write_all(&text))?;
         }
         Ok(planned)
+    }
+
+    /// Whether sums that were read from a file can be those of this run.
+    ///
+    /// # Errors
+    /// What differs.
+    pub fn check(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
+        if tally.sums.iter().map(|(model, _)| model).eq(&self.facts.models) {
+            Ok(())
+        } else {
+            Err("they are of other driver models".to_owned())
+        }
     }
 
     /// The headway of every lane, or the density's own.

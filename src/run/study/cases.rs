@@ -147,6 +147,19 @@ impl StudyCases {
         Ok(summary)
     }
 
+    /// Bytes of the series of these units' cases, at most.
+    pub(super) fn series_bytes(&self, units: Range<u64>) -> u64 {
+        (self.entries(units) * size_of::<f64>() as f64) as u64
+    }
+
+    /// Bytes of the series that a sweep holds at once, about: those of its first window, and as many again for their copy in
+    /// binary32 and what a batch unrolls.
+    pub(crate) fn window_bytes(&self) -> u64 {
+        let first = self.held.units();
+        let bytes = self.series_bytes(first.start..first.end.min(first.start + WINDOW));
+        2 * bytes.min((MAX_ENTRIES_AT_ONCE * size_of::<f64>() as f64) as u64)
+    }
+
     /// How many values the series of these units' cases have together, at most.
     fn entries(&self, units: Range<u64>) -> f64 {
         let grid = TimeGrid::of(&self.outline.profile);
@@ -224,6 +237,26 @@ mod tests {
 
     fn outlined(scenarios: &[Scenario]) -> StudyOutline {
         outline_study(scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_study_whose_lanes_would_share_a_key_is_refused_with_what_is_there_twice() {
+        let (scenarios, paper) = (scenarios(), Profile::load("paper").unwrap());
+        let refused = |scenarios: &[Scenario], change: &dyn Fn(&mut StudyOptions)| {
+            let mut options = StudyOptions::default();
+            change(&mut options);
+            outline_study(scenarios, &paper, &options).err().map_or(String::new(), |error| error.to_string())
+        };
+        assert_eq!(refused(&scenarios, &|_| {}), "");
+        let headways = refused(&scenarios, &|o| o.headways = [0.6, 1.0, 0.6].map(Headway::ThwS).to_vec());
+        assert!(headways.contains("`0.6s` is given twice"), "{headways}");
+        let models = refused(&scenarios, &|o| o.models.push(o.models[0]));
+        assert!(models.contains("is given twice"), "{models}");
+        let categories = refused(&scenarios, &|o| o.categories.push(Category::Lvd));
+        assert!(categories.contains("`LVD` is given twice"), "{categories}");
+        let kept = scenarios.iter().find(|scenario| scenario.kept).unwrap().clone();
+        let twice = refused(&[&scenarios[..], std::slice::from_ref(&kept)].concat(), &|_| {});
+        assert!(twice.contains(&format!("`{}` is given twice", kept.id)), "{twice}");
     }
 
     #[test]

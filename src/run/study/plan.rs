@@ -10,6 +10,7 @@ use crate::scenario::parameterization::{
     ParameterizationOptions, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
 use crate::scenario::{Category, Scenario};
+use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// What a study sweeps.
@@ -69,7 +70,13 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
 }
 
 /// Plans a study as [`plan_study`] does, without making its cases.
+///
+/// # Errors
+/// [`Error::Usage`] for a category, model, headway or kept scenario that is there twice: each lane has a key of its own.
 pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyOutline> {
+    refuse_repeats(|| Place::option("categories"), options.categories.iter().map(|c| (*c, c.label())))?;
+    let kept = scenarios.iter().filter(|scenario| scenario.kept);
+    refuse_repeats(|| Place::item("scenarios"), kept.map(|scenario| (&scenario.id, &scenario.id)))?;
     let dt_s = profile.frame.dt_s;
     let parameterization = &options.parameterization;
     let grid = TimeGrid::of(profile);

@@ -126,13 +126,14 @@ impl StudyCases {
         &self.head
     }
 
-    /// A plan of its own over some of the scenarios held, evenly taken from all of them, at most about so many: for
-    /// what may be concluded from them on the whole.
+    /// A plan of its own over some of the scenarios held, evenly taken from all of them, at most about so many with about
+    /// so many bytes of series, and one of each category at least: for what may be concluded from them on the whole.
     ///
     /// # Errors
     /// None for what this program makes.
-    pub(crate) fn thinned(&self, most: u64) -> Result<LanePlan> {
-        let step = (self.held.ends.len() as u64).div_ceil(most.max(1)).max(1);
+    pub(crate) fn thinned(&self, most: u64, max_bytes: u64) -> Result<LanePlan> {
+        let by_bytes = self.series_bytes(self.held.units()).div_ceil(max_bytes.max(1));
+        let step = (self.held.ends.len() as u64).div_ceil(most.max(1)).max(by_bytes).max(1);
         let (mut held, mut blocks) = (UnitRecords::default(), Vec::new());
         for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {
             let units = block.units.held().map(|unit| block.first_unit + unit).step_by(step as usize);

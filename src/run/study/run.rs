@@ -58,10 +58,11 @@ impl Study {
             shard,
             unit_count: self.plan().unit_count(),
         };
-        if run_dir.is_done::<Partial>()? {
+        let fits = |counts: &Partial| counts.check_of(self.plan());
+        if run_dir.is_done(&fits)? {
             return Ok(None);
         }
-        let state = run_dir.begin(&[], true)?;
+        let state = run_dir.begin(&[], true, &fits)?;
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         Ok(Some(StudyRun { study: self, run_dir, state, summary }))
     }
@@ -90,7 +91,9 @@ impl Study {
         // Only counts are joined: no scenario is needed.
         let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
         let plan = study.plan();
-        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again)?;
+        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again, &|counts| {
+            counts.check_of(plan)
+        })?;
         let mut summary = SweepSummary { lanes: plan.lane_count(), ..SweepSummary::default() };
         let parts = found.len();
         let mut counts = Partial::empty(plan);
@@ -99,7 +102,7 @@ impl Study {
             summary.rechecked_lanes += part.lanes_redone_and_rechecked[1];
             counts = part.segments.into_iter().try_fold(counts, Partial::merge)?;
         }
-        if !counts.is_complete(plan) || !counts.fits(plan) {
+        if !counts.is_complete(plan) {
             let problem = "the parts do not hold every unit that their names stand for";
             return Err(Error::input(Place::file(out), problem, "make them again"));
         }
@@ -131,10 +134,12 @@ impl StudyRun<'_> {
         for range in ledger.missing(self.state.units.clone())? {
             let part = self.study.cases.sweep(range, Wanted::Verdicts, executor, |plan, chunk| {
                 progress(chunk.units.end - chunk.units.start);
-                ledger.add(Partial::from_chunk(plan, &chunk)?)
+                ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
             })?;
             self.summary.add(&part);
         }
+        // What earlier processes checked is in the journal.
+        [self.summary.redone_lanes, self.summary.rechecked_lanes] = ledger.redone_and_rechecked();
         Ok(self.summary)
     }
 
@@ -143,7 +148,7 @@ impl StudyRun<'_> {
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] where lanes are missing or the run is no shard.
     pub fn write_part(self) -> Result<()> {
-        self.run_dir.finish(self.state, [self.summary.redone_lanes, self.summary.rechecked_lanes])
+        self.run_dir.finish(self.state)
     }
 
     /// Takes the counts of a whole run.

@@ -290,7 +290,8 @@ pub fn read_density(path: &Path) -> Result<DensityModel> {
             "fit on fewer scenarios, or check that this is the right file",
         ));
     }
-    DensityModel::from_json(&input_file::read(path, MAX_FILE_BYTES)?, &Place::file(path))
+    let text = input_file::read_json(path, MAX_FILE_BYTES, "a density file", REFIT)?;
+    DensityModel::from_json(&text, &Place::file(path))
 }
 
 /// Writes a density file: whole or not at all.

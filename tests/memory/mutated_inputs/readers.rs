@@ -8,7 +8,7 @@ use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Countable, Journal, Ledger, read_part, read_sealed_line, seal};
+use lanesweep::run::parts::{Countable, Counted, Journal, Ledger, read_part, read_sealed_line, seal};
 use lanesweep::run::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, WeightedTally, plan_samples,
     read_proposal,
@@ -241,7 +241,8 @@ fn reseal_partial(bytes: &[u8], _: &Path, _: &Seeds) -> Option<Vec<u8>> {
 }
 
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
-    let read = read_part::<SampleTally>(&file(bytes, dir, "part.json"), "00", &PART_UNITS, "make it again")?;
+    let path = file(bytes, dir, "part.json");
+    let read = read_part::<SampleTally>(&path, "00", &PART_UNITS, "make it again", &|_| Ok(()))?;
     for tally in read.segments {
         tally.samples();
         tally.valid();
@@ -267,9 +268,9 @@ fn plan(bytes: &[u8], dir: &Path, _: &Seeds, heavy: bool) -> Result<()> {
 
 fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.journal");
-    let (journal, found) = Journal::<SampleTally>::open(&path, "00", PART_UNITS)?;
+    let (journal, found) = Journal::<Counted<SampleTally>>::open(&path, "00", PART_UNITS)?;
     let mut ledger = Ledger::new(PART_UNITS, &[]);
-    ledger.resume(journal, found)?;
+    ledger.resume(journal, found, &|_| Ok(()))?;
     ledger.missing(PART_UNITS)?;
     Ok(())
 }
@@ -281,7 +282,8 @@ pub const PART_UNITS: std::ops::Range<u64> = 3..17;
 pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
 
 fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
-    let part = read_part::<WeightedTally>(&file(bytes, dir, "part.json"), "00", &WEIGHTED_UNITS, "again")?;
+    let path = file(bytes, dir, "part.json");
+    let part = read_part::<WeightedTally>(&path, "00", &WEIGHTED_UNITS, "again", &|_| Ok(()))?;
     for segment in part.segments {
         for (_, sums) in &segment.sums {
             sums.total().unwrap_or_default().figures();

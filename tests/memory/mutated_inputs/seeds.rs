@@ -5,7 +5,7 @@ use std::path::Path;
 use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Journal, Part, seal, write_part};
+use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
 use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
@@ -157,7 +157,7 @@ impl Seeds {
         let journals = parts.each_ref().map(|(tally, _)| {
             written(|path| {
                 let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
-                journal.append(std::slice::from_ref(tally)).unwrap();
+                journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
             })
         });
         let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
