@@ -248,7 +248,8 @@ mod tests {
             outline_study(scenarios, &paper, &options).err().map_or(String::new(), |error| error.to_string())
         };
         assert_eq!(refused(&scenarios, &|_| {}), "");
-        let headways = refused(&scenarios, &|o| o.headways = [0.6, 1.0, 0.6].map(Headway::ThwS).to_vec());
+        let headways =
+            refused(&scenarios, &|o| o.headways = [0.6, 1.0, 0.6].map(crate::engine::Headway::ThwS).to_vec());
         assert!(headways.contains("`0.6s` is given twice"), "{headways}");
         let models = refused(&scenarios, &|o| o.models.push(o.models[0]));
         assert!(models.contains("is given twice"), "{models}");
