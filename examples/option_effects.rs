@@ -197,7 +197,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mine = |settings: &Settings| mine_generated(&settings.generator, &settings.mining, || ());
     let collection = mine(&settings)?;
     let base = settings.scores(&collection)?;
-    println!("option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1,claims");
+    println!(
+        "option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1,claims"
+    );
     println!("(default),,{}", row(&base, &base));
     for (table, key, value) in OPTIONS {
         let changed = settings.with(table, key, value)?;

@@ -8,8 +8,9 @@ use crate::support::error::{Error, Place, Result};
 /// How drivers change lanes and brake, and how often traffic is dense, where scenarios arise. Rates and shares are those
 /// at rate factor 1.
 ///
-/// The defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures, never to an F1
-/// (`examples/calibrate_generator.rs`, which also prints what other numbers give).
+/// All defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
+/// (`examples/calibrate_generator.rs`, which also prints what other numbers give). The fit never saw an F1, a claim of the
+/// paper or the seed of the default recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Behaviour {

@@ -32,8 +32,8 @@ pub struct GeneratorOptions {
     #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_share: f64,
     /// Factor on the rates of lane changes and hard braking in the camera's view, and on the share of dense carriageways;
-    /// 1 is the published rate. The default gives as many kept scenarios as the paper has, in a ninth of highD's time. A
-    /// larger one disturbs the traffic: vehicles brake for each other's lane changes.
+    /// 1 is the published rate. The default gives about as many kept cut-ins and LVDs as the paper has and half as many
+    /// cut-outs, in a quarter of highD's time. A larger one disturbs the traffic: vehicles brake for lane changes of others.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
     /// How scenarios arise.
