@@ -22,7 +22,7 @@
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
 //! `tests/traffic/generator_calibration.rs` prints these figures beside ours and fails if the difference exceeds its
-//! limit.
+//! limit. It names the figures that are outside.
 //!
 //! # What is fitted
 //! The numbers of [`Behaviour`] are fitted, all others are set by hand to published traffic figures. The fit sees the
