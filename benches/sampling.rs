@@ -30,7 +30,8 @@ fn main() {
         return;
     }
     println!("part,density,models,samples,lanes,worst,seconds,peak_bytes,failures");
-    let scenarios = mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios;
+    let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
     let million = 1_000_000;
     if std::env::args().any(|arg| arg == "--worst") {
         for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {

@@ -7,13 +7,13 @@
 //!
 //! Each row changes one option. `s_points` is the root mean square change of the shares of failures of S, per cent;
 //! `f1_change` the mean absolute change of the F1 that are defined in both runs; the misfits are those to the published
-//! shares and to the published F1 of LVD.
+//! shares and to the published F1 of LVD. `claims` are those whose verdict differs from the default's.
 
 use std::error::Error;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::score::{Misfit, ScoreOptions, ScoreTable, f1};
+use lanesweep::run::score::{ClaimResult, Misfit, ScoreOptions, ScoreTable, f1, judge_claims};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
@@ -74,7 +74,7 @@ const OPTIONS: [(&str, &str, &str); 57] = [
     ("mining.lvd", "min_peak_deceleration_mps2", "1.5"),
     ("mining.lvd", "min_peak_deceleration_mps2", "3.0"),
     ("generator", "event_rate_factor", "1.0"),
-    ("generator", "event_rate_factor", "4.0"),
+    ("generator", "event_rate_factor", "8.0"),
     ("profile", "name", "\"paper-fit\""),
     ("profile", "name", "\"jrc-2021\""),
     ("profile", "name", "\"un-r157\""),
@@ -110,7 +110,7 @@ impl Settings {
 
     fn scores(&self, collection: &Collection) -> Result<ScoreTable, Box<dyn Error>> {
         let options = StudyOptions { parameterization: self.parameterization.clone(), ..StudyOptions::default() };
-        let score = ScoreOptions { bootstrap_draws: 20, ..ScoreOptions::default() };
+        let score = ScoreOptions { bootstrap_draws: 200, ..ScoreOptions::default() };
         let study = Study::builder(collection, self.profile.clone()).options(options).score(score).plan()?;
         let backend = CpuBackend::lane_arithmetic();
         Ok(study.score(&study.run(&Executor::new(&backend))?.counts)?)
@@ -154,6 +154,16 @@ fn changes<'a>(old: &'a [(String, f64)], new: &[(String, f64)]) -> Vec<(&'a str,
     old.iter().filter_map(|(name, old)| Some((name.as_str(), find(name)? - old))).collect()
 }
 
+/// The claims with another verdict than before, joined by semicolons.
+fn other_verdicts(base: &ScoreTable, scores: &ScoreTable) -> String {
+    let (old, new) = (judge_claims(base), judge_claims(scores));
+    let other = |(old, new): (&ClaimResult, &ClaimResult)| {
+        let verdict = new.overall.verdict;
+        (verdict != old.overall.verdict).then(|| format!("{}: {}", new.claim.id.replace(',', " and"), verdict.text()))
+    };
+    old.iter().zip(&new).filter_map(other).collect::<Vec<_>>().join("; ")
+}
+
 fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
     let ((old_shares, old_f1), (shares, f1s)) = (numbers(base), numbers(scores));
     let (shares, f1s) = (changes(&old_shares, &shares), changes(&old_f1, &f1s));
@@ -167,12 +177,13 @@ fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
     let misfit = Misfit::of(scores).expect("all models are published");
     let kept: Vec<String> = scores.categories.iter().map(|category| category.scenarios.to_string()).collect();
     format!(
-        "{},{s_points:.2},{},{f1_change:.3},{},{:.2},{:.3}",
+        "{},{s_points:.2},{},{f1_change:.3},{},{:.2},{:.3},{}",
         kept.join(" "),
         largest(&shares),
         largest(&f1s),
         misfit.share_rms_points,
-        misfit.f1_mean
+        misfit.f1_mean,
+        other_verdicts(base, scores)
     )
 }
 
@@ -186,7 +197,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mine = |settings: &Settings| mine_generated(&settings.generator, &settings.mining, || ());
     let collection = mine(&settings)?;
     let base = settings.scores(&collection)?;
-    println!("option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1");
+    println!(
+        "option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1,claims"
+    );
     println!("(default),,{}", row(&base, &base));
     for (table, key, value) in OPTIONS {
         let changed = settings.with(table, key, value)?;

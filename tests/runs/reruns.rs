@@ -50,7 +50,8 @@ fn drawn(index: u64, below: u64) -> u64 {
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
     MINED.get_or_init(|| {
-        mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios
+        let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
     })
 }
 

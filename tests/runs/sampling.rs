@@ -25,7 +25,8 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
     MINED.get_or_init(|| {
-        mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios
+        let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
     })
 }
 

@@ -154,7 +154,8 @@ fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, sa
 }
 
 fn default_data() -> Vec<Scenario> {
-    mine_generated(&GeneratorOptions::default(), &MiningOptions::default(), || ()).unwrap().scenarios
+    let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
+    mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::traffic::trajectory::VehicleClass;
 const RAISED_BEFORE_M: f64 = 120.0;
 /// Rate of lane changes with full motive and accepted gaps, 1/s. Calibrated to the published 0.24 line crossings per
 /// vehicle and kilometre at rate factor 1.
-const LANE_CHANGES_PER_S: f64 = 0.265;
+const LANE_CHANGES_PER_S: f64 = 0.175;
 /// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
 /// Minimum speed at which braking is scheduled, m/s.
@@ -77,8 +77,10 @@ impl Traffic {
                 continue;
             }
             let there = self.view(place, to);
-            let rate = LANE_CHANGES_PER_S * motive(way, own.speed_mps, &own.driver, here, there.ahead);
-            let accepted = acceptance(own.speed_mps, there, &self.setting.behaviour);
+            let behaviour = &self.setting.behaviour;
+            let of_class = if own.class == VehicleClass::Truck { behaviour.truck_change_factor } else { 1.0 };
+            let rate = LANE_CHANGES_PER_S * of_class * motive(way, own.speed_mps, &own.driver, here, there.ahead);
+            let accepted = acceptance(own.speed_mps, there, behaviour);
             if self.decisions.chance(rate * factor * accepted * DECISION_S) {
                 self.start_lane_change(i, to);
                 return;
@@ -90,9 +92,8 @@ impl Traffic {
         let width = self.setting.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
-        let acceleration_mps2 = self.setting.behaviour.change_acceleration_mps2;
-        let way_m = (own.line_m, target_m);
-        let change = LaneChangeMotion::draw((own.lane, to), way_m, acceleration_mps2, &mut self.decisions);
+        let (lanes, way_m) = ((own.lane, to), (own.line_m, target_m));
+        let change = LaneChangeMotion::draw(lanes, way_m, own.class, &self.setting.behaviour, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);

@@ -6,10 +6,7 @@ pub(super) const DECISION_S: f64 = 0.2;
 pub(super) const SETTLE_S: f64 = 4.0;
 /// Lane changes obstruct each other: to raise their rate by a factor f, their hazard is multiplied by f to this
 /// power.
-const CROWDING: f64 = 1.85;
-/// More lane changes also cause braking: to raise the rate of hard braking by a factor f, its hazard is multiplied by
-/// f to this power.
-const PROVOKED: f64 = 0.5;
+const CROWDING: f64 = 1.56;
 
 /// Factors on the hazards.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,8 +21,8 @@ impl Hazards {
 
     /// The factors that raise both rates by `factor`.
     pub fn raised(factor: f64) -> Hazards {
-        // Both powers describe crowding, which is absent below the published rates.
-        let power = |exponent| if factor > 1.0 { libm::pow(factor, exponent) } else { factor };
-        Hazards { brakings: power(PROVOKED), lane_changes: power(CROWDING) }
+        // There is no crowding below the published rates.
+        let lane_changes = if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor };
+        Hazards { brakings: factor, lane_changes }
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn demand(
             LaneDemand {
                 mean_headway_s: 3600.0 / lane_vehph,
                 truck_share: (truck_share * trucks[lane] / flow[lane]).min(0.95),
-                car_speed_mps: speeds[lane] * speed_level,
+                car_speed_mps: speeds[lane] * speed_level * options.behaviour.car_speed_factor,
                 overreaction: options.behaviour.overreaction,
             }
         })

@@ -4,7 +4,7 @@ use super::behaviour::Behaviour;
 use super::idm::DriverParameters;
 
 /// The motive to change to a faster lane increases up to this gain in speed, m/s.
-const FULL_GAIN_MPS: f64 = 3.0;
+const FULL_GAIN_MPS: f64 = 4.5;
 /// Strength of keeping right, as a fraction of the full motive.
 const KEEP_RIGHT: f64 = 0.38;
 /// Strength of changes without visible reason (exits, habits), as a fraction of the full motive.
@@ -32,7 +32,7 @@ const LEAD_BRAKING_MPS2: f64 = 0.5;
 /// Minimum sum of the gaps ahead and behind, m.
 const MIN_ROOM_M: f64 = 15.0;
 /// A leader this much farther away than the desired headway has no influence, s.
-const LOOK_AHEAD_S: f64 = 8.0;
+const LOOK_AHEAD_S: f64 = 2.0;
 /// Maximum loss of speed for keeping right, m/s.
 const KEEP_RIGHT_LOSS_MPS: f64 = 0.8;
 

@@ -1,11 +1,11 @@
 //! Lateral motion: the lane change as a quintic, and the wander within a lane.
 
+use super::behaviour::Behaviour;
 use super::random::TrafficRandom;
+use crate::traffic::trajectory::VehicleClass;
 
 /// Published range of lane-change durations, s.
 const DURATION_S: [f64; 2] = [2.9, 7.3];
-/// Median of the durations before truncation to the range, s.
-const DURATION_MEDIAN_S: f64 = 5.0;
 /// Standard deviation of the duration's logarithm.
 const DURATION_SIGMA: f64 = 0.28;
 /// Standard deviation of the acceleration during a change, as a fraction of its mean.
@@ -40,10 +40,14 @@ impl LaneChangeMotion {
     pub fn draw(
         lanes: (usize, usize),
         way_m: (f64, f64),
-        mean_acceleration_mps2: f64,
+        class: VehicleClass,
+        behaviour: &Behaviour,
         stream: &mut TrafficRandom,
     ) -> LaneChangeMotion {
-        let duration_s = stream.lognormal_within(DURATION_MEDIAN_S, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
+        let mean_acceleration_mps2 = behaviour.change_acceleration_mps2;
+        let of_class = if class == VehicleClass::Truck { behaviour.truck_duration_factor } else { 1.0 };
+        let median_s = behaviour.change_duration_s * of_class;
+        let duration_s = stream.lognormal_within(median_s, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
         let spread_mps2 = ACCELERATION_SPREAD * mean_acceleration_mps2;
         let accelerates = mean_acceleration_mps2 > 0.0;
@@ -108,7 +112,8 @@ mod tests {
     fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
         let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
-            let mut change = LaneChangeMotion::draw((1, 0), (-5.6, -1.9), 0.5, &mut stream);
+            let mut change =
+                LaneChangeMotion::draw((1, 0), (-5.6, -1.9), VehicleClass::Truck, &Behaviour::default(), &mut stream);
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;

@@ -10,6 +10,7 @@ use super::lane_change::{LaneView, Neighbour};
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
 use super::waves::Waves;
+use crate::traffic::trajectory::VehicleClass;
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
 /// vehicles would be sorted by speed before they enter the view.
@@ -36,7 +37,10 @@ const ADAPTATION_S: f64 = 1.0;
 /// Speed at which the road fills before the recording, m/s: slower than most trucks, and in dense traffic.
 const FILLING_MPS: f64 = 21.0;
 const FILLING_DENSE_MPS: f64 = 5.0;
-/// Room ahead in which drivers accelerate during a lane change: length, time headway and time to collision.
+/// Speed up to which drivers of cars accelerate during a lane change, as a factor on their desired speed. Trucks have
+/// limiters.
+const EXCEEDING: f64 = 1.15;
+/// Room ahead in which they do: length, time headway and time to collision.
 const ROOM_M: f64 = 3.0;
 const ROOM_HEADWAY_S: f64 = 0.3;
 const ROOM_TTC_S: f64 = 6.0;
@@ -246,7 +250,9 @@ impl Traffic {
                     gap_m > ROOM_M + ROOM_HEADWAY_S * own.speed_mps && gap_m > ROOM_TTC_S * closing_mps
                 };
                 let old = if own.is_in(change.from_lane) { last_in[change.from_lane] } else { None };
-                if leader.is_none_or(room) && old.is_none_or(room) && own.speed_mps < own.driver.desired_speed_mps {
+                let most = if own.class == VehicleClass::Truck { 1.0 } else { EXCEEDING };
+                let slow = own.speed_mps < most * own.driver.desired_speed_mps;
+                if leader.is_none_or(room) && old.is_none_or(room) && slow {
                     command = command.max(acceleration_mps2);
                 }
             }

@@ -94,7 +94,7 @@ impl Vehicle {
                 overreaction,
             },
             VehicleClass::Truck => DriverParameters {
-                desired_speed_mps: stream.normal_within(24.8, 0.9, 22.0, 28.0),
+                desired_speed_mps: stream.normal_within(23.9, 0.9, 21.2, 26.5),
                 time_headway_s: stream.lognormal_within(TRUCK_HEADWAY_S, HEADWAY_SIGMA, 0.8, 4.5),
                 standstill_gap_m: 3.4,
                 acceleration_mps2: stream.lognormal_within(0.45, 0.25, 0.2, 0.9),
