@@ -189,7 +189,7 @@ fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration(
         braking(duration);
         let (code, text) = run(&["check", "a.csv", "--profiles", "paper"]);
         assert_eq!(code, i32::from(collides), "{text}");
-        let of = |args: &[&str]| run(args).1.contains("collision FAIL");
+        let of = |args: &[&str]| run(args).1.contains("Collision FAIL");
         let study = ["simulate", "--scenarios", "a.csv", "--lane", "a/S/0.6s/FSM"];
         let row = ["simulate", "--table", "a.csv", "--models", "FSM"];
         assert_eq!((of(&study), of(&row)), (collides, collides), "duration {duration:?}");
