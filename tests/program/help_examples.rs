@@ -12,6 +12,7 @@ fn run(dir: &Path, line: &str) -> Output {
         .current_dir(dir)
         // Help in one line per example.
         .env("COLUMNS", "1000")
+        .env("LANESWEEP_GENERATOR_RECORDINGS", "12")
         .args(args)
         .output()
         .unwrap()

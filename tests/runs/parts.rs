@@ -300,7 +300,9 @@ fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
 fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    done(dir, &[&STUDY[..], &["--plan-only", "--out", "p"]].concat());
+    // More scenarios than stand under one checksum.
+    let study = STUDY.map(|word| if word == "2" { "8" } else { word });
+    done(dir, &[&study[..], &["--plan-only", "--out", "p"]].concat());
     let path = dir.join("p/plan.json");
     let whole = std::fs::read(&path).unwrap();
     let mut damaged = whole.clone();

@@ -231,7 +231,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let told = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
     assert_eq!(check(&told, "study"), 1);
     // What an earlier export left does not stand beside the new files.
-    assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 3);
+    assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 4);
 
     good(
         root,

@@ -88,7 +88,7 @@ proptest! {
 fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
-    lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "1"]);
+    lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "3"]);
     lanesweep(at, &["-q", "mine", "rec", "--out", "s.jsonl"]);
     lanesweep(at, &["-q", "mine", "rec", "--out", "s.parquet"]);
     let study = ["-q", "study", "--backend", "cpu", "--keep-plan", "never"];
