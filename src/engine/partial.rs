@@ -239,8 +239,8 @@ impl Partial {
         if self.plan_hash != plan.hash() {
             return Err(format!("they belong to plan {}, not to {}", self.plan_hash, plan.hash()));
         }
-        if !self.fits(plan) || !self.adds_up(plan) {
-            return Err("they do not fit the units, variants, models and headways of the plan".to_owned());
+        if !self.fits(plan) {
+            return Err("they do not fit the units, variants and models of the plan".to_owned());
         }
         match self.worst.iter().find(|worst| worst.lane >= plan.lane_count()) {
             Some(worst) => Err(format!("lane {} is not in the plan", worst.lane)),

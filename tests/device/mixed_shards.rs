@@ -20,7 +20,9 @@ fn results(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let paths = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
     let mut files: Vec<(String, Vec<u8>)> = paths
         .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap()))
-        .filter(|(name, _)| !name.ends_with("plan.json") && !name.starts_with("part-"))
+        .filter(|(name, _)| {
+            !name.ends_with("plan.json") && !name.starts_with("part-") && name != "lanesweep-files.json"
+        })
         .collect();
     for (name, content) in &mut files {
         if ["run.json", "estimate.json"].contains(&name.as_str()) {

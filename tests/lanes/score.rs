@@ -230,7 +230,7 @@ fn a_part_that_was_changed_and_sealed_again_is_refused_by_merge() {
     let changes: [(&str, Change); 3] = [
         ("lanes of 10 headways", |p| p["units"][0]["cells"][0] = serde_json::json!([7, 0, 0, 7])),
         ("S does not agree with itself", |p| p["units"][1]["cells"][0] = serde_json::json!([0, 5, 5, 0])),
-        ("do not hold every unit", |p| p["units"][0]["cells"] = serde_json::json!([])),
+        ("do not fit the units", |p| p["units"][0]["cells"] = serde_json::json!([])),
     ];
     for (said, change) in changes {
         let mut content = sealed["content"].clone();
