@@ -77,7 +77,7 @@ pub struct Xosc {
     /// its worst lane.
     #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
     worst: Option<usize>,
-    /// Criterion that ranks the lanes of --worst [default: collision, or that of worst.csv]
+    /// Criterion of --worst [default: collision, or that of worst.csv]
     #[arg(long, value_name = "collision|ttc|btn", requires = "worst")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
