@@ -121,7 +121,7 @@ fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
 fn a_thousand_random_lanes_of_the_default_study_are_the_studys_lanes() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    done(dir, &["-q", "study", "--backend", "cpu", "--out", "result"]);
+    done(dir, &["-q", "study", "--synth-recordings", "24", "--backend", "cpu", "--out", "result"]);
     // The study itself, as it sweeps: in batches, on the widest instructions.
     let study = plan_study(scenarios(), &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan;
     let mut session = CpuBackend::lane_arithmetic().prepare(&study).unwrap();
