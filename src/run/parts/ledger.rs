@@ -35,6 +35,9 @@ pub struct Counted<T> {
     pub redone_and_rechecked: [u64; 2],
 }
 
+/// The journal of a ledger.
+pub type CountsJournal<T> = Journal<Counted<T>>;
+
 /// Finished counts of an interval of units. Where the interval has cuts (the checkpoints of a sampling run), counts on
 /// the two sides of a cut stay apart.
 pub struct Ledger<T> {
@@ -49,7 +52,7 @@ pub struct Ledger<T> {
     pending: Option<Counted<T>>,
     /// Counts of segments that are not in the journal yet.
     unwritten: Vec<Counted<T>>,
-    journal: Option<Journal<Counted<T>>>,
+    journal: Option<CountsJournal<T>>,
 }
 
 impl<T: Countable> Ledger<T> {
@@ -70,7 +73,7 @@ impl<T: Countable> Ledger<T> {
     /// # Errors
     /// [`Error::Input`] naming the journal where a record's counts cannot be, are there twice, or fit no segment of the
     /// interval: its checksum is whole all the same.
-    pub fn resume(&mut self, journal: Journal<Counted<T>>, found: Records<Counted<T>>, fits: &Fits<T>) -> Result<u64> {
+    pub fn resume(&mut self, journal: CountsJournal<T>, found: Records<Counted<T>>, fits: &Fits<T>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
         }
@@ -263,7 +266,7 @@ impl<T: Countable> Ledger<T> {
     ///
     /// # Errors
     /// Of [`Countable::join`].
-    pub fn finish(mut self) -> Result<(Vec<T>, Option<Journal<Counted<T>>>)> {
+    pub fn finish(mut self) -> Result<(Vec<T>, Option<CountsJournal<T>>)> {
         self.settle()?;
         Ok((self.segments.into_iter().flatten().collect(), self.journal))
     }
