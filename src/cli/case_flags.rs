@@ -44,7 +44,7 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m", value_parser = length_m)]
     lateral_distance: Option<f64>,
     /// Acceleration of the other vehicle [default: 0]
-    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2)]
+    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true)]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends [default: standstill, or never]
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]

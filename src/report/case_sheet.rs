@@ -16,6 +16,9 @@ use crate::{Error, Result};
 
 /// Metres per second in kilometres per hour.
 const KMH: f64 = 3.6;
+/// What the columns of the drivers are.
+const DRIVERS: &str = "Drivers; smallest gap and TTC, largest BTN. At a contact: rear-end where the ego's front hits, side where \
+                       the other vehicle hits the ego's side or rear; closing is the ego's speed minus the other's";
 /// What a robust verdict survives.
 const VARIED: &str = "half the time step, 1 cm of gap, 0.1 km/h of a speed";
 
@@ -40,7 +43,7 @@ impl CaseSheet<'_> {
         &self.judgements[0]
     }
 
-    /// The case in one line: speeds in km/h, all else in SI units.
+    /// The case in one line: speeds along the road in km/h, all else in SI units.
     pub fn case(&self) -> String {
         let point = self.subject.point();
         let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
@@ -59,7 +62,7 @@ impl CaseSheet<'_> {
             let si = point.get(quantity)?;
             let unit = PARAMETERS.iter().find(|parameter| parameter.quantity == quantity)?.unit;
             Some(match unit {
-                "m/s" | "km/h" => kmh(name, si),
+                "m/s" | "km/h" if quantity != MapQuantity::LateralSpeed => kmh(name, si),
                 unit => format!("{name} {} {unit}", value(si)),
             })
         });
@@ -98,15 +101,25 @@ impl CaseSheet<'_> {
     pub fn demand(&self) -> Vec<String> {
         let first = self.first();
         let Some(is_demanded) = first.is_demanded() else { return Vec::new() };
-        let unmet: Vec<&str> = first.unmet().map(|reading| reading.then).collect();
+        let unmet = first.unmet().map(|reading| {
+            let is =
+                reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
+            let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
+            format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
+        });
+        let unmet: Vec<String> = unmet.collect();
         let mut sentences = vec![match (is_demanded, &first.demand_flips[..]) {
             (true, []) => "5.2.5.2: the system has to avoid the collision (robust)".to_owned(),
-            (false, []) => format!("5.2.5.2: no demand; this does not hold: {}", unmet.join("; ")),
+            (false, []) => format!("5.2.5.2: no demand: {}", unmet.join("; ")),
             (_, flips) => format!(
                 "5.2.5.2: undecided: whether the system has to avoid the collision changes with {}",
                 flips.join(", ")
             ),
         }];
+        // What rounding decides is no disagreement.
+        if !first.demand_flips.is_empty() || first.verdict() == Verdict::Undecided {
+            return sentences;
+        }
         let model_collides = first.verdicts.collides(ModelId::Reg157);
         let model =
             format!("Reg157, the model of the clause, {}", if model_collides { "collides" } else { "avoids it" });
@@ -179,6 +192,7 @@ impl CaseSheet<'_> {
             "TTC s",
             "BTN",
             "contact",
+            "closing km/h",
             "reacts s",
             "brakes s",
             "changes with",
@@ -240,7 +254,7 @@ impl CaseSheet<'_> {
         };
         let demand: Vec<String> = self.demand().iter().map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}\n{}\n{}{}\nDrivers; smallest gap and TTC, largest BTN\n{}\nClauses under {}\n{}\nWhere the \
+            "{synthetic}{}\n{}\n{}{}\n{DRIVERS}\n{}\nClauses under {}\n{}\nWhere the \
              answer changes, and each driver's collision, under {}\n{}",
             self.case(),
             self.answer(),
@@ -351,7 +365,8 @@ impl CaseSheet<'_> {
                 "A collision is preventable where one of the two drivers of Annex 3, CCHDM or FSM, avoids it. Where nothing \
                  collides even if the ego never reacts, there is no conflict. Gap and TTC are the smallest, BTN is the \
                  largest. In a rear-end contact the ego's front hits the other vehicle; in a side contact the other vehicle \
-                 hits the ego from the side or behind. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
+                 hits the ego from the side or behind. \"Closing\" is the ego's speed minus the other's at the contact: \
+                 negative where the ego is slower. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
                  before it is no braking. \"Changes with\" names what turns the collision verdict, of {VARIED}."
             ),
             tables: vec![page_table("Drivers", 3, self.drivers())],
@@ -406,6 +421,7 @@ impl CaseSheet<'_> {
 
 fn driver_row(judgement: &Judgement, judged: &Judged) -> Vec<String> {
     let outcome = &judged.trace.outcome;
+    let closing_mps = judged.impact_closing_mps();
     let time = |time: Option<f64>| time.map_or("never".to_owned(), value);
     vec![
         judgement.profile.clone(),
@@ -414,18 +430,21 @@ fn driver_row(judgement: &Judgement, judged: &Judged) -> Vec<String> {
         value(outcome.min_gap),
         value(outcome.min_ttc),
         value(outcome.max_btn),
-        contact(judged),
+        judged
+            .trace
+            .outcome
+            .contact
+            .label()
+            .split(' ')
+            .next()
+            .filter(|_| closing_mps.is_some())
+            .unwrap_or("–")
+            .to_owned(),
+        closing_mps.map_or("–".to_owned(), |mps| value(mps * KMH)),
         time(judged.reaction_s()),
         time(judged.braking_s()),
         judged.flips.join(", "),
     ]
-}
-
-/// Kind of contact, and by how much the ego is faster or slower than what it touches.
-fn contact(judged: &Judged) -> String {
-    let Some(closing_mps) = judged.impact_closing_mps() else { return "–".to_owned() };
-    let than = if closing_mps < 0.0 { "slower" } else { "faster" };
-    format!("{}, ego {} km/h {than}", judged.trace.outcome.contact.label(), value((closing_mps * KMH).abs()))
 }
 
 fn nearest(change: &Change, from: f64) -> Option<f64> {
