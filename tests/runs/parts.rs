@@ -253,6 +253,7 @@ fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
     density(dir);
     let is = weighted(dir);
     type Change = fn(&mut serde_json::Value);
+    type Changes<'c> = &'c [(&'c str, Change)];
     let of_study: [(&str, Change); 2] = [
         ("belong to plan", |part| part["segments"][0]["plan_hash"] = "00".into()),
         ("do not fit", |part| part["segments"][0]["units"][0]["capped"] = serde_json::json!([0])),
@@ -272,7 +273,7 @@ fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
     let of_is: [(&str, Change); 1] = [("other driver models", |part| {
         part["segments"][0]["sums"].as_array_mut().unwrap().truncate(1);
     })];
-    let runs: [(&[&str], &str, &[(&str, Change)]); 3] =
+    let runs: [(&[&str], &str, Changes); 3] =
         [(&STUDY, "study", &of_study), (&SAMPLE, "sample", &of_sample), (&is, "is", &of_is)];
     for (run, name, changes) in runs {
         for shard in ["0/2", "1/2"] {

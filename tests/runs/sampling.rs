@@ -329,7 +329,7 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
     let dir = few_and_all();
     let crude = estimated(dir.path(), "all.json", &["--thw", "0.4", "--samples", "6000"]).0["estimates"][0].clone();
     for estimator in ["is", "ce"] {
-        let how = ["--thw", "0.4", "--estimator", estimator, "--samples", "3000"];
+        let how = ["--thw", "0.4", "--estimator", estimator, "--samples", "12000"];
         let (file, text) = estimated(dir.path(), "all.json", &how);
         let rows = file["estimates"].as_array().unwrap();
         let is_costlier =
