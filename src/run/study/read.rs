@@ -194,7 +194,7 @@ mod tests {
         let scenarios = mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios;
         let copies =
             |copy: usize| scenarios.iter().map(move |s| Scenario { id: format!("{}~{copy}", s.id), ..s.clone() });
-        let many: Vec<Scenario> = (0..4).flat_map(copies).collect();
+        let many: Vec<Scenario> = (0..6).flat_map(copies).collect();
         let profile = Profile::load("paper").unwrap();
         let StudyOutline { cases: study, .. } = outline_study(&many, &profile, &StudyOptions::default()).unwrap();
         let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
