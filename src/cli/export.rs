@@ -49,7 +49,7 @@ impl Export {
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
                   lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out worst\n  \
-                  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_24_22_1/S/1.2s/RSS\n  \
+                  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_44_37_214/S/1.2s/RSS\n  \
                   lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
 pub struct Xosc {
@@ -77,7 +77,9 @@ pub struct Xosc {
     /// its worst lane.
     #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
     worst: Option<usize>,
-    /// Criterion of --worst [default: collision, or that of worst.csv]
+    /// Criterion of --worst [default: collision]
+    ///
+    /// Of a sampling run it is that of its worst.csv.
     #[arg(long, value_name = "collision|ttc|btn", requires = "worst")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]

@@ -258,7 +258,18 @@ fn values_that_no_lane_can_hold_are_refused_with_their_line() {
     assert_eq!(study.status.code(), Some(4), "{said}");
     assert!(said.contains("line 1") && said.contains("ego.v0"), "{said}");
     refused(
-        &["simulate", "--category", "lvd", "--models", "FSM", "--ego-speed", "30", "--gap", "1e300"],
+        &[
+            "simulate",
+            "--category",
+            "lvd",
+            "--models",
+            "FSM",
+            "--ego-speed",
+            "30",
+            "--gap",
+            "1e300",
+            "--acceleration=-5",
+        ],
         "at most 1e6",
     );
 }
