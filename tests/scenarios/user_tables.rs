@@ -131,7 +131,9 @@ fn parameters_make_the_scenarios_that_simulate_runs() {
         let by_lane = lanesweep(dir.path(), &["simulate", "--scenarios", "p.csv", "--lane", lane]);
         assert!(by_row.lines().count() > 20);
         let numbers = |text: &str| -> Vec<f64> {
-            text.lines().skip(1).flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
+            let steps: Vec<&str> = text.lines().skip(1).collect();
+            let before_end = &steps[..steps.len() - 1];
+            before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
         };
         let (x, y) = (numbers(&by_row), numbers(&by_lane));
         let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 1e-6 * (1.0 + a.abs());
@@ -194,15 +196,19 @@ fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration(
         let row = ["simulate", "--table", "a.csv", "--models", "FSM"];
         assert_eq!((of(&study), of(&row)), (collides, collides), "duration {duration:?}");
     }
-    // A lane change that ends half way: the series of the row is that of its scenario.
+    // A lane change that ends half way: the series of the row is that of its scenario, up to the step at which the motions
+    // end. There the row's lateral speed is 0 already, and a scenario's is that of its last sample.
     file(dir.path(), "a.csv", &format!("{header}a,cut-in,30,20,1.2,1,-2,1.2\n"));
     let row = lanesweep(dir.path(), &["simulate", "--table", "a.csv", "--models", "FSM"]);
     let lane = lanesweep(dir.path(), &["simulate", "--scenarios", "a.csv", "--lane", "a/S/1.2s/FSM"]);
     let numbers = |text: &str| -> Vec<f64> {
-        text.lines().skip(1).flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
+        let steps: Vec<&str> = text.lines().skip(1).collect();
+        let before_end = &steps[..steps.len() - 1];
+        before_end.iter().flat_map(|line| line.split(',')).filter_map(|field| field.parse().ok()).collect()
     };
     let (row, lane) = (numbers(&row), numbers(&lane));
     assert!(row.len() > 200, "{}", row.len());
+    assert_eq!(row.len(), lane.len());
     assert!(row.iter().zip(&lane).all(|(a, b)| (a - b).abs() <= 1e-6 * (1.0 + a.abs())));
     // What is no duration is refused by all of them, with its place.
     for duration in ["0", "-1", "1e9", "nan", "0.01"] {
@@ -488,13 +494,15 @@ fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
     let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
     let (code, text) = simulate("108");
+    assert!(code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h; write 108km/h or 108m/s"), "{text}");
+    let (code, text) = simulate("108m/s");
     assert!(
         code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
         "{text}"
     );
-    let (code, text) = simulate("108 --accept-implausible");
+    let (code, text) = simulate("108m/s --accept-implausible");
     assert!(code == 0 && text.contains("WARN an implausible speed is used as it is"), "{text}");
-    let (code, text) = simulate("90");
+    let (code, text) = simulate("90m/s");
     assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
     let (code, text) = simulate("30 --acceleration 6");
     assert!(code == 2 && text.contains("acceleration: it results in a speed that no vehicle has: 740 m/s"), "{text}");
