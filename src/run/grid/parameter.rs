@@ -262,7 +262,7 @@ impl Point {
     /// The plain case of these values; what they do not set has the value that `simulate` gives it.
     ///
     /// # Errors
-    /// As [`check_headway`].
+    /// [`Error::Usage`] for a headway of an ego at rest.
     pub fn plain_case(&self, category: Category, profile: &Profile) -> Result<PlainCase> {
         let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
         let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
