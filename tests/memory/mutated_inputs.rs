@@ -215,7 +215,7 @@ fn inputs_that_once_took_the_memory_or_panicked_are_refused_by_name() {
     refused("mining options", "window_s = 1.0", "window_s = 1e300", "window_s");
     refused("conformance table", ",0.9,3,", ",1e-300,3,", "vlat");
     // A table asks for a parameterization by SVD, which it cannot have.
-    refused("conformance table", "_1,cut_in,1,", "_1,cut_in,6,", "no kinematic parameterization `6`");
+    refused("conformance table", ",cut_in,1,", ",cut_in,6,", "no kinematic parameterization `6`");
     // Lengths of a density follow from its options.
     refused("density", "\"svd_instants\": 50", "\"svd_instants\": 9223372036854775808", "svd_instants");
     refused("density", "\"sinusoid_intervals\": 0", "\"sinusoid_intervals\": 4000000000", "sinusoid_intervals");
