@@ -88,6 +88,11 @@ fn open(path: &Path) -> Result<Option<File>> {
         Ok(file) => Ok(Some(file)),
         // Between the two: the folder itself is there, or the first would have said so.
         Err(error) if error.kind() == ErrorKind::NotFound && path.parent().is_some_and(is_folder) => Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let folder = path.parent().unwrap_or(Path::new(".")).display();
+            let why = format!("the folder {folder} vanished while the run began; the same command begins anew");
+            Err(Error::io(path, "lock", std::io::Error::other(why)))
+        }
         Err(error) => Err(Error::io(path, "lock", error)),
     }
 }
