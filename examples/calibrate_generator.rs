@@ -75,14 +75,14 @@ struct Traffic {
     overlaps: u64,
     /// Vehicles per kilometre and lane, summed over the looks.
     density: f64,
-    /// Vehicles at the looks, and their number.
+    /// Number of looks.
     looks: u64,
     car_speeds_mps: Vec<f64>,
     truck_speeds_mps: Vec<f64>,
 }
 
 impl Traffic {
-    /// Looks at a recording every second.
+    /// Looks at every tenth frame of a recording.
     fn of(recording: &Recording, data_sets: u64, window_m: f64) -> Traffic {
         let mut traffic = Traffic { data_sets, ..Traffic::default() };
         let last = recording.tracks.iter().map(|track| track.last_frame()).max().unwrap_or(0);
@@ -131,11 +131,11 @@ fn mode(values: &[f64], bin: f64) -> f64 {
 impl Outcome {
     fn of(options: &GeneratorOptions, bootstrap_draws: usize) -> Result<Outcome, Box<dyn Error>> {
         let part = |index| {
-            let recording = generate_one(options, index).ok()?;
+            let recording = generate_one(options, index)?;
             let mined = mine(&recording, &MiningOptions::default());
-            Some((Traffic::of(&recording, mined.data_sets, options.window_m), mined.scenarios))
+            Ok((Traffic::of(&recording, mined.data_sets, options.window_m), mined.scenarios))
         };
-        let parts: Vec<_> = (0..options.recordings).into_par_iter().filter_map(part).collect();
+        let parts = (0..options.recordings).into_par_iter().map(part).collect::<lanesweep::Result<Vec<_>>>()?;
         let mut collection = Collection { synthetic: true, ..Collection::default() };
         let mut traffic = Traffic::default();
         for (of_recording, scenarios) in parts {

@@ -43,7 +43,7 @@ pub(super) struct CaseFlags {
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
     #[arg(long, value_name = "m", value_parser = length_m)]
     lateral_distance: Option<f64>,
-    /// Acceleration of the other vehicle [default: 0]
+    /// Acceleration of the other vehicle; an LVD needs one [default: 0]
     #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true)]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends [default: standstill, or never]

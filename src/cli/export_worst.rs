@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
+
 use super::rerun::worst_sha256;
 use super::simulate_lanes::{find, model};
 use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
@@ -14,7 +16,6 @@ use crate::support::input_file;
 use crate::support::repeats::refuse_repeats;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
-use sha2::{Digest, Sha256};
 
 /// Lanes that one export writes at most.
 const MAX_LANES: usize = 10_000;
@@ -113,7 +114,7 @@ pub(super) fn worst_of_sample(
     }
     let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
     if worst_sha256(dir)?.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
-        let problem = "its checksum does not fit the one in estimate.json: it was changed or damaged";
+        let problem = "checksum mismatch with estimate.json: the table was changed or damaged";
         return Err(Error::input(
             Place::file(&path),
             problem,

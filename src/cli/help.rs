@@ -113,7 +113,6 @@ const FLAGS: [Group; 5] = [
             "elite_fraction",
             "broad_weight",
             "defensive_weight",
-            "bootstrap",
             "threshold_units",
         ],
     ),

@@ -226,8 +226,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     }
 }
 
-/// Threads per logical core beyond which no thread is started: two keep a core at work while a thread waits for a file,
-/// and more only take turns.
+/// Maximum number of threads per logical core. Lanes are bound by computing, so more threads only take turns.
 const THREADS_PER_CORE: usize = 4;
 
 /// Address space of a thread: its stack, and its share of the allocator's arenas.
@@ -242,9 +241,7 @@ fn start_threads(asked: Option<usize>) -> Result<()> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
     if let Some(asked) = asked.filter(|asked| *asked > useful) {
-        tracing::info!(
-            "--threads {asked}: {useful} are started; more than {THREADS_PER_CORE} per logical core bring no gain"
-        );
+        tracing::info!("--threads {asked}: {useful} are started, {THREADS_PER_CORE} per logical core");
     }
     let count = asked.map(|asked| asked.min(useful));
     let refused = |reason: String| {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
+
 use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
 use crate::model::criterion::Criterion;
 use crate::report::convergence::ConvergenceFigure;
@@ -17,7 +19,6 @@ use crate::support::hex::hex;
 use crate::support::run_dir::Results;
 use crate::support::table::{TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
-use sha2::{Digest, Sha256};
 
 /// One row per lane: a table that gets its name with the run's other results.
 pub(super) struct RowTable<'a> {

@@ -3,6 +3,7 @@
 //! Here live the terminal tables, the CSV files, the figures (SVG, all drawn by [`plot`]), the pages and `run.json`.
 //! Here lives no arithmetic beyond formatting. Scores come from [`crate::run::score`]; text and files go to the user.
 
+mod case_sentences;
 pub mod case_sheet;
 pub mod compare;
 pub mod convergence;

@@ -5,6 +5,7 @@
 
 pub(crate) mod atomic_file;
 pub mod error;
+mod file_list;
 pub mod files;
 pub(crate) mod hex;
 pub(crate) mod input_file;

@@ -12,13 +12,9 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
-
 use crate::support::atomic_file::{AtomicFile, StagedFile, clear_stale, refuse_link, sync_folder};
-use crate::support::files::{make_folder, write_inside};
-use crate::support::hex::hex;
-use crate::support::input_file;
+use crate::support::file_list::{FileList, LIST, RunFiles};
+use crate::support::files::make_folder;
 use crate::support::live_files::Live;
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
@@ -39,11 +35,6 @@ const RECORDS: [&str; 5] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_R
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
-
-/// Lists the files of the runs in a folder.
-const LIST: &str = "lanesweep-files.json";
-
-const LIST_VERSION: u64 = 1;
 
 /// Files that every run of a record writes. A file of the user's with such a name is found before the work starts.
 fn usual_files(record: &str) -> &'static [&'static str] {
@@ -312,79 +303,6 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// The files of one run, or of all runs without a record.
-#[derive(Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RunFiles {
-    /// Name of the run's record.
-    record: Option<String>,
-    /// Names of the other files.
-    files: Vec<String>,
-    /// False while they get their names. Once the record is there, all are.
-    is_complete: bool,
-}
-
-/// The content of [`LIST`].
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileList {
-    lanesweep_files: u64,
-    runs: Vec<RunFiles>,
-    /// SHA-256 of the runs' text. It tells a list of this program from other files; it is no signature.
-    sha256: String,
-}
-
-impl FileList {
-    /// The list of a folder; empty where there is none.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a file that is no whole list; [`Error::Io`].
-    fn read(dir: &Path) -> Result<FileList> {
-        let path = dir.join(LIST);
-        if path.symlink_metadata().is_err() {
-            return Ok(FileList { lanesweep_files: LIST_VERSION, runs: Vec::new(), sha256: String::new() });
-        }
-        let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
-        let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|file| file == name.as_str());
-        let list = serde_json::from_slice::<FileList>(&text).ok().filter(|list| {
-            let mut names = list.runs.iter().flat_map(|run| run.files.iter().chain(&run.record));
-            let is_ours = list.lanesweep_files == LIST_VERSION && list.checksum().is_ok_and(|sum| sum == list.sha256);
-            is_ours && names.all(|name| is_plain(name) && !name.starts_with('.'))
-        });
-        list.ok_or_else(|| {
-            let problem = "this is no whole list of the files that lanesweep wrote here";
-            Error::input(
-                Place::file(path),
-                problem,
-                "move it away with the results beside it, or give another option `out`",
-            )
-        })
-    }
-
-    fn checksum(&self) -> Result<String> {
-        let text = serde_json::to_vec(&self.runs).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
-        Ok(hex(&Sha256::digest(text)))
-    }
-
-    fn write(mut self, dir: &Path) -> Result<()> {
-        self.runs.sort_by(|a, b| a.record.cmp(&b.record));
-        self.sha256 = self.checksum()?;
-        let text = serde_json::to_vec(&self).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
-        write_inside(&dir.join(LIST), |file| file.write_all(&text))
-    }
-
-    /// Whether some run has this file.
-    fn holds(&self, name: &str) -> bool {
-        self.runs.iter().any(|run| run.record.as_deref() == Some(name) || run.files.iter().any(|file| file == name))
-    }
-
-    /// Takes a run out of the list.
-    fn take(&mut self, record: Option<&str>) -> RunFiles {
-        let at = self.runs.iter().position(|run| run.record.as_deref() == record);
-        at.map_or_else(RunFiles::default, |at| self.runs.remove(at))
-    }
-}
-
 /// Is this a result of a run in the folder, or its record?
 pub fn is_listed(dir: &Path, name: &str) -> bool {
     FileList::read(dir).is_ok_and(|list| list.holds(name))
@@ -478,12 +396,6 @@ mod tests {
             assert!(!is_listed(out, "a.csv") && unfinished(out).is_none());
             assert_eq!(fs::read_to_string(out.join(LIST)).unwrap(), changed);
         }
-        // Even with a checksum, a list leads to plain names in the folder only.
-        for name in ["../a.csv", "inner/a.csv", ".a.csv", ""] {
-            let run = RunFiles { record: None, files: vec![name.to_owned()], is_complete: true };
-            FileList { lanesweep_files: LIST_VERSION, runs: vec![run], sha256: String::new() }.write(out).unwrap();
-            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(LIST), "{name}");
-        }
         fs::write(out.join(LIST), whole).unwrap();
         publish(&folder(out), &["b.csv"], "second");
         assert_eq!(names(out), ["b.csv", LIST, "map.json"]);
@@ -497,7 +409,7 @@ mod tests {
         let cut = || {
             let files = vec!["a.csv".to_owned(), "b.csv".to_owned()];
             let run = RunFiles { record: Some("map.json".to_owned()), files, is_complete: false };
-            FileList { lanesweep_files: LIST_VERSION, runs: vec![run], sha256: String::new() }.write(out).unwrap();
+            FileList::of(vec![run]).write(out).unwrap();
         };
         for (name, text) in [("a.csv", "first"), ("b.csv", "second"), ("other.csv", "mine")] {
             fs::write(out.join(name), text).unwrap();

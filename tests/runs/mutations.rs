@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::parts::{SAMPLE, STUDY, density, done, lanesweep, results, weighted};
+use super::parts::{SAMPLE, STUDY, density, done, flat, lanesweep, results, weighted};
 use crate::common::plans::mixed;
 use lanesweep::run::parts::seal;
 use sha2::{Digest, Sha256};
@@ -152,4 +152,56 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
 
 fn write(path: &Path, bytes: &[u8]) {
     std::fs::write(path, bytes).unwrap();
+}
+
+/// A checksum can be made anew: what a part counts must still be of its run.
+#[test]
+fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    density(dir);
+    let is = weighted(dir);
+    type Change = fn(&mut serde_json::Value);
+    type Changes<'c> = &'c [(&'c str, Change)];
+    let of_study: [(&str, Change); 2] = [
+        ("belong to plan", |part| part["segments"][0]["plan_hash"] = "00".into()),
+        ("do not fit", |part| part["segments"][0]["units"][0]["capped"] = serde_json::json!([0])),
+    ];
+    let of_sample: [(&str, Change); 3] = [
+        ("worst lane", |part| part["segments"][0]["worst"][0][0]["lane"] = 123_456_789_012_u64.into()),
+        ("other models or headways", |part| {
+            for (key, count) in [("failures", 3), ("squares", 3), ("capped", 1), ("worst", 1)] {
+                part["segments"][0][key].as_array_mut().unwrap().truncate(count);
+            }
+            part["segments"][0]["by_kernel"] = serde_json::Value::Null;
+            part["segments"][0]["worst"] = serde_json::json!([[]]);
+            part["segments"][0]["map"] = serde_json::Value::Null;
+        }),
+        ("belongs to plan", |part| part["segments"][0]["plan_sha256"] = "00".into()),
+    ];
+    let of_is: [(&str, Change); 1] = [("other driver models", |part| {
+        part["segments"][0]["sums"].as_array_mut().unwrap().truncate(1);
+    })];
+    let runs: [(&[&str], &str, Changes); 3] =
+        [(&STUDY, "study", &of_study), (&SAMPLE, "sample", &of_sample), (&is, "is", &of_is)];
+    for (run, name, changes) in runs {
+        for shard in ["0/2", "1/2"] {
+            done(dir, &[run, &["--shard", shard, "--out", name]].concat());
+        }
+        let path = dir.join(name).join("part-00000-of-00002.json");
+        let whole = std::fs::read(&path).unwrap();
+        for (said, change) in changes {
+            let mut sealed: serde_json::Value = serde_json::from_slice(&whole).unwrap();
+            change(&mut sealed["content"]);
+            std::fs::write(&path, seal("part", &sealed["content"]).unwrap().0).unwrap();
+            let (code, _, err) = lanesweep(dir, &["-q", "cluster", "merge", name]);
+            let err = flat(&err);
+            assert!(
+                code == 3 && err.contains("part-00000-of-00002.json") && err.contains(said),
+                "{said}: {code} {err}"
+            );
+        }
+        std::fs::write(&path, &whole).unwrap();
+        done(dir, &["-q", "cluster", "merge", name]);
+    }
 }

@@ -20,7 +20,7 @@ pub fn done(dir: &Path, args: &[&str]) -> String {
     out
 }
 
-fn flat(text: &str) -> String {
+pub fn flat(text: &str) -> String {
     text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
@@ -243,58 +243,6 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
     done(dir, &lane);
     edit(&dir.join("sample/estimate.json"), "\"engine\": 2", "\"engine\": 3");
     refused(dir, &lane, "of engine 3, this program has engine 2");
-}
-
-/// A checksum can be made anew: what a part counts must still be of its run.
-#[test]
-fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
-    let dir = tempfile::tempdir().unwrap();
-    let dir = dir.path();
-    density(dir);
-    let is = weighted(dir);
-    type Change = fn(&mut serde_json::Value);
-    type Changes<'c> = &'c [(&'c str, Change)];
-    let of_study: [(&str, Change); 2] = [
-        ("belong to plan", |part| part["segments"][0]["plan_hash"] = "00".into()),
-        ("do not fit", |part| part["segments"][0]["units"][0]["capped"] = serde_json::json!([0])),
-    ];
-    let of_sample: [(&str, Change); 3] = [
-        ("worst lane", |part| part["segments"][0]["worst"][0][0]["lane"] = 123_456_789_012_u64.into()),
-        ("other models or headways", |part| {
-            for (key, count) in [("failures", 3), ("squares", 3), ("capped", 1), ("worst", 1)] {
-                part["segments"][0][key].as_array_mut().unwrap().truncate(count);
-            }
-            part["segments"][0]["by_kernel"] = serde_json::Value::Null;
-            part["segments"][0]["worst"] = serde_json::json!([[]]);
-            part["segments"][0]["map"] = serde_json::Value::Null;
-        }),
-        ("belongs to plan", |part| part["segments"][0]["plan_sha256"] = "00".into()),
-    ];
-    let of_is: [(&str, Change); 1] = [("other driver models", |part| {
-        part["segments"][0]["sums"].as_array_mut().unwrap().truncate(1);
-    })];
-    let runs: [(&[&str], &str, Changes); 3] =
-        [(&STUDY, "study", &of_study), (&SAMPLE, "sample", &of_sample), (&is, "is", &of_is)];
-    for (run, name, changes) in runs {
-        for shard in ["0/2", "1/2"] {
-            done(dir, &[run, &["--shard", shard, "--out", name]].concat());
-        }
-        let path = dir.join(name).join("part-00000-of-00002.json");
-        let whole = std::fs::read(&path).unwrap();
-        for (said, change) in changes {
-            let mut sealed: serde_json::Value = serde_json::from_slice(&whole).unwrap();
-            change(&mut sealed["content"]);
-            std::fs::write(&path, lanesweep::run::parts::seal("part", &sealed["content"]).unwrap().0).unwrap();
-            let (code, _, err) = lanesweep(dir, &["-q", "cluster", "merge", name]);
-            let err = flat(&err);
-            assert!(
-                code == 3 && err.contains("part-00000-of-00002.json") && err.contains(said),
-                "{said}: {code} {err}"
-            );
-        }
-        std::fs::write(&path, &whole).unwrap();
-        done(dir, &["-q", "cluster", "merge", name]);
-    }
 }
 
 #[test]

@@ -90,11 +90,11 @@ impl Perturbation {
         let from_mps = point.get(quantity).unwrap_or(0.0);
         let to_mps = (from_mps + by_mps).max(0.0);
         // Beyond its end speed, or with a headway at rest, it would be no case.
-        let is_none = match quantity {
+        let is_no_case = match quantity {
             MapQuantity::EgoSpeed => to_mps == 0.0,
             _ => point.get(MapQuantity::EndSpeed).is_some_and(|end| (from_mps - end) * (to_mps - end) <= 0.0),
         };
-        if is_none { point } else { point.with(quantity, to_mps) }
+        if is_no_case { point } else { point.with(quantity, to_mps) }
     }
 
     /// The same point with another gap or other speeds; a time headway becomes longer or shorter by the centimetre.

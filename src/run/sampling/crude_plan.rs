@@ -86,7 +86,7 @@ impl CrudePlan {
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
         facts.profile.check(&place)?;
         if !(facts.level > 0.0 && facts.level < 1.0) {
-            return Err(wrong("its level is no share"));
+            return Err(wrong("its confidence level must lie between 0 and 1"));
         }
         let density = DensityModel::from_json(facts.density.as_bytes(), &place)?;
         let parameters = density.space.parameters().len();

@@ -93,13 +93,13 @@ impl WeightedPlan {
         let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
         facts.profile.check(&place)?;
         if !(facts.level > 0.0 && facts.level < 1.0) {
-            return Err(wrong("its level is no share"));
+            return Err(wrong("its confidence level must lie between 0 and 1"));
         }
         if !(0.0..1.0).contains(&facts.defence) {
-            return Err(wrong("its defensive share is no share"));
+            return Err(wrong("its defensive mixture weight must be at least 0 and below 1"));
         }
         if facts.samples == 0 || facts.samples >= 1 << 63 {
-            return Err(wrong("its number of samples cannot be"));
+            return Err(wrong("its number of samples is out of range"));
         }
         let density = DensityModel::from_json(facts.density.as_bytes(), &place)?;
         let proposal = |text: &String| proposal_from_text(text.as_bytes(), &density, &place);
@@ -127,7 +127,7 @@ impl WeightedPlan {
         if let Some(path) = path.as_deref().filter(|path| path.symlink_metadata().is_ok()) {
             refuse_link(path)?;
             if !kind_of(path).is_ok_and(|kind| kind == KIND) {
-                let problem = "it would be overwritten, and it is no pilot of an interrupted run";
+                let problem = "it would be overwritten, and it is not the pilot of an interrupted run";
                 return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
             }
             if let Ok((kept, _)) = WeightedPlan::read(path) {

@@ -176,7 +176,13 @@ impl File {
         }
         let share = self.p_valid;
         if !(share.estimate > 0.0 && share.estimate <= 1.0) || share.valid > share.draws {
-            return wrong("p_valid", format!("{} ({} of {}) is no share", share.estimate, share.valid, share.draws));
+            return wrong(
+                "p_valid",
+                format!(
+                    "{} ({} of {}); expected a fraction above 0 and at most 1",
+                    share.estimate, share.valid, share.draws
+                ),
+            );
         }
         let sizes = [Some(self.sizes.ego), Some(self.sizes.target), self.sizes.lead];
         let lengths = sizes.into_iter().flatten().flat_map(|s| [s.length_m, s.width_m]);

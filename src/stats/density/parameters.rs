@@ -95,7 +95,7 @@ impl ParameterSpace {
         {
             return Err(Error::usage(
                 place(),
-                "with lateral_start = recorded a case needs its recorded start, which is no parameter",
+                "lateral_start = recorded needs the recorded start of every case, and a density has no such parameter",
                 "use lateral_start = lane-width",
             ));
         }

@@ -27,7 +27,7 @@ impl TableReader {
     /// Opens a table and reads the names of its columns; fields of records count as columns `record_field`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for what is no regular file, no table, or one with a damaged header or footer.
+    /// [`Error::Io`]; [`Error::Input`] for anything but a regular file with a table, and for a damaged header or footer.
     pub fn open(path: &Path, format: TableFormat) -> Result<TableReader> {
         let (columns, rows) = match format {
             TableFormat::Csv => {

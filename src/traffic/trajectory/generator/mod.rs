@@ -33,16 +33,16 @@
 //! # The rate factor
 //! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published. The default
 //! of 3 multiplies the *rate* of lane changes and hard braking in view and the share of dense carriageways, so that 60
-//! recordings of four minutes have about as many kept cut-ins and LVDs as the paper, and half as many cut-outs. Rates rise slightly less than the factor,
-//! because lane changes obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
+//! recordings of four minutes have about as many kept cut-ins and LVDs as the paper, and half as many cut-outs. Rates
+//! rise slightly less than the factor, because lane changes obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
 //! A factor of 8 fits the published failures worse: so many lane changes disturb the traffic, and closing speeds and
 //! brakings become those of congestion.
 //!
 //! # Limits
 //! The data contains no row of highD and was fitted to published figures only. It says nothing about real
 //! traffic: do not quote exposure, risk or comparisons of driver models from it. Drivers are never distracted and
-//! never abort a lane change; some braking has no visible cause. Trucks change lanes more often than on a real
-//! motorway, which the published collisions of side by side vehicles need. There are no ramps, curves, motorcycles,
+//! never abort a lane change; some braking has no visible cause. Trucks change lanes 3.84
+//! times as often as cars with the same motive would; the factor is fitted, not measured. There are no ramps, curves, motorcycles,
 //! weather or measurement errors.
 //!
 //! # Reproducibility
