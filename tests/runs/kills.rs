@@ -39,7 +39,7 @@ const fn verb(
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 17] = [
+const VERBS: [Verb; 18] = [
     verb(
         "study",
         Some("run.json"),
@@ -52,6 +52,7 @@ const VERBS: [Verb; 17] = [
         Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
         "study --synth-recordings 1 --categories cut-in --rows rows/lanes.csv --out out",
     ),
+    verb("study --shard", None, None, "study --plan plan/plan.json --shard 0/2 --threads 1 --out out"),
     verb(
         "merge",
         Some("run.json"),
@@ -178,10 +179,10 @@ fn names(dir: &Path) -> Vec<String> {
     entries.map(|entry| entry.file_name().into_string().unwrap()).collect()
 }
 
-/// Not a result: plan and parts, and what is there only while a run is at work.
+/// Not a result: the plan, and what is there only while a run is at work.
 fn is_beside(name: &str) -> bool {
     let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
-    is_of_work || name == "pilot.json" || name == "plan.json" || name == LIST || name.starts_with("part-")
+    is_of_work || name == "pilot.json" || name == "plan.json" || name == LIST
 }
 
 /// Whether files are getting their names.
