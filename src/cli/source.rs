@@ -31,7 +31,7 @@ impl Source {
             Source::Folder(dir) => made_up(dir).unwrap_or_else(|| format!("recordings in {}", dir.display())),
             Source::Scenarios(path) => format!("scenarios of {}", path.display()),
             Source::Generated(options) => format!(
-                "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates {} times those of highD",
+                "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates multiplied by {}",
                 options.recordings, options.duration_s, options.seed, options.event_rate_factor
             ),
         };
