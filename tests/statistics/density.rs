@@ -578,7 +578,7 @@ fn white_space_may_change_but_lengths_must_fit() {
         ("/basis", Value::Null, "needs a decomposition"),
         ("/parameterization", serde_json::json!("9"), "there is no `9`"),
         ("/parameters/0/unit", serde_json::json!("km"), "unit and bounds"),
-        ("/p_valid/estimate", serde_json::json!(1.5), "no share"),
+        ("/p_valid/estimate", serde_json::json!(1.5), "expected a fraction above 0"),
         ("/sizes/ego/length_m", serde_json::json!(0.0), "expected 0.1 to 100 m"),
     ] {
         let mut file = good.clone();
