@@ -1,12 +1,15 @@
 // CCHDM: the careful and competent human driver of UN R157, Annex 3. Twin of src/model/driver/cchdm.rs.
 
 override driver_always_unsafe: bool;
+override driver_until_equal_speeds: bool;
 // m
 override driver_lateral_gate: f32;
 // s
 override driver_ttc: f32;
 // s; 0 where the danger is a TTC
 override driver_headway: f32;
+// m
+override driver_headway_tolerance: f32;
 // m/s²
 override driver_coasting: f32;
 // m/s² per step
@@ -17,7 +20,7 @@ override driver_delay_steps: u32;
 
 // The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
 fn danger_gap(v_ego: f32, dv: f32) -> f32 {
-    return select(driver_ttc * abs(dv), driver_headway * v_ego, driver_headway > 0.0);
+    return select(driver_ttc * abs(dv), driver_headway * v_ego + driver_headway_tolerance, driver_headway > 0.0);
 }
 
 // The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
@@ -36,10 +39,11 @@ fn check(view: View) -> Hazard {
     return Hazard(is_unsafe, driver_max_deceleration);
 }
 
-// A reaction to a cut-out that has begun goes on to standstill.
-fn keeps_braking(state: DriverState) -> bool {
+// A reaction that has begun goes on: to standstill in a cut-out, in a cut-in until the ego is no faster.
+fn keeps_braking(state: DriverState, view: View) -> bool {
     let has_begun = (state.delay_steps != driver_delay_steps) | (state.deceleration > driver_coasting);
-    return (driver_headway > 0.0) & has_begun;
+    let is_faster = driver_until_equal_speeds & (closing(view) > 0.0) & !is_behind(view);
+    return ((driver_headway > 0.0) | is_faster) & has_begun;
 }
 
 // Coast at 0.4 m/s² during the delay, then ramp at 12.65 m/s³ up to 0.774 g.

@@ -127,7 +127,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
         }
     }
 
-    hazard.is_unsafe = hazard.is_unsafe | keeps_braking(state.driver);
+    hazard.is_unsafe = hazard.is_unsafe | keeps_braking(state.driver, first.view);
     state.reaction_step = select(state.reaction_step, index, hazard.is_unsafe & (state.reaction_step == NO_STEP));
     let over = (index >= lane.horizon) & frame_end_when_settled;
     let is_capped = index + 1u >= frame_step_cap;

@@ -20,16 +20,17 @@ use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
 /// Profiles unless told otherwise; the first one decides.
-const PROFILES: [&str; 4] = ["un-r157", "jrc-2021", "paper", "paper-fit"];
+const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
 /// Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
 ///
 /// The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns; flags
 /// win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under every profile.
 /// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. It
-/// has no conflict where nothing collides even if the ego never reacts. It is undecided where half the time step, 1 cm of
-/// gap or 0.1 km/h changes the answer. Then follow the margins, the clauses, and the distance from the boundary along each
-/// number. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 4 input was left out.
+/// has no conflict where nothing collides even if the ego never reacts. It is undecided where a tenth of the time step, 1 cm
+/// of gap or 0.1 km/h changes the answer, and outside Annex 3 where the annex describes no such case. Then follow the
+/// margins, the clauses, and the distance from the boundary along each number. Exit status: 0 preventable, 1 not
+/// preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 input was left out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -51,7 +52,7 @@ pub struct Check {
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
-    /// Profiles; the first decides [default: un-r157,jrc-2021,paper,paper-fit]
+    /// Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
     #[arg(long, alias = "profile", value_name = "LIST", value_delimiter = ',')]
     profiles: Vec<String>,
     /// Also write the sheet as a page to print
@@ -103,6 +104,7 @@ impl Check {
             // Of input that was left out nothing is known, whatever the answer.
             _ if asked.incomplete => Exit::Incomplete,
             Verdict::Undecided => Exit::Undecided,
+            Verdict::OutsideAnnex => Exit::OutsideAnnex,
             Verdict::Answer(Answer::Preventable) => Exit::Ok,
             Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
             Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,

@@ -28,6 +28,8 @@ pub enum Exit {
     Undecided = 8,
     /// Nothing collides in the checked case even where the ego never reacts; the sheet was written.
     NoConflict = 9,
+    /// Annex 3 does not describe the checked case, so its drivers give no answer; the sheet was written.
+    OutsideAnnex = 10,
     /// A defect of the program.
     Internal = 70,
     /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
@@ -36,7 +38,7 @@ pub enum Exit {
 
 impl Exit {
     /// All, for documentation.
-    pub const ALL: [Exit; 12] = [
+    pub const ALL: [Exit; 13] = [
         Exit::Ok,
         Exit::NotPreventable,
         Exit::Usage,
@@ -47,6 +49,7 @@ impl Exit {
         Exit::NoDevice,
         Exit::Undecided,
         Exit::NoConflict,
+        Exit::OutsideAnnex,
         Exit::Internal,
         Exit::Interrupted,
     ];
@@ -69,6 +72,7 @@ impl Exit {
             Exit::NoDevice => "no usable device, or the device failed",
             Exit::Undecided => "the answer on the checked case is undecided (check)",
             Exit::NoConflict => "the checked case has no conflict: nothing to prevent (check)",
+            Exit::OutsideAnnex => "Annex 3 of UN R157 does not describe the checked case (check)",
             Exit::Internal => "a program error",
             Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",
         }

@@ -211,7 +211,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let over = state.over | touched | aborted | (past_horizon & (at_rest | settled));
 
     // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
-    hazard.is_unsafe = hazard.is_unsafe | (runs & model.keeps_braking(&state.driver));
+    hazard.is_unsafe = hazard.is_unsafe | (runs & model.keeps_braking(&state.driver, &first.view));
     let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
     let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
     let state = LaneState {

@@ -14,6 +14,9 @@ use crate::support::repeats::refuse_repeats;
 use crate::support::toml_file;
 use crate::{Error, Place, Result};
 
+/// Steps of a run at most.
+pub(crate) const MAX_STEPS: f64 = 4e6;
+
 /// Which vehicles the ego's driver heeds in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -116,11 +119,13 @@ macro_rules! declare_profile {
 }
 for_every_driver_model!(declare_profile);
 
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 6] = [
     ("paper", include_str!("../../configs/profiles/paper.toml")),
     ("paper-fit", include_str!("../../configs/profiles/paper-fit.toml")),
     ("jrc-2021", include_str!("../../configs/profiles/jrc-2021.toml")),
     ("un-r157", include_str!("../../configs/profiles/un-r157.toml")),
+    ("eu-2022-1426", include_str!("../../configs/profiles/eu-2022-1426.toml")),
+    ("eu-2022-1426-standing", include_str!("../../configs/profiles/eu-2022-1426-standing.toml")),
 ];
 
 impl Profile {
@@ -194,7 +199,7 @@ impl Profile {
             let place = || place.clone().of(format!("`{key}.always_unsafe`"));
             refuse_repeats(place, list.iter().map(|category| (*category, category.key())))?;
         }
-        if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > 4e6 {
+        if self.frame.dt_s > 1.0 || self.frame.time_cap_s / self.frame.dt_s > MAX_STEPS {
             return Err(Error::usage(
                 place.clone().of("`frame.dt_s`"),
                 format!("{} s with a cap of {} s is not usable", self.frame.dt_s, self.frame.time_cap_s),
@@ -381,7 +386,9 @@ mod tests {
             assert!(check(name, 0.1, &ModelId::ALL).is_ok(), "{name}");
             let error = check(name, 0.101, &ModelId::ALL).unwrap_err();
             let says = format!("{error} {}", error.help().unwrap());
-            assert!(says.contains("reg157.margin_s") && says.contains("at most 0.1 s"), "{name}: {says}");
+            // The short reaction times of EU 2022/1426 allow no longer step themselves.
+            let key = if name.starts_with("eu-") { "reg157.reaction_time_s" } else { "reg157.margin_s" };
+            assert!(says.contains(key) && says.contains("at most 0.1 s"), "{name}: {says}");
             assert!(check(name, 0.25, &[ModelId::Rss, ModelId::Fsm]).is_ok(), "{name}");
             assert!(check(name, 0.251, &[ModelId::Fsm]).is_err(), "{name}");
         }

@@ -1,16 +1,16 @@
-//! The sentences that lead a sheet: the case, the answer, what 5.2.5.2 demands.
+//! The sentences that lead a sheet: the case and its reading, the answer, what the clauses of cut-ins demand.
 
 use super::case_sheet::{CaseSheet, KMH};
 use crate::model::driver::ModelId;
-use crate::run::check::{Answer, REFERENCE_DRIVERS, Verdict};
+use crate::run::check::{Answer, Judgement, REFERENCE_DRIVERS, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
 
 /// What a robust verdict survives.
-pub(super) const VARIED: &str = "half the time step, 1 cm of gap, 0.1 km/h of a speed";
+pub(super) const VARIED: &str = "a tenth of the time step, 1 cm of gap, 0.1 km/h of a speed";
 
 impl CaseSheet<'_> {
-    /// The case in one line: speeds along the road in km/h, all else in SI units.
+    /// The case in one line, with the reading that decides: speeds along the road in km/h, all else in SI units.
     pub fn case(&self) -> String {
         let point = self.subject.point();
         let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
@@ -33,7 +33,9 @@ impl CaseSheet<'_> {
                 unit => format!("{name} {} {unit}", value(si)),
             })
         });
-        format!("{}: {}", self.subject.category().label(), parts.collect::<Vec<_>>().join(", "))
+        let first = self.first();
+        let reading = format!("{} under {} ({})", self.subject.category().label(), first.profile, first.danger);
+        format!("{reading}: {}", parts.collect::<Vec<_>>().join(", "))
     }
 
     /// The answer in one sentence; "robust" stands only where it holds for every verdict that is named.
@@ -55,34 +57,44 @@ impl CaseSheet<'_> {
             (!flips.is_empty()).then(|| format!("the verdict of {} changes with {}", model.name(), changes(flips)))
         });
         let of_drivers: Vec<String> = of_drivers.collect();
+        if let (Verdict::OutsideAnnex, Some(reason)) = (first.verdict(), &first.outside_annex) {
+            return format!("{}: {reason}. Its drivers give no answer here ({drivers})", first.verdict().label());
+        }
         let robustness = match (&first.flips[..], &of_drivers[..]) {
             ([], []) => format!("robust: {VARIED} change none of it"),
             ([], of_drivers) => format!("the answer is robust; {}", of_drivers.join("; ")),
             (flips, _) => format!("the answer changes with {}", changes(flips)),
         };
-        format!("{}: {drivers} (profile {}; {robustness})", first.verdict().label(), first.profile)
+        format!("{}: {drivers} ({robustness})", first.verdict().label())
     }
 
-    /// What 5.2.5.2 demands of the system, where it says something of this kind of scenario, and where that and the
+    /// Readings where the regulation is silent, of which another one changes the answer.
+    pub fn silent(&self) -> Vec<String> {
+        self.first()
+            .silent
+            .iter()
+            .map(|sentence| format!("Rests on a reading where Annex 3 is silent: {sentence}"))
+            .collect()
+    }
+
+    /// What the clauses of cut-ins demand of the system, each clause once, and where that of the first profile and the
     /// drivers disagree.
     pub fn demand(&self) -> Vec<String> {
+        let mut sentences = self.demand_of_first();
+        let mut clauses = vec![&self.first().clause];
+        for judgement in &self.judgements[1..] {
+            if !clauses.contains(&&judgement.clause) {
+                sentences.extend(demand_of(judgement));
+                clauses.push(&judgement.clause);
+            }
+        }
+        sentences
+    }
+
+    fn demand_of_first(&self) -> Vec<String> {
         let first = self.first();
-        let Some(is_demanded) = first.is_demanded() else { return Vec::new() };
-        let unmet = first.unmet().map(|reading| {
-            let is =
-                reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
-            let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
-            format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
-        });
-        let unmet: Vec<String> = unmet.collect();
-        let mut sentences = vec![match (is_demanded, &first.demand_flips[..]) {
-            (true, []) => "5.2.5.2: the system has to avoid the collision (robust)".to_owned(),
-            (false, []) => format!("5.2.5.2: no demand: {}", unmet.join("; ")),
-            (_, flips) => format!(
-                "5.2.5.2: undecided: whether the system has to avoid the collision changes with {}",
-                flips.join(", ")
-            ),
-        }];
+        let (Some(is_demanded), Some(demand)) = (first.is_demanded(), demand_of(first)) else { return Vec::new() };
+        let (mut sentences, clause) = (vec![demand], &first.clause);
         // What rounding decides is no disagreement.
         if !first.demand_flips.is_empty() || first.verdict() == Verdict::Undecided {
             return sentences;
@@ -92,20 +104,40 @@ impl CaseSheet<'_> {
             format!("Reg157, the model of the clause, {}", if model_collides { "collides" } else { "avoids it" });
         match (is_demanded, first.verdicts.answer()) {
             (true, Answer::NotPreventable) => sentences.push(format!(
-                "Clause and drivers disagree: 5.2.5.2 demands what CCHDM and FSM do not achieve; {model}"
+                "Clause and drivers disagree: {clause} demands what CCHDM and FSM do not achieve; {model}"
             )),
             (true, Answer::Preventable) if model_collides => {
-                sentences.push(format!("Clause and model disagree: 5.2.5.2 demands an avoidance, and {model}"));
+                sentences.push(format!("Clause and model disagree: {clause} demands an avoidance, and {model}"));
             }
             (true, Answer::NoConflict) => {
-                sentences.push("The conditions of 5.2.5.2 hold, but there is no collision to avoid".to_owned());
+                sentences.push(format!("The conditions of {clause} hold, but there is no collision to avoid"));
             }
-            (false, Answer::Preventable) => sentences.push(
-                "5.2.5.2 makes no demand here; that does not mean unavoidable: a driver of Annex 3 avoids the collision"
-                    .to_owned(),
-            ),
+            (false, Answer::Preventable) => sentences.push(format!(
+                "{clause} makes no demand here; that does not mean unavoidable: a driver of Annex 3 avoids the collision"
+            )),
             _ => {}
         }
         sentences
     }
+}
+
+/// What the clause of a profile demands, where it says something of this kind of scenario.
+fn demand_of(judgement: &Judgement) -> Option<String> {
+    let clause = &judgement.clause;
+    let unmet = judgement.unmet().map(|reading| {
+        let is = reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
+        let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
+        format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
+    });
+    let unmet: Vec<String> = unmet.collect();
+    Some(match (judgement.is_demanded()?, &judgement.demand_flips[..]) {
+        (true, []) => format!("{clause}: the system has to avoid the collision (robust)"),
+        (false, []) => format!("{clause}: no demand: {}", unmet.join("; ")),
+        (_, flips) => {
+            format!(
+                "{clause}: undecided: whether the system has to avoid the collision changes with {}",
+                flips.join(", ")
+            )
+        }
+    })
 }

@@ -10,7 +10,7 @@ use super::tables::{aligned, table};
 use super::trace::{TraceFigure, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Answer, Boundary, Change, Judged, Judgement, Subject, Verdict};
+use crate::run::check::{Answer, Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
 use crate::{Error, Result};
@@ -19,7 +19,8 @@ use crate::{Error, Result};
 pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers are.
 const DRIVERS: &str = "Drivers; smallest gap and TTC, largest BTN. At a contact: rear-end where the ego's front hits, side where \
-                       the other vehicle hits the ego's side or rear; closing is the ego's speed minus the other's";
+                       the other vehicle hits the ego's side or rear; closing is the ego's speed minus the other's. A row that \
+                       equals that of a profile above is left out";
 
 /// A checked case with what has to be said of it.
 pub struct CaseSheet<'a> {
@@ -99,16 +100,16 @@ impl CaseSheet<'_> {
         ];
         let mut rows = Vec::new();
         for judgement in self.judgements {
-            rows.extend(judgement.models.iter().map(|judged| driver_row(judgement, judged)));
+            judgement.models.iter().for_each(|judged| push_new(&mut rows, driver_row(judgement, judged)));
         }
         (header.map(str::to_owned).to_vec(), rows)
     }
 
     fn clauses(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let header = ["clause", "condition", "where it holds", "at s", "value", "", "threshold", "unit", "holds"];
-        let row = |reading: &crate::run::check::Reading| {
+        let row = |reading: &Reading| {
             vec![
-                reading.clause.to_owned(),
+                reading.clause.clone(),
                 reading.quantity.to_owned(),
                 reading.then.to_owned(),
                 reading.time_s.map_or("never".to_owned(), value),
@@ -119,7 +120,14 @@ impl CaseSheet<'_> {
                 if reading.holds() { "yes" } else { "no" }.to_owned(),
             ]
         };
-        (header.map(str::to_owned).to_vec(), self.first().readings.iter().map(row).collect())
+        let mut rows: Vec<Vec<String>> = self.first().readings.iter().map(row).collect();
+        // Of another clause, the conditions that differ.
+        for judgement in &self.judgements[1..] {
+            for row in judgement.conditions().map(row) {
+                push_new(&mut rows, row);
+            }
+        }
+        (header.map(str::to_owned).to_vec(), rows)
     }
 
     fn boundaries(&self) -> (Vec<String>, Vec<Vec<String>>) {
@@ -152,10 +160,12 @@ impl CaseSheet<'_> {
             });
             aligned(table, texts)
         };
-        let demand: Vec<String> = self.demand().iter().map(|sentence| format!("  {sentence}\n")).collect();
+        let sentences = self.demand().into_iter().chain(self.silent());
+        let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
             "{synthetic}{}\n{}\n{}{}\n{DRIVERS}\n{}\nClauses under {}\n{}\nWhere the \
-             answer changes, and each driver's collision, under {}\n{}",
+             answer changes, and each driver's collision, under {}: at least one change lies between the case and this value, \
+             and the answer may change again beyond it\n{}",
             self.case(),
             self.answer(),
             demand.concat(),
@@ -204,8 +214,11 @@ impl CaseSheet<'_> {
                 "dt_s": profile.frame.dt_s,
                 "verdict": judgement.verdict().label(),
                 "answer": judgement.verdicts.answer().label(),
-                "demanded_by_5_2_5_2": judgement.is_demanded(),
+                "clause": judgement.clause,
+                "demanded": judgement.is_demanded(),
                 "demand_changes_with": judgement.demand_flips,
+                "outside_annex_3": judgement.outside_annex,
+                "silent": judgement.silent,
                 "avoided_by": judgement.verdicts.avoided_by().iter().map(|m| m.name()).collect::<Vec<_>>(),
                 "changes_with": judgement.flips,
                 "models": models.collect::<Vec<_>>(),
@@ -229,6 +242,7 @@ impl CaseSheet<'_> {
             "verdict": self.first().verdict().label(),
             "answer": self.answer(),
             "demand": self.demand(),
+            "silent": self.silent(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
         }))
     }
@@ -274,15 +288,18 @@ impl CaseSheet<'_> {
         };
         let clauses = Section {
             intro: format!(
-                "What the clauses of UN Regulation 157 say of the case, with the numbers of {}.",
+                "What the clauses say of the case, with the numbers of {}; then the conditions of other clauses of \
+                 cut-ins that differ from these.",
                 first.profile
             ),
             tables: vec![page_table("Clauses", 3, self.clauses())],
             ..Section::new("clauses", "Clauses")
         };
         let boundaries = Section {
-            intro: "One number is changed, all others stay. \"Changes at\" is the nearest value on either side (below, above) \
-                    at which the answer is another one, and what it is there; the last columns say so of each model's collision."
+            intro: "One number is changed, all others stay, in 100 steps to either end of its range. \"Changes at\" is the \
+                    nearest value found on either side (below, above) at which the answer is another one, and what it is \
+                    there: at least one change lies between, and one that lasts for less than a step of the scan is missed. \
+                    The last columns say so of each model's collision."
                 .to_owned(),
             tables: vec![page_table("Distance to the boundary", 1, self.boundaries())],
             ..Section::new("boundary", "Distance to another answer")
@@ -309,6 +326,7 @@ impl CaseSheet<'_> {
             lead: std::iter::once(self.case())
                 .chain([self.answer()])
                 .chain(self.demand())
+                .chain(self.silent())
                 .map(|sentence| format!("{sentence}."))
                 .collect::<Vec<_>>()
                 .join(" "),
@@ -345,6 +363,14 @@ fn driver_row(judgement: &Judgement, judged: &Judged) -> Vec<String> {
         time(judged.braking_s()),
         judged.flips.join(", "),
     ]
+}
+
+/// Adds a row that differs from all others in more than its first cell: profiles share most drivers, clauses most
+/// conditions.
+fn push_new(rows: &mut Vec<Vec<String>>, row: Vec<String>) {
+    if rows.iter().all(|known| known[1..] != row[1..]) {
+        rows.push(row);
+    }
 }
 
 fn nearest(change: &Change, from: f64) -> Option<f64> {

@@ -119,7 +119,7 @@ impl MapReport {
         }
         if is_robust {
             text.push_str(
-                "Undecided: the verdict changes with half the time step, 1 cm of gap, or 0.1 km/h of a speed.\n",
+                "Undecided: the verdict changes with a tenth of the time step (binary64), 1 cm of gap, or 0.1 km/h of a speed.\n",
             );
         }
         let differences = self.differences();

@@ -102,7 +102,9 @@ fn every_answer_has_its_own_exit_status_and_the_sheet_begins_with_the_case_in_km
         let (code, out, error) = cut_in(ego, other, gap, across, more);
         assert_eq!(code, status, "{ego} {other}: {out} {error}");
         let mut lines = out.lines();
-        let case = format!("cut-in: ego {ego} km/h, other vehicle {other} km/h, gap {gap} m, across {across} m/s");
+        let case = format!(
+            "cut-in under un-r157 (TTC ≤ 2 s): ego {ego} km/h, other vehicle {other} km/h, gap {gap} m, across {across} m/s"
+        );
         assert_eq!(lines.next().unwrap(), case);
         assert!(lines.next().unwrap().starts_with(answer), "{ego} {other}: {out}");
     }

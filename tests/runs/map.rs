@@ -630,7 +630,11 @@ fn named_options_explain_every_cell_between_the_readings() {
     step!("`reg157.always_unsafe`", reg157.always_unsafe);
     step!("`cchdm.perception_time_s`", cchdm.perception_time_s);
     step!("`cchdm.wandering_m`, `lateral_gate_m`", cchdm.wandering_m cchdm.lateral_gate_m);
-    step!("`cchdm.cut_out_headway_s`, `always_unsafe`", cchdm.cut_out_headway_s cchdm.always_unsafe);
+    step!("`cchdm.cut_in_braking`", cchdm.cut_in_braking);
+    step!(
+        "`cchdm.cut_out_headway_s`, its tolerance, `always_unsafe`",
+        cchdm.cut_out_headway_s cchdm.cut_out_headway_tolerance_m cchdm.always_unsafe
+    );
     step!("`cchdm.lead_deceleration_trigger_mps2`", cchdm.lead_deceleration_trigger_mps2);
     step!("`fsm.cfs_step`", fsm.cfs_step);
     step!("`frame.cut_out_target`", frame.cut_out_target);

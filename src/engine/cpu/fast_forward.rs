@@ -56,7 +56,9 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
         let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
         return (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps: state.gaps });
     }
-    if simulation.model.keeps_braking(&state.driver).holds() {
+    let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
+    let first = see(simulation, &ego, &lane.others[0], &places[0], state.gaps[0], index, Flag::TRUE);
+    if simulation.model.keeps_braking(&state.driver, &first.view).holds() {
         return None;
     }
     // A model that does not see its acceleration does not keep the previous speed.

@@ -66,7 +66,7 @@ macro_rules! declare_shaders {
 for_every_driver_model!(declare_shaders);
 
 /// What holds of a model whose shader does not say otherwise, as in its trait.
-const NO_LATCH: &str = "fn keeps_braking(state: DriverState) -> bool { return false; }\n";
+const NO_LATCH: &str = "fn keeps_braking(state: DriverState, view: View) -> bool { return false; }\n";
 
 /// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
 pub fn assemble(model: ModelId) -> String {

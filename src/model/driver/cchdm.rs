@@ -37,6 +37,10 @@ pub struct CchdmProfile {
     /// Cut-out: the danger is a time headway of at most this, s, in place of the TTC (Annex 3: 2.0 s), and the braking
     /// goes on to standstill; 0 keeps the TTC check.
     pub cut_out_headway_s: f64,
+    /// Added to the gap of that headway, m: a gap that was typed to the centimetre counts as the headway that it means.
+    pub cut_out_headway_tolerance_m: f64,
+    /// Cut-in: when braking that has begun ends.
+    pub cut_in_braking: CutInBraking,
     /// LVD: perception begins once the leader decelerates more than this, m/s² (Annex 3: 5 m/s²);
     /// 0 switches the rule off.
     pub lead_deceleration_trigger_mps2: f64,
@@ -46,14 +50,27 @@ pub struct CchdmProfile {
     pub abort_on_large_ttc: bool,
 }
 
+/// When braking for a vehicle that cuts in ends. Annex 3 is silent; its charts do not tell the two apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CutInBraking {
+    /// At each step at which the TTC exceeds `ttc_s` (the JRC's simulator). Braking then begins anew and ends again, and
+    /// the gap creeps shut.
+    WhileUnsafe,
+    /// Once the ego is no faster than the vehicle ahead.
+    UntilEqualSpeeds,
+}
+
 /// The model at one time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cchdm<R> {
     always_unsafe: bool,
+    until_equal_speeds: bool,
     lateral_gate: R,
     ttc: R,
     /// The danger is a headway of at most this, s; 0 where it is a TTC.
     headway: R,
+    headway_tolerance: R,
     coasting: R,
     jerk_per_step: R,
     max_deceleration: R,
@@ -67,9 +84,11 @@ impl DriverProfile for CchdmProfile {
     fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Cchdm<R> {
         Cchdm {
             always_unsafe: self.always_unsafe.contains(&category),
+            until_equal_speeds: category == Category::CutIn && self.cut_in_braking == CutInBraking::UntilEqualSpeeds,
             lateral_gate: R::from_f64(self.lateral_gate_m),
             ttc: R::from_f64(self.ttc_s),
             headway: R::from_f64(if category == Category::CutOut { self.cut_out_headway_s } else { 0.0 }),
+            headway_tolerance: R::from_f64(self.cut_out_headway_tolerance_m),
             coasting: R::from_f64(self.coasting_mps2),
             jerk_per_step: R::from_f64(self.jerk_mps3 * dt_s),
             max_deceleration: R::from_f64(self.max_deceleration_mps2),
@@ -88,6 +107,7 @@ impl DriverProfile for CchdmProfile {
             ("wandering_m", self.wandering_m, Bound::DISTANCE),
             ("perception_time_s", self.perception_time_s, Bound::DELAY),
             ("cut_out_headway_s", self.cut_out_headway_s, Bound::DELAY),
+            ("cut_out_headway_tolerance_m", self.cut_out_headway_tolerance_m, Bound::DISTANCE),
             ("lead_deceleration_trigger_mps2", self.lead_deceleration_trigger_mps2, Bound::ACCELERATION),
             ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
         ]
@@ -118,7 +138,7 @@ impl<R: Real> Cchdm<R> {
     /// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
     #[inline(always)]
     pub fn danger_gap(&self, v_ego: R, dv: R) -> R {
-        if self.headway > R::ZERO { self.headway * v_ego } else { self.ttc * dv.abs() }
+        if self.headway > R::ZERO { self.headway * v_ego + self.headway_tolerance } else { self.ttc * dv.abs() }
     }
 }
 
@@ -157,17 +177,23 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
     }
 
     #[inline(always)]
-    fn keeps_braking(&self, state: &DriverState<R>) -> Flag {
+    fn keeps_braking(&self, state: &DriverState<R>, view: &View<R>) -> Flag {
         let has_begun = Flag::of(state.delay_steps != self.delay_steps) | state.deceleration.is_above(self.coasting);
-        Flag::of(self.headway > R::ZERO) & has_begun
+        if self.until_equal_speeds {
+            has_begun & view.closing().is_positive() & !view.is_behind()
+        } else {
+            Flag::of(self.headway > R::ZERO) & has_begun
+        }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
+            ("driver_until_equal_speeds", f64::from(u8::from(self.until_equal_speeds))),
             ("driver_lateral_gate", self.lateral_gate.to_f64()),
             ("driver_ttc", self.ttc.to_f64()),
             ("driver_headway", self.headway.to_f64()),
+            ("driver_headway_tolerance", self.headway_tolerance.to_f64()),
             ("driver_coasting", self.coasting.to_f64()),
             ("driver_jerk_per_step", self.jerk_per_step.to_f64()),
             ("driver_max_deceleration", self.max_deceleration.to_f64()),

@@ -58,6 +58,7 @@ macro_rules! declare_models {
 }
 for_every_driver_model!(declare_models);
 
+pub use cchdm::CutInBraking;
 pub use fsm::CfsStep;
 
 impl ModelId {
@@ -182,9 +183,10 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     fn initial(&self) -> DriverState<R>;
     /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
     fn check(&self, view: &View<R>) -> Hazard<R>;
-    /// Whether a reaction that has begun goes on to standstill, whatever the check says.
+    /// Whether a reaction that has begun goes on, whatever the check says. `view` is the principal vehicle's; while both
+    /// keep their speeds the answer does not become true.
     #[inline(always)]
-    fn keeps_braking(&self, _state: &DriverState<R>) -> Flag {
+    fn keeps_braking(&self, _state: &DriverState<R>, _view: &View<R>) -> Flag {
         Flag::FALSE
     }
     /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.

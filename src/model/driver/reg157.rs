@@ -16,6 +16,8 @@ use crate::model::scalar::Real;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reg157Profile {
+    /// The clause whose numbers these are, as sheets name it.
+    pub clause: String,
     /// The check opens at this lateral gap, m (0.5 m is 0.3 m beyond the marking for 3.5 m lanes and
     /// 1.9 m cars: R157, 5.2.5.2).
     pub lateral_gate_m: f64,

@@ -1,6 +1,6 @@
 //! How far a case lies from the boundary at which the answer is another one: one number is changed, all others stay. A scan
-//! of evenly spaced values finds the nearest change on either side, bisection then finds the value. A change between two
-//! values of the scan and back is missed.
+//! of evenly spaced values finds the nearest change on either side, bisection then finds the value. At least one change lies
+//! between the case and that value; a change between two values of the scan and back is missed.
 
 use super::subject::Subject;
 use super::{Answer, CaseVerdicts, StepBudget};

@@ -7,9 +7,6 @@ use crate::model::profile::Profile;
 use crate::run::grid::SPEED_MPS;
 use crate::scenario::Category;
 
-/// The clause of cut-ins.
-pub(super) const LANE_INTRUSION: &str = "5.2.5.2";
-
 /// How a value stands to its threshold where the clause applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
@@ -50,7 +47,9 @@ impl Relation {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// Number of the clause.
-    pub clause: &'static str,
+    pub clause: String,
+    /// A condition under which the clause demands that the system avoids the collision.
+    pub is_condition: bool,
     /// What is compared.
     pub quantity: &'static str,
     /// Unit of value and threshold.
@@ -90,11 +89,11 @@ pub(super) fn readings(
     list
 }
 
-/// Do all conditions of 5.2.5.2 hold? `None` where the clause says nothing.
+/// Do all conditions of the clause of cut-ins hold? `None` where it says nothing.
 pub(super) fn is_demanded(readings: &[Reading]) -> Option<bool> {
-    let mut of_clause = readings.iter().filter(|reading| reading.clause == LANE_INTRUSION).peekable();
-    of_clause.peek()?;
-    Some(of_clause.all(Reading::holds))
+    let mut conditions = readings.iter().filter(|reading| reading.is_condition).peekable();
+    conditions.peek()?;
+    Some(conditions.all(Reading::holds))
 }
 
 /// The other vehicle as it intrudes into the ego's lane: between two steps, where the lateral gap is that of the clause.
@@ -118,7 +117,8 @@ impl Intrusion {
     }
 }
 
-/// 5.2.5.2: a collision with a vehicle that cuts in has to be avoided where (a), (b) and (c) hold.
+/// The clause of cut-ins (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision has to be avoided where (a), (b) and (c)
+/// hold. A profile without a time of visible movement has no (b).
 pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let constants = &profile.reg157;
     let other = |step: &TracedStep| step.others[0];
@@ -131,7 +131,8 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let change_mps = |step: &TracedStep| first.map_or(0.0, |first| (other(step).v_mps - first.v_mps).abs());
     let changed = first_largest(trace.steps.iter().map(|step| (step.time_s, change_mps(step))));
     let reading = |quantity, unit, value: Option<f64>, relation, threshold, then| Reading {
-        clause: LANE_INTRUSION,
+        clause: constants.clause.clone(),
+        is_condition: true,
         quantity,
         unit,
         value,
@@ -143,7 +144,7 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let closing_mps = intrusion.as_ref().map(|intrusion| intrusion.closing_mps);
     let required_s =
         closing_mps.unwrap_or(0.0).max(0.0) / (2.0 * constants.deceleration_mps2) + constants.reaction_time_s;
-    vec![
+    let mut list = vec![
         reading(
             "(a) relative speed at lane intrusion",
             "m/s",
@@ -163,23 +164,26 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
                 "the other vehicle keeps its speed, to 0.1 km/h",
             )
         },
-        reading(
+    ];
+    if constants.visible_lateral_movement_s > 0.0 {
+        list.push(reading(
             "(b) lateral movement visible before lane intrusion",
             "s",
             intrusion.as_ref().zip(moved_s).map(|(intrusion, moved_s)| intrusion.time_s - moved_s),
             Relation::AtLeast,
             constants.visible_lateral_movement_s,
             "the movement could be seen",
-        ),
-        reading(
-            "(c) TTC at lane intrusion",
-            "s",
-            intrusion.as_ref().map(|intrusion| intrusion.ttc_s),
-            Relation::Above,
-            required_s,
-            "with (a) and (b): the system has to avoid the collision",
-        ),
-    ]
+        ));
+    }
+    list.push(reading(
+        "(c) TTC at lane intrusion",
+        "s",
+        intrusion.as_ref().map(|intrusion| intrusion.ttc_s),
+        Relation::Above,
+        required_s,
+        "with the conditions above: the system has to avoid the collision",
+    ));
+    list
 }
 
 /// The largest value and the first time of it.
@@ -202,7 +206,8 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         trace.steps.iter().find(|step| step.time_s >= at_s - 1e-9)
     };
     let reading = |quantity, unit, value, relation, threshold, time_s, then| Reading {
-        clause: "Annex 3, CCHDM",
+        clause: "Annex 3, CCHDM".to_owned(),
+        is_condition: false,
         quantity,
         unit,
         value,
@@ -248,8 +253,11 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
             ("TTC when perceived", ttc_s, constants.ttc_s)
         }
         _ => {
-            let headway_s = seen.map(|step| step.others[0].gap_m / step.v_ego_mps.max(1e-9));
-            ("headway when perceived", headway_s, constants.cut_out_headway_s)
+            let ego_mps = seen.map_or(f64::INFINITY, |step| step.v_ego_mps.max(1e-9));
+            let headway_s = seen.map(|step| step.others[0].gap_m / ego_mps);
+            // As the driver compares it: the tolerance is one of the gap.
+            let tolerance_s = constants.cut_out_headway_tolerance_m / ego_mps;
+            ("headway when perceived", headway_s, constants.cut_out_headway_s + tolerance_s)
         }
     };
     let (quantity, value, threshold) = danger;
@@ -268,7 +276,8 @@ fn fuzzy_driver(trace: &Trace) -> Vec<Reading> {
         first.map(|step| step.others[..trace.vehicles].iter().map(of).fold(0.0, f64::max))
     };
     let reading = |quantity, value| Reading {
-        clause: "Annex 3, FSM",
+        clause: "Annex 3, FSM".to_owned(),
+        is_condition: false,
         quantity,
         unit: "1",
         value,

@@ -4,6 +4,7 @@
 //! Here lives what is computed, in f64. The case comes from [`crate::scenario`]; the sheet is made by
 //! [`crate::report`].
 
+mod annex;
 mod boundary;
 mod clauses;
 mod subject;
@@ -63,8 +64,16 @@ pub struct Judgement {
     pub flips: Vec<&'static str>,
     /// The same for each driver's collision, in the order of [`ModelId::ALL`].
     pub driver_flips: Vec<Vec<&'static str>>,
-    /// The same for the demand of 5.2.5.2.
+    /// The same for the demand of the clause of cut-ins.
     pub demand_flips: Vec<&'static str>,
+    /// Clause of cut-ins, by the profile.
+    pub clause: String,
+    /// The danger that the profile's CCHDM waits for, in a few words.
+    pub danger: String,
+    /// Why the case is none that Annex 3 describes; `None` where it is one, or the profile does not read Annex 3.
+    pub outside_annex: Option<String>,
+    /// Readings where the regulation is silent, of which another one changes the answer or the verdict of CCHDM.
+    pub silent: Vec<&'static str>,
     /// What the clauses say of the case.
     pub readings: Vec<Reading>,
     /// Where along each parameter the answer becomes another one.
@@ -95,19 +104,29 @@ impl Judged {
 }
 
 impl Judgement {
-    /// The answer, where no perturbation changes it.
+    /// The answer, where no perturbation changes it, and Annex 3 describes the case. No conflict needs no driver.
     pub fn verdict(&self) -> Verdict {
-        if self.flips.is_empty() { Verdict::Answer(self.verdicts.answer()) } else { Verdict::Undecided }
+        match (self.verdicts.answer(), self.flips.is_empty()) {
+            (Answer::NoConflict, true) => Verdict::Answer(Answer::NoConflict),
+            _ if self.outside_annex.is_some() => Verdict::OutsideAnnex,
+            (answer, true) => Verdict::Answer(answer),
+            (_, false) => Verdict::Undecided,
+        }
     }
 
-    /// Do all conditions of 5.2.5.2 hold, so that the system has to avoid the collision? `None` but for cut-ins.
+    /// Do all conditions of the clause hold, so that the system has to avoid the collision? `None` but for cut-ins.
     pub fn is_demanded(&self) -> Option<bool> {
         clauses::is_demanded(&self.readings)
     }
 
-    /// Conditions of 5.2.5.2 that do not hold.
+    /// The conditions of the clause of cut-ins.
+    pub fn conditions(&self) -> impl Iterator<Item = &Reading> {
+        self.readings.iter().filter(|reading| reading.is_condition)
+    }
+
+    /// Those that do not hold.
     pub fn unmet(&self) -> impl Iterator<Item = &Reading> {
-        self.readings.iter().filter(|reading| reading.clause == clauses::LANE_INTRUSION && !reading.holds())
+        self.conditions().filter(|reading| !reading.holds())
     }
 
     /// Perturbations under which a driver's collision is another one.
@@ -210,9 +229,33 @@ impl Check {
             flips: flips(&changed, |changed| changed.verdicts.answer()),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
             demand_flips: flips(&changed, |changed| changed.is_demanded),
+            clause: profile.reg157.clause.clone(),
+            danger: annex::danger(profile, self.subject.category()),
+            outside_annex: annex::outside(profile, &self.subject),
+            silent: self.silent(profile, &changed[0].verdicts, &budget)?,
             readings: clauses::readings(profile, self.subject.category(), &unreacting, &trace),
             boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
         })
+    }
+
+    /// Readings where the regulation is silent that the answer rests on.
+    fn silent(&self, profile: &Profile, is: &CaseVerdicts, budget: &StepBudget) -> Result<Vec<&'static str>> {
+        let category = self.subject.category();
+        let decides = |other: &Profile| -> Result<bool> {
+            budget.check()?;
+            let lane = self.subject.lane(other, self.subject.point())?;
+            let found = verdicts(&lane, other, category, budget);
+            Ok(found.answer() != is.answer() || found.collides(ModelId::Cchdm) != is.collides(ModelId::Cchdm))
+        };
+        let mut all = Vec::new();
+        for (sentence, other) in annex::readings_where_silent(profile, category) {
+            if !all.contains(&sentence) && decides(&other)? {
+                all.push(sentence);
+            }
+        }
+        let lane = self.subject.lane(profile, self.subject.point())?;
+        all.extend(annex::attends_at_once(profile, category, &lane));
+        Ok(all)
     }
 
     /// The verdicts of the case and of each perturbation. The case itself comes first.

@@ -32,6 +32,8 @@ pub enum Verdict {
     Answer(Answer),
     /// A perturbation changes it.
     Undecided,
+    /// Annex 3 does not describe such a case, so its drivers do not tell what is preventable.
+    OutsideAnnex,
 }
 
 impl Verdict {
@@ -40,6 +42,7 @@ impl Verdict {
         match self {
             Verdict::Answer(answer) => answer.label(),
             Verdict::Undecided => "undecided",
+            Verdict::OutsideAnnex => "outside Annex 3",
         }
     }
 }

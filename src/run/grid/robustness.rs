@@ -1,9 +1,9 @@
-//! Robust verdicts: does a verdict survive half the time step, a centimetre of gap, a tenth of a kilometre per hour? A case
+//! Robust verdicts: does a verdict survive a tenth of the time step, a centimetre of gap, a tenth of a kilometre per hour? A case
 //! whose verdict does not is *undecided*: rounding decides it, or a measurement would have to be better than it is.
 
 use super::parameter::{MapQuantity, Point};
 use crate::Result;
-use crate::model::profile::Profile;
+use crate::model::profile::{MAX_STEPS, Profile};
 
 /// Change of the initial gap, m.
 pub const GAP_M: f64 = 0.01;
@@ -13,8 +13,9 @@ pub const SPEED_MPS: f64 = 0.1 / 3.6;
 /// A small change of a case or of how it is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Perturbation {
-    /// Half the time step.
-    HalfStep,
+    /// A tenth of the time step, in binary64: what steps and rounding decide. Half a step would keep half of the error of
+    /// whole steps, and round a delay as the step itself does.
+    FinerStep,
     /// One centimetre of initial gap more.
     GapMore,
     /// One centimetre less.
@@ -32,7 +33,7 @@ pub enum Perturbation {
 impl Perturbation {
     /// All, in the order of messages.
     pub const ALL: [Perturbation; 7] = [
-        Perturbation::HalfStep,
+        Perturbation::FinerStep,
         Perturbation::GapMore,
         Perturbation::GapLess,
         Perturbation::EgoFaster,
@@ -44,7 +45,7 @@ impl Perturbation {
     /// What it is, in words.
     pub fn label(self) -> &'static str {
         match self {
-            Perturbation::HalfStep => "half the time step",
+            Perturbation::FinerStep => "a tenth of the time step",
             Perturbation::GapMore => "gap + 1 cm",
             Perturbation::GapLess => "gap - 1 cm",
             Perturbation::EgoFaster => "ego + 0.1 km/h",
@@ -69,9 +70,17 @@ impl Perturbation {
     /// [`crate::Error::Usage`] for a time step that is too short.
     pub fn profile(self, profile: &Profile) -> Result<Profile> {
         match self {
-            Perturbation::HalfStep => profile.clone().with_dt(profile.frame.dt_s / 2.0),
+            Perturbation::FinerStep => {
+                let frame = &profile.frame;
+                profile.clone().with_dt((frame.dt_s / 10.0).max(frame.time_cap_s / MAX_STEPS).min(frame.dt_s))
+            }
             _ => Ok(profile.clone()),
         }
+    }
+
+    /// Is the changed case computed in binary64, whatever the sweep computes in?
+    pub fn is_binary64(self) -> bool {
+        self == Perturbation::FinerStep
     }
 
     /// The same point with other speeds; a vehicle without a speed of its own has the ego's. A speed stays where its change

@@ -5,7 +5,7 @@ use super::map::GridMap;
 use super::plan::GridPlan;
 use super::presets::{self, Preset, Presets};
 use super::robustness::Perturbation;
-use crate::engine::{Executor, LanePlan, SweepSummary};
+use crate::engine::{CpuBackend, Executor, LanePlan, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -80,9 +80,9 @@ struct PlannedGrid {
     is_chosen_to_match: bool,
     other: Option<(String, GridPlan)>,
     /// The same cells, perturbed.
-    perturbed: Vec<GridPlan>,
+    perturbed: Vec<(Perturbation, GridPlan)>,
     /// Those of the other profile.
-    other_perturbed: Vec<GridPlan>,
+    other_perturbed: Vec<(Perturbation, GridPlan)>,
 }
 
 /// A swept grid with what is known of it.
@@ -170,7 +170,7 @@ impl Map {
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
             let perturbed = |plan: &GridPlan, profile: &Profile| {
                 let all = Perturbation::ALL.iter().filter(|_| options.robust);
-                all.map(|perturbation| plan.perturbed(profile, *perturbation)).collect::<Result<Vec<_>>>()
+                all.map(|by| Ok((*by, plan.perturbed(profile, *by)?))).collect::<Result<Vec<_>>>()
             };
             let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
             grids.push(PlannedGrid {
@@ -192,9 +192,9 @@ impl Map {
     pub fn plans(&self) -> impl Iterator<Item = (Option<&str>, &GridPlan)> {
         self.grids.iter().flat_map(|grid| {
             let other = grid.other.iter().map(|(name, plan)| (Some(name.as_str()), plan));
-            let perturbed = grid.perturbed.iter().map(|plan| (Some("a perturbation"), plan));
-            let of_other = grid.other_perturbed.iter().map(|plan| (Some("a perturbation"), plan));
-            std::iter::once((None, &grid.plan)).chain(other).chain(perturbed).chain(of_other)
+            let perturbed = grid.perturbed.iter().chain(&grid.other_perturbed);
+            let perturbed = perturbed.map(|(_, plan)| (Some("a perturbation"), plan));
+            std::iter::once((None, &grid.plan)).chain(other).chain(perturbed)
         })
     }
 
@@ -219,15 +219,17 @@ impl Map {
     /// As [`GridMap::sweep`].
     pub fn run(self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<MapResult> {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        let mut swept = |plan: &GridPlan, perturbed: &[GridPlan]| -> Result<GridMap> {
-            let mut sweep = |plan: &GridPlan| -> Result<GridMap> {
+        let reference = CpuBackend::reference();
+        let binary64 = Executor { chunk_lanes: executor.chunk_lanes, ..Executor::new(&reference) };
+        let mut swept = |plan: &GridPlan, perturbed: &[(Perturbation, GridPlan)]| -> Result<GridMap> {
+            let mut sweep = |plan: &GridPlan, executor: &Executor| -> Result<GridMap> {
                 let (map, of_map) = GridMap::sweep(plan, executor)?;
                 summary.add(&of_map);
                 Ok(map)
             };
-            let mut map = sweep(plan)?;
-            for plan in perturbed {
-                map.mark_undecided(&sweep(plan)?);
+            let mut map = sweep(plan, executor)?;
+            for (by, plan) in perturbed {
+                map.mark_undecided(&sweep(plan, if by.is_binary64() { &binary64 } else { executor })?);
             }
             Ok(map)
         };

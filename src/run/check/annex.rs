@@ -1,0 +1,104 @@
+//! What Annex 3 of UN R157 describes and where it is silent: the danger that a profile's CCHDM waits for, cases outside
+//! the annex, and readings of ours that decide a case. All follow from the profile, so a profile without the annex's rules
+//! has none.
+
+use super::subject::{Lane, Subject};
+use crate::model::driver::{BelowTrigger, CutInBraking};
+use crate::model::profile::Profile;
+use crate::run::grid::{MapQuantity, SPEED_MPS};
+use crate::scenario::Category;
+use crate::support::readable::value;
+
+/// The danger of a category, in a few words.
+pub(super) fn danger(profile: &Profile, category: Category) -> String {
+    let cchdm = &profile.cchdm;
+    let trigger_mps2 = cchdm.lead_deceleration_trigger_mps2;
+    match category {
+        Category::CutOut if cchdm.cut_out_headway_s > 0.0 => format!("headway ≤ {} s", value(cchdm.cut_out_headway_s)),
+        Category::Lvd if trigger_mps2 > 0.0 => {
+            let below = match cchdm.lvd_below_threshold {
+                BelowTrigger::Never => "no reaction",
+                BelowTrigger::DelayOnly => "the delay only",
+                BelowTrigger::AtOnce => "at once",
+            };
+            format!("leader beyond {} m/s², else {below}", value(trigger_mps2))
+        }
+        category if cchdm.always_unsafe.contains(&category) => "brakes without a test".to_owned(),
+        _ => format!("TTC ≤ {} s", value(cchdm.ttc_s)),
+    }
+}
+
+/// Why Annex 3 does not describe a case.
+pub(super) fn outside(profile: &Profile, subject: &Subject) -> Option<String> {
+    let (cchdm, point) = (&profile.cchdm, subject.point());
+    let ego_mps = point.get(MapQuantity::EgoSpeed)?;
+    match subject.category() {
+        Category::Lvd if cchdm.lead_deceleration_trigger_mps2 > 0.0 => {
+            let lead_mps = point.get(MapQuantity::OtherSpeed)?;
+            (ego_mps > lead_mps + SPEED_MPS).then(|| {
+                "the ego is faster than the leader from the start; the annex starts at equal speeds, and its driver reacts \
+                 to a deceleration only"
+                    .to_owned()
+            })
+        }
+        Category::CutOut if cchdm.cut_out_headway_s > 0.0 => {
+            let headway_s = cchdm.cut_out_headway_s;
+            let (gap_m, thw_s) = (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw));
+            let gap_m = gap_m.or_else(|| thw_s.map(|thw_s| thw_s * ego_mps))?;
+            (gap_m > headway_s * ego_mps + cchdm.cut_out_headway_tolerance_m + 1e-9).then(|| {
+                format!(
+                    "the headway of {} s is longer than the {} s at which the annex follows and its driver sees a danger",
+                    value(gap_m / ego_mps),
+                    value(headway_s)
+                )
+            })
+        }
+        Category::CutIn | Category::CutOut | Category::Lvd => None,
+    }
+}
+
+/// Readings where the annex is silent, each with a profile that reads otherwise.
+pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(&'static str, Profile)> {
+    let mut all = Vec::new();
+    let mut other = |sentence, change: &dyn Fn(&mut Profile)| {
+        let mut other = profile.clone();
+        change(&mut other);
+        if other != *profile {
+            all.push((sentence, other));
+        }
+    };
+    // A profile that does not read the annex has no silence of it.
+    if profile.cchdm.wandering_m <= 0.0 {
+        return all;
+    }
+    other("CCHDM coasts at 0.4 m/s² during its delay (the JRC's; the annex gives no value)", &|other| {
+        other.cchdm.coasting_mps2 = 0.0;
+    });
+    match category {
+        Category::CutIn => {
+            other("CCHDM brakes until the speeds are equal, not only while TTC ≤ 2 s (ours)", &|other| {
+                other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe;
+            });
+        }
+        Category::Lvd => {
+            for below in [BelowTrigger::Never, BelowTrigger::DelayOnly, BelowTrigger::AtOnce] {
+                other(
+                    "CCHDM reacts to a leader that never exceeds the trigger by `lvd_below_threshold` (ours)",
+                    &|other| {
+                        other.cchdm.lvd_below_threshold = below;
+                    },
+                );
+            }
+        }
+        Category::CutOut => {}
+    }
+    all
+}
+
+/// A cutter that overlaps the ego's path at the start has no deviation to show: that it is perceived at once is ours.
+pub(super) fn attends_at_once(profile: &Profile, category: Category, lane: &Lane) -> Option<&'static str> {
+    let cutter = &lane.case.others[0];
+    let overlaps = cutter.motion.lateral(&lane.tables, 0).position.abs() <= cutter.half_widths;
+    let applies = category == Category::CutIn && profile.cchdm.wandering_m > 0.0 && overlaps;
+    applies.then_some("CCHDM attends at once to a vehicle that overlaps the ego's path at the start (ours)")
+}
