@@ -203,8 +203,8 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         std::fs::write(&path, content).unwrap();
         text(&path).to_owned()
     };
-    let key = file("key.toml", "[score]\nbootstrap_drawz = 5\n");
-    let range = file("range.toml", "[score]\nbootstrap_draws = 0\n");
+    let key = file("key.toml", "[score]\nleast_failurez = 5\n");
+    let range = file("range.toml", "[score]\nconfidence = 0\n");
     let svd = file("svd.toml", "[parameterization]\nsvd_instants = 1\n");
     let profile = file("profile.toml", "name = \"x\"\n");
     let no_table = file("table.csv", "a,b\n1,2\n");
@@ -213,8 +213,8 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--profile", &profile], 2, "missing field"),
         (&["study", "--dt", "0"], 2, "--dt"),
         (&["study", "--dt", "NaN"], 2, "--dt"),
-        (&["study", "--config", &key], 2, "bootstrap_drawz"),
-        (&["study", "--config", &range], 2, "score.bootstrap_draws"),
+        (&["study", "--config", &key], 2, "least_failurez"),
+        (&["study", "--config", &range], 2, "score.confidence"),
         (&["study", "--config", &svd], 2, "svd_instants"),
         (&["study", "--categories", "cutin"], 2, "use cut-in, cut-out, lvd"),
         (&["study", "--threads", "0"], 2, "use at least 1"),
