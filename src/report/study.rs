@@ -110,6 +110,7 @@ impl StudyReport {
         let chart = RadarChart {
             title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
+            failing: spokes.iter().map(|&(model, criterion)| scores.failing_scenarios(model, criterion)).collect(),
             spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
             series: series.collect(),
         };
@@ -168,6 +169,7 @@ impl StudyReport {
             "f1": records(&csv::f1_scores(&self.scores, "")?)?,
             "claims": records(&csv::claims(&self.claims, "")?)?,
         });
+        value["best"] = self.best.iter().map(best).collect();
         if self.published {
             value["published"] = published(&self.scores);
         }
@@ -176,6 +178,19 @@ impl StudyReport {
         }
         document(&value)
     }
+}
+
+/// A best parameterization; numbers without one are null.
+fn best(best: &Best) -> Value {
+    let score = best.score.as_ref();
+    serde_json::json!({
+        "category": best.category.key(), "model": best.model.name(), "criterion": Criterion::Collision.key(),
+        "s_failures": best.failures, "failing_scenarios": best.failing_scenarios,
+        "parameterization": score.map(|s| &s.variant), "f1": score.map(|s| s.f1),
+        "f1_low": score.map(|s| s.interval.low), "f1_high": score.map(|s| s.interval.high),
+        "hidden": score.map(|s| s.hidden), "not_told_apart": score.map(|s| &s.rivals),
+        "more_data": score.map(|s| s.more_data).filter(|times| times.is_finite()),
+    })
 }
 
 /// The paper's numbers, of highD.

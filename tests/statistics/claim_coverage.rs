@@ -206,9 +206,14 @@ fn verdicts_about_claims_are_seldom_wrong() {
         "better of, wrong", "scenarios", "truth"
     );
     let mut missed = Vec::new();
-    for (better, wrong) in
-        [(1, vec![0.1; 2]), (1, vec![0.1; 5]), (2, vec![0.1; 5]), (1, vec![0.02, 0.1, 0.1]), (1, vec![0.1, 0.02])]
-    {
+    for (better, wrong) in [
+        (1, vec![0.1; 2]),
+        (1, vec![0.1; 5]),
+        (2, vec![0.1; 5]),
+        (1, vec![0.02, 0.1, 0.1]),
+        (1, vec![0.1, 0.02]),
+        (1, vec![0.02, 0.5]),
+    ] {
         for n in [40, 100, 400] {
             let population = Population { failing: 0.3, wrong: wrong.clone(), better, common: 0.4 };
             let truth = population.truth();

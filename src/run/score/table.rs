@@ -98,6 +98,11 @@ impl CategoryScores {
         Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
     }
 
+    /// Scenarios in which S fails a criterion with a model; 0 for a model that was not run.
+    pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
+        self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)
+    }
+
     /// A variant by its name.
     pub fn variant(&self, name: &str) -> Option<usize> {
         self.variants.iter().position(|v| v == name)
