@@ -19,7 +19,7 @@ use cmaes::{CMAESOptions, DVector};
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::score::{
-    CategoryScores, Misfit, ScoreOptions, ScoreTable, f1, judge_claims, published_failures, published_lvd_f1,
+    CategoryScores, ClaimResult, Misfit, ScoreTable, f1, judge_claims, published_failures, published_lvd_f1,
 };
 use lanesweep::run::study::Study;
 use lanesweep::scenario::Category;
@@ -31,8 +31,6 @@ use rayon::prelude::*;
 /// Seed of the recordings that the fit sees, and their number.
 const FITTED_SEED: u64 = 1_000_001;
 const FITTED_RECORDINGS: usize = 80;
-/// Bootstrap draws of the scores that are shown; the fit needs none.
-const SHOWN_DRAWS: usize = 1000;
 
 /// The share that no set came near to.
 const NOT_REACHED: &str = "cut-out CCHDM TTC";
@@ -63,6 +61,7 @@ const RANGES: [(&str, f64, f64); 18] = [
 struct Outcome {
     collection: Collection,
     scores: ScoreTable,
+    claims: Vec<ClaimResult>,
     rate_factor: f64,
     traffic: Traffic,
 }
@@ -129,7 +128,7 @@ fn mode(values: &[f64], bin: f64) -> f64 {
 }
 
 impl Outcome {
-    fn of(options: &GeneratorOptions, bootstrap_draws: usize) -> Result<Outcome, Box<dyn Error>> {
+    fn of(options: &GeneratorOptions) -> Result<Outcome, Box<dyn Error>> {
         let part = |index| {
             let recording = generate_one(options, index)?;
             let mined = mine(&recording, &MiningOptions::default());
@@ -142,11 +141,12 @@ impl Outcome {
             traffic = traffic.add(of_recording);
             collection.scenarios.extend(scenarios);
         }
-        let score = ScoreOptions { bootstrap_draws, ..ScoreOptions::default() };
-        let study = Study::builder(&collection, Profile::load("paper")?).score(score).plan()?;
+        let study = Study::builder(&collection, Profile::load("paper")?).plan()?;
         let backend = CpuBackend::lane_arithmetic();
-        let scores = study.score(&study.run(&Executor::new(&backend))?.counts)?;
-        Ok(Outcome { collection, scores, rate_factor: options.event_rate_factor, traffic })
+        let counts = study.run(&Executor::new(&backend))?.counts;
+        let scores = study.score(&counts)?;
+        let claims = judge_claims(&scores, study.plan(), &counts);
+        Ok(Outcome { collection, scores, claims, rate_factor: options.event_rate_factor, traffic })
     }
 
     /// Every share of failures with the published one, per cent.
@@ -257,7 +257,7 @@ fn fit(evaluations: usize, start: Behaviour) -> Result<(), Box<dyn Error>> {
                 behaviour,
                 ..GeneratorOptions::default()
             };
-            let outcome = Outcome::of(&options, 20)?;
+            let outcome = Outcome::of(&options)?;
             let loss = outcome.loss();
             if loss < best {
                 best = loss;
@@ -291,7 +291,7 @@ fn row(name: &str, published: &str, of_seeds: impl Iterator<Item = String>) {
 fn show(seeds: &[u64], behaviour: Behaviour) -> Result<(), Box<dyn Error>> {
     let of_seed = |&seed: &u64| {
         let options = GeneratorOptions { seed, behaviour, ..GeneratorOptions::default() };
-        Outcome::of(&options, SHOWN_DRAWS)
+        Outcome::of(&options)
     };
     let outcomes = seeds.iter().map(of_seed).collect::<Result<Vec<_>, _>>()?;
     let each = |text: &dyn Fn(&Outcome) -> String| outcomes.iter().map(text).collect::<Vec<_>>().into_iter();
@@ -319,9 +319,8 @@ fn show(seeds: &[u64], behaviour: Behaviour) -> Result<(), Box<dyn Error>> {
         let name = format!("F1 LVD {name} {} {}", cell.model.name(), cell.criterion.label());
         row(&name, &format!("{theirs:.3}"), each(&|outcome| text(outcome).unwrap_or_else(|| "–".to_owned())));
     }
-    let claims: Vec<_> = outcomes.iter().map(|outcome| judge_claims(&outcome.scores)).collect();
-    for (at, claim) in claims[0].iter().enumerate() {
-        row(claim.claim.id, "", claims.iter().map(|of| of[at].overall.verdict.text().to_owned()));
+    for (at, claim) in outcomes[0].claims.iter().enumerate() {
+        row(claim.claim.id, "", outcomes.iter().map(|of| of.claims[at].verdict.text().to_owned()));
     }
     let misfit = |outcome: &Outcome| Misfit::of(&outcome.scores).expect("all models are published");
     let within = |outcome: &Outcome| {

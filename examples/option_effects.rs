@@ -13,7 +13,7 @@ use std::error::Error;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::score::{ClaimResult, Misfit, ScoreOptions, ScoreTable, f1, judge_claims};
+use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, f1, judge_claims};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
@@ -108,13 +108,21 @@ impl Settings {
         Ok(changed)
     }
 
-    fn scores(&self, collection: &Collection) -> Result<ScoreTable, Box<dyn Error>> {
+    fn scores(&self, collection: &Collection) -> Result<Scored, Box<dyn Error>> {
         let options = StudyOptions { parameterization: self.parameterization.clone(), ..StudyOptions::default() };
-        let score = ScoreOptions { bootstrap_draws: 200, ..ScoreOptions::default() };
-        let study = Study::builder(collection, self.profile.clone()).options(options).score(score).plan()?;
+        let study = Study::builder(collection, self.profile.clone()).options(options).plan()?;
         let backend = CpuBackend::lane_arithmetic();
-        Ok(study.score(&study.run(&Executor::new(&backend))?.counts)?)
+        let counts = study.run(&Executor::new(&backend))?.counts;
+        let table = study.score(&counts)?;
+        let claims = judge_claims(&table, study.plan(), &counts);
+        Ok(Scored { table, claims })
     }
+}
+
+/// Scores of a study with its claims.
+struct Scored {
+    table: ScoreTable,
+    claims: Vec<ClaimResult>,
 }
 
 fn merged(mut old: toml::Table, new: toml::Table) -> toml::Table {
@@ -155,17 +163,16 @@ fn changes<'a>(old: &'a [(String, f64)], new: &[(String, f64)]) -> Vec<(&'a str,
 }
 
 /// The claims with another verdict than before, joined by semicolons.
-fn other_verdicts(base: &ScoreTable, scores: &ScoreTable) -> String {
-    let (old, new) = (judge_claims(base), judge_claims(scores));
+fn other_verdicts(base: &[ClaimResult], claims: &[ClaimResult]) -> String {
     let other = |(old, new): (&ClaimResult, &ClaimResult)| {
-        let verdict = new.overall.verdict;
-        (verdict != old.overall.verdict).then(|| format!("{}: {}", new.claim.id.replace(',', " and"), verdict.text()))
+        let verdict = new.verdict;
+        (verdict != old.verdict).then(|| format!("{}: {}", new.claim.id.replace(',', " and"), verdict.text()))
     };
-    old.iter().zip(&new).filter_map(other).collect::<Vec<_>>().join("; ")
+    base.iter().zip(claims).filter_map(other).collect::<Vec<_>>().join("; ")
 }
 
-fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
-    let ((old_shares, old_f1), (shares, f1s)) = (numbers(base), numbers(scores));
+fn row(base: &Scored, scores: &Scored) -> String {
+    let ((old_shares, old_f1), (shares, f1s)) = (numbers(&base.table), numbers(&scores.table));
     let (shares, f1s) = (changes(&old_shares, &shares), changes(&old_f1, &f1s));
     let largest = |changes: &[(&str, f64)]| {
         let most = changes.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
@@ -174,8 +181,8 @@ fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
     let n = |changes: &[(&str, f64)]| changes.len().max(1) as f64;
     let s_points = (shares.iter().map(|(_, d)| d * d).sum::<f64>() / n(&shares)).sqrt();
     let f1_change = f1s.iter().map(|(_, d)| d.abs()).sum::<f64>() / n(&f1s);
-    let misfit = Misfit::of(scores).expect("all models are published");
-    let kept: Vec<String> = scores.categories.iter().map(|category| category.scenarios.to_string()).collect();
+    let misfit = Misfit::of(&scores.table).expect("all models are published");
+    let kept: Vec<String> = scores.table.categories.iter().map(|category| category.scenarios.to_string()).collect();
     format!(
         "{},{s_points:.2},{},{f1_change:.3},{},{:.2},{:.3},{}",
         kept.join(" "),
@@ -183,7 +190,7 @@ fn row(base: &ScoreTable, scores: &ScoreTable) -> String {
         largest(&f1s),
         misfit.share_rms_points,
         misfit.f1_mean,
-        other_verdicts(base, scores)
+        other_verdicts(&base.claims, &scores.claims)
     )
 }
 

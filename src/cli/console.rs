@@ -10,6 +10,7 @@ use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
+use crate::report::tables::WIDTH;
 use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
@@ -49,6 +50,13 @@ pub fn start_log(verbosity: Verbosity) {
         .with_target(false)
         .without_time()
         .try_init();
+}
+
+/// Columns for tables on stdout: `COLUMNS` where it is set, the terminal's, or 120 where there is none.
+pub fn width() -> usize {
+    let set = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let terminal = || Some(usize::from(terminal_size::terminal_size_of(io::stdout())?.0.0));
+    set.filter(|width| *width > 0).or_else(terminal).unwrap_or(WIDTH)
 }
 
 /// Writes a text to stdout.

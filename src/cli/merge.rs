@@ -7,7 +7,7 @@ use clap::Args;
 use super::Exit;
 use super::format::FormatFlag;
 use super::sample_run;
-use super::study_run::{Host, finish_study};
+use super::study_run::{Host, TablesFlag, finish_study};
 use crate::interop::cluster::quoted_word;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, Shard, kind_of};
@@ -30,6 +30,8 @@ pub struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR")]
     dir: PathBuf,
+    #[command(flatten)]
+    tables: TablesFlag,
     #[command(flatten)]
     format: FormatFlag,
 }
@@ -63,7 +65,11 @@ impl Merge {
             move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
         };
         match kind.as_str() {
-            Study::KIND => merge_study(&OutputDir::open(&self.dir, STUDY_RECORD)?, &again("study"), self.format),
+            Study::KIND => merge_study(
+                &OutputDir::open(&self.dir, STUDY_RECORD)?,
+                &again("study"),
+                (self.format, self.tables.tables),
+            ),
             kind if Sample::is_kind(kind) => {
                 sample_run::merge(&OutputDir::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
             }
@@ -75,7 +81,7 @@ impl Merge {
     }
 }
 
-fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
+fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: (FormatFlag, bool)) -> Result<Exit> {
     let (study, result) = Study::merge_or(folder.dir(), again)?;
     let host = Host {
         backend: format!("{} merged", counted(result.parts, "part")),

@@ -59,9 +59,10 @@ pub(super) fn write(
     file: &mut EstimateFile,
 ) -> Result<Vec<PageFigure>> {
     let mut figures = Vec::new();
+    let level = run.rows.first().map_or(0.95, |row| row.estimate.interval.level);
     if !run.convergence.is_empty() {
         results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
-        let figure = ConvergenceFigure::of(density, &run.convergence).figure();
+        let figure = ConvergenceFigure::of(density, &run.convergence, level).figure();
         let svg = figure.svg();
         results.add("convergence.svg", svg.as_bytes())?;
         figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));

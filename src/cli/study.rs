@@ -12,7 +12,7 @@ use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
 use super::source::{self, PlausibilityFlag, Source};
-use super::study_run::{Host, compare_reference, finish_study, lane_format, write_lanes};
+use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
@@ -36,7 +36,7 @@ const FORECAST_BYTES: u64 = 64 << 20;
 ///
 /// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S') from ten
 /// time headways against every driver model, judges collision, TTC and BTN, and scores S' against S. Without data it
-/// runs on generated recordings. Tables go to stdout, files to --out.
+/// runs on generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
@@ -60,7 +60,7 @@ pub struct Study {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, alias = "lanes", value_name = "FILE")]
     rows: Option<PathBuf>,
-    /// Also show the paper's published numbers (of highD)
+    /// Print all tables, with the paper's published numbers (of highD)
     #[arg(long)]
     published: bool,
     /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
@@ -69,7 +69,7 @@ pub struct Study {
     /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
     #[arg(long, conflicts_with = "reference")]
     compare_reference: bool,
-    /// Seed of the bootstrap [default: 157]
+    /// Seed of the choice of lanes that are computed again [default: 157]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
@@ -91,6 +91,8 @@ pub struct Study {
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
     dry_run: bool,
+    #[command(flatten)]
+    tables: TablesFlag,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
@@ -197,7 +199,10 @@ impl Study {
         let mut config = configured.settings.clone();
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let (profile, options, source) = self.asked(configured)?;
-        tracing::info!("{}", source.describe(false));
+        // What is generated is said with the answer.
+        if !matches!(source, Source::Generated(_)) {
+            tracing::info!("{}", source.describe(false));
+        }
         let mut timings = Timings::default();
         let collection =
             timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
@@ -229,19 +234,18 @@ impl Study {
             forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
         forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
         forecast.lanes = plan.lane_count();
-        // The counts of every unit, in the ledger and joined; every draw's counts of every cell.
+        // The counts of every unit, in the ledger and joined.
         let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
-        let (of_unit, of_draw) = (size_of::<Confusion<u32>>() as u64, size_of::<Confusion>() as u64);
+        let of_unit = size_of::<Confusion<u32>>() as u64;
         let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
-        let draws = |block: &Block| study.facts().score.bootstrap_draws as u64 * cells_of(block) * of_draw;
         DryRun {
             data: study.facts().data.clone(),
             parts: dry_run::parts(plan),
             units: "scenarios",
             is_at_most: false,
-            more_bytes: plan.blocks.iter().map(|block| counts(block) + draws(block)).sum::<u64>()
+            more_bytes: plan.blocks.iter().map(counts).sum::<u64>()
                 + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
-            more: "counts, bootstrap and the series of a window",
+            more: "counts and the series of a window",
             forecast: Some(forecast),
             backend: backend.describe(),
             before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
@@ -302,7 +306,8 @@ impl Study {
             settings: configured.record(),
         };
         self.leave_plan(study, &mut results)?;
-        let exit = finish_study(study, &counts, comparison, host, results, self.format)?;
+        let tables = self.tables.tables || self.published;
+        let exit = finish_study(study, &counts, comparison, host, results, (self.format, tables))?;
         run.close()?;
         Ok(exit)
     }

@@ -2,16 +2,19 @@
 
 use std::path::Path;
 
-use super::Exit;
+use clap::Args;
+
 use super::format::FormatFlag;
+use super::{Exit, console};
 use crate::Result;
 use crate::engine::{Backend, CpuBackend, ENGINE_VERSION, Executor, Partial, SweepSummary, Wanted, chunks};
+use crate::model::criterion::Criterion;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
-use crate::run::score::{ScoreTable, f1, judge_claims};
+use crate::run::score::{ScoreTable, best_parameterizations, f1, judge_claims};
 use crate::run::study::{CategoryFacts, Study, StudyCases, WINDOW};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder;
@@ -74,6 +77,14 @@ pub(super) struct Host {
     pub settings: Vec<SettingRecord>,
 }
 
+/// The flag of every verb that ends in a study's report.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct TablesFlag {
+    /// Print all tables instead of the answer; they are in report.txt too
+    #[arg(long)]
+    pub tables: bool,
+}
+
 /// Scores, tables, figures and the record, from the counts of all lanes.
 pub(super) fn finish_study(
     study: &Study,
@@ -81,7 +92,7 @@ pub(super) fn finish_study(
     comparison: Option<ReferenceComparison>,
     mut host: Host,
     results: Results,
-    format: FormatFlag,
+    (format, tables): (FormatFlag, bool),
 ) -> Result<Exit> {
     let (plan, facts) = (study.plan(), study.facts().clone());
     let started = std::time::Instant::now();
@@ -115,7 +126,8 @@ pub(super) fn finish_study(
         files: Vec::new(),
         timings: host.timings,
     };
-    let claims = judge_claims(&scores);
+    let claims = judge_claims(&scores, plan, partial);
+    let best = best_parameterizations(&scores, plan, partial, Criterion::Collision);
     let picture = |(block, of): (usize, &CategoryFacts)| {
         Ok(CategoryPictures {
             headways: HeadwayFailures::of(plan, partial, block)?,
@@ -126,10 +138,11 @@ pub(super) fn finish_study(
     };
     let pictures = study.facts().categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
     let out = results.dir().to_path_buf();
-    let mut report = StudyReport { scores, claims, pictures, run, published: facts.published, comparison };
+    let mut report = StudyReport { scores, claims, best, pictures, run, published: facts.published, comparison };
     report.write(results)?;
-    format.print(|| report.text(), || report.json())?;
-    tracing::info!("{} files written to {}", report.run.files.len() + 1, out.display());
+    let width = console::width();
+    format.print(|| if tables { report.text(width) } else { report.answer(width) }, || report.json())?;
+    tracing::info!("{} files written; start with {}", report.run.files.len() + 1, out.join("report.html").display());
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
 }
 
@@ -146,7 +159,6 @@ fn category_records(study: &Study, scores: &ScoreTable) -> Vec<CategoryRecord> {
             lanes: plan.lanes_per_unit(block) * block.units.len(),
             capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
             undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
-            undefined_draws: cells().map(|c| u64::from(c.undefined_draws)).sum(),
             svd_explained: of.svd_explained.clone(),
         }
     };

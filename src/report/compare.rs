@@ -352,7 +352,8 @@ fn factor(value: f64) -> String {
 
 fn row(name: String, rate: &RateRecord) -> ForestRow {
     // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
-    ForestRow { name, estimate: rate.rate.is_finite().then_some(rate.rate), lower: rate.low, upper: rate.high }
+    let estimate = rate.rate.is_finite().then_some(rate.rate);
+    ForestRow { name, estimate, lower: rate.low, upper: rate.high, ..ForestRow::default() }
 }
 
 /// One criterion of one category: a group per driver model, a row per density, the recorded scenarios as reference.
@@ -361,11 +362,16 @@ pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Cri
     let groups = recorded.map(|cell| {
         let density = |p: &crate::run::sampling::ComparedParameterization| {
             let found = p.cells.iter().find(|c| c.model == cell.model && c.criterion == criterion)?;
-            Some(row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate))
+            let row = row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate);
+            let [low, high] = found.sampled.with_data;
+            Some(ForestRow { outer: Some((low, high)), ..row })
         };
         ForestGroup {
             name: cell.model.name().to_owned(),
-            reference: Some(row("S, as recorded".to_owned(), &cell.rate)),
+            reference: Some(ForestRow {
+                failing_scenarios: Some(cell.failing_scenarios),
+                ..row("S, as recorded".to_owned(), &cell.rate)
+            }),
             rows: comparison.parameterizations.iter().filter_map(density).collect(),
         }
     });
@@ -374,6 +380,12 @@ pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Cri
         subtitle: Some(format!("{} · densities of {} samples each", file.data, file.samples)),
         axis: "Failure probability".to_owned(),
         scale: AxisScale::Logarithmic,
+        intervals: format!(
+            "Line: its {0} % interval, of S over the scenarios, of a density over the draws alone. Thin line, second \
+             numbers: the density's {0} % interval over draws and scenarios, at fixed bandwidth and scale. S and the \
+             densities rest on the same scenarios: compare them by the ratios in the table.",
+            100.0 * file.level
+        ),
         groups: groups.collect(),
     }
 }

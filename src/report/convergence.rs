@@ -5,12 +5,12 @@
 //! interval's upper end is drawn instead, with an arrow downwards.
 
 use super::plot::{AxisScale, logarithmic_reach, number};
-use super::plot::{Ends, Figure, Mark, Plot, PlotAxis, Series, Value};
+use super::plot::{Ends, Figure, HOLLOW, Mark, Plot, PlotAxis, Series, Value, is_few};
 use crate::run::sampling::Checkpoint;
 use crate::stats::density::DensityModel;
 
 /// The estimate after so many samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConvergencePoint {
     /// Samples so far, at least 1.
     pub samples: u64,
@@ -20,6 +20,10 @@ pub struct ConvergencePoint {
     pub lower: f64,
     /// Upper end of the interval, finite, not below `lower`; above one it counts as one.
     pub upper: f64,
+    /// Ends of the interval that covers what other scenarios would change too; where it is known.
+    pub outer: Option<(f64, f64)>,
+    /// Scenarios that failures come from, where it is known.
+    pub failing_scenarios: Option<f64>,
 }
 
 /// One line: the estimates of one quantity in the order of their samples (sorted for drawing).
@@ -40,6 +44,8 @@ pub struct ConvergenceFigure {
     pub title: String,
     /// Line below the heading (what was sampled, which interval); wrapped when long.
     pub subtitle: Option<String>,
+    /// Coverage of the intervals, 0 to 1.
+    pub level: f64,
     /// The lines; panels and legend in the order of first appearance.
     pub series: Vec<ConvergenceSeries>,
 }
@@ -72,7 +78,7 @@ pub(super) fn sampled(density: &DensityModel) -> String {
 
 impl ConvergenceFigure {
     /// Probability over samples of a sampling run, one panel per driver model.
-    pub fn of(density: &DensityModel, checkpoints: &[Checkpoint]) -> ConvergenceFigure {
+    pub fn of(density: &DensityModel, checkpoints: &[Checkpoint], level: f64) -> ConvergenceFigure {
         let mut series: Vec<ConvergenceSeries> = Vec::new();
         for checkpoint in checkpoints {
             for row in &checkpoint.rows {
@@ -82,6 +88,8 @@ impl ConvergenceFigure {
                     probability: row.probability,
                     lower: row.interval[0],
                     upper: row.interval[1],
+                    outer: row.with_data.map(|([low, high], _)| (low, high)),
+                    failing_scenarios: row.with_data.map(|(_, scenarios)| scenarios),
                 };
                 match series.iter_mut().find(|s| s.panel == panel && s.name == name) {
                     Some(known) => known.points.push(point),
@@ -94,7 +102,7 @@ impl ConvergenceFigure {
             }
         }
         let title = "Failure probability against samples".to_owned();
-        ConvergenceFigure { title, subtitle: Some(sampled(density)), series }
+        ConvergenceFigure { title, subtitle: Some(sampled(density)), level, series }
     }
 
     /// The figure. A point that is no estimate (not finite, no probability, no samples, interval upside down, zero
@@ -105,7 +113,9 @@ impl ConvergenceFigure {
         // The same for all, so that plots can be compared.
         let points = || drawn.iter().flatten();
         let samples = points().map(|p| p.samples as f64).collect();
-        let intervals: Vec<_> = points().map(|p| (p.probability, p.lower, p.upper)).collect();
+        let widest =
+            |p: &ConvergencePoint| p.outer.map_or((p.lower, p.upper), |o| (o.0.min(p.lower), o.1.max(p.upper)));
+        let intervals: Vec<_> = points().map(|p| (p.probability, widest(p).0, widest(p).1)).collect();
         let axis = |label: &str, values| PlotAxis {
             scale: AxisScale::Logarithmic,
             ends: Ends::Around(values),
@@ -127,9 +137,37 @@ impl ConvergenceFigure {
             title: self.title.clone(),
             subtitle: self.subtitle.clone(),
             plots: if is_empty { Vec::new() } else { panels.into_iter().map(plot).collect() },
-            caption: if is_empty { "There is no estimate to draw.".to_owned() } else { caption(&drawn) },
+            caption: if is_empty { "There is no estimate to draw.".to_owned() } else { self.caption(&drawn) },
             notes: ("Not drawn:", self.refused()),
         }
+    }
+
+    /// What the marks mean, as far as they occur.
+    fn caption(&self, drawn: &[Vec<ConvergencePoint>]) -> String {
+        let level = 100.0 * self.level;
+        let mut words = format!(
+            "Marker: estimate. Area or whisker: its {level} % interval over the draws alone, which more samples make \
+             narrower. "
+        );
+        let points = || drawn.iter().flatten();
+        words.push_str(match points().any(|p| p.outer.is_some()) {
+            true => {
+                "Pale area: the interval over draws and scenarios, at fixed bandwidth and scale; more samples do not make \
+                 it narrower than the scenarios allow. "
+            }
+            false => "It does not cover what other scenarios would change. ",
+        });
+        words.push_str("Both axes are logarithmic.");
+        if points().any(|p| p.failing_scenarios.is_some_and(is_few)) {
+            words = [&words, HOLLOW].join(" ");
+        }
+        if points().any(|p| p.probability > 0.0 && p.outer.map_or(p.lower, |o| o.0) < p.probability / 10.0) {
+            words.push_str(" An interval that reaches the lower edge goes on below it.");
+        }
+        if points().any(|p| p.probability == 0.0) {
+            words.push_str(" Arrow: the estimate is zero; the bar is the interval's upper end.");
+        }
+        words
     }
 
     /// Per series and reason, how many points are not drawn.
@@ -157,10 +195,16 @@ impl ConvergenceSeries {
             let name = [self.panel.as_str(), self.name.as_str()].join(" ");
             let tip = format!("{name}: {estimate} [{lower}, {upper}] after {} samples", p.samples);
             let (x, y) = (p.samples as f64, p.probability);
-            Value { x, y, interval: Some((p.lower, p.upper)), tip, ..Value::default() }
+            let is_few = p.failing_scenarios.is_some_and(is_few);
+            Value { x, y, interval: Some((p.lower, p.upper)), outer: p.outer, is_few, tip, ..Value::default() }
         };
+        let mut values: Vec<Value> = points.iter().map(value).collect();
+        // The number at every look would cover the line.
+        if let Some((value, p)) = values.last_mut().zip(points.last()).filter(|(value, _)| value.is_few) {
+            value.label = p.failing_scenarios.map_or(String::new(), |n| format!("{n:.0}"));
+        }
         Series {
-            values: points.iter().map(value).collect(),
+            values,
             attributes: "class=\"estimate\"".to_owned(),
             ..Series::new(&self.name, &[Mark::Band, Mark::Line, Mark::Points], [])
         }
@@ -169,7 +213,10 @@ impl ConvergenceSeries {
 
 fn drawable(series: &ConvergenceSeries) -> Vec<ConvergencePoint> {
     let mut points: Vec<_> = series.points.iter().copied().filter(|p| p.refusal().is_none()).collect();
-    points.iter_mut().for_each(|p| p.upper = p.upper.min(1.0));
+    for p in &mut points {
+        p.upper = p.upper.min(1.0);
+        p.outer = p.outer.map(|(low, high)| (low, high.min(1.0))).filter(|(low, high)| low <= high && low.is_finite());
+    }
     points.sort_by_key(|p| p.samples);
     points
 }
@@ -184,18 +231,6 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     seen
 }
 
-/// What the marks mean, as far as they occur.
-fn caption(drawn: &[Vec<ConvergencePoint>]) -> String {
-    let mut words = "Marker: estimate. Area or whisker: its interval. Both axes are logarithmic.".to_string();
-    if drawn.iter().flatten().any(|p| p.probability > 0.0 && p.lower < p.probability / 10.0) {
-        words.push_str(" An interval that reaches the lower edge goes on below it.");
-    }
-    if drawn.iter().flatten().any(|p| p.probability == 0.0) {
-        words.push_str(" Arrow: the estimate is zero; the bar is the interval's upper end.");
-    }
-    words
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::plot::Axis;
@@ -204,7 +239,13 @@ mod tests {
 
     fn point(samples: u64, probability: f64) -> ConvergencePoint {
         let half = 2.0 * (probability.max(1e-6) / samples as f64).sqrt();
-        ConvergencePoint { samples, probability, lower: (probability - half).max(0.0), upper: probability + half }
+        ConvergencePoint {
+            samples,
+            probability,
+            lower: (probability - half).max(0.0),
+            upper: probability + half,
+            ..ConvergencePoint::default()
+        }
     }
 
     fn figure(panels: usize, names: usize, probability: impl Fn(usize) -> f64) -> ConvergenceFigure {
@@ -213,7 +254,12 @@ mod tests {
             name: format!("Criterion{}", i % names),
             points: (3..7).map(|k| point(10_u64.pow(k), probability(i))).collect(),
         };
-        ConvergenceFigure { title: "Cut-in".into(), subtitle: None, series: (0..panels * names).map(series).collect() }
+        ConvergenceFigure {
+            title: "Cut-in".into(),
+            subtitle: None,
+            level: 0.95,
+            series: (0..panels * names).map(series).collect(),
+        }
     }
 
     fn marks(svg: &str) -> (usize, usize) {
@@ -249,6 +295,21 @@ mod tests {
         let axis = Axis::around(AxisScale::Logarithmic, &logarithmic_reach(&intervals), (430.0, 0.0)).unwrap();
         let lowest = upper.iter().map(|upper| axis.at(*upper)).fold(0.0, f64::max);
         assert!(lowest + 15.0 < 430.0, "{lowest}");
+    }
+
+    #[test]
+    fn the_interval_with_the_data_is_drawn_behind_that_of_the_draws_and_both_are_named() {
+        let narrow = figure(1, 1, |_| 1e-2);
+        let mut wide = narrow.clone();
+        for point in &mut wide.series[0].points {
+            (point.outer, point.failing_scenarios) = (Some((5e-3, 2e-2)), Some(7.2));
+        }
+        let [narrow, wide] = [narrow, wide].map(|figure| figure.figure().svg());
+        let areas = |svg: &str| svg.matches("opacity=\"0.09\"").count();
+        assert_eq!((areas(&narrow), areas(&wide)), (0, 1));
+        let [narrow, wide] = [narrow, wide].map(|svg| words(&svg));
+        assert!(narrow.contains("95 % interval over the draws alone") && narrow.contains("does not cover what other"));
+        assert!(wide.contains("over draws and scenarios") && wide.contains("Hollow") && wide.contains('7'), "{wide}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The tables as CSV: numbers in full precision, an empty field where a value is undefined.
 
 use crate::model::criterion::Criterion;
-use crate::run::score::{BootstrapInterval, ClaimResult, ScoreCell, ScoreTable, f1, precision, recall};
+use crate::run::score::{ClaimResult, ClaimVerdict, ScoreCell, ScoreInterval, ScoreTable, f1, precision, recall};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::table::cell_text;
 use crate::{Error, Result};
@@ -68,7 +68,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
         "f1_low",
         "f1_high",
         "f1_no_interval",
-        "undefined_draws",
+        "failing_scenarios",
         "data",
     ])];
     for category in &scores.categories {
@@ -77,7 +77,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
             let parameters = Parameterization::find(category.category, name)
                 .map_or(String::new(), |p| p.parameter_count().to_string());
             let c = &cell.counts;
-            let end = |pick: fn(BootstrapInterval) -> f64| number(cell.f1_interval.map(pick));
+            let end = |pick: fn(ScoreInterval) -> f64| number(cell.f1_interval.map(pick));
             rows.push(vec![
                 category.category.key().to_owned(),
                 name.clone(),
@@ -94,7 +94,7 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
                 end(|i| i.low),
                 end(|i| i.high),
                 no_interval(cell),
-                cell.undefined_draws.to_string(),
+                cell.failing_scenarios.to_string(),
                 data.to_owned(),
             ]);
         }
@@ -119,31 +119,24 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
         "statement",
         "model",
         "criterion",
-        "s_failures",
+        "failing_scenarios",
         "difference",
         "low",
         "high",
-        "undefined_draws",
         "verdict",
         "data",
     ])];
     for result in results {
-        for claim_row in std::iter::once(&result.overall).chain(&result.rows) {
-            let (model, criterion) = claim_row.cell.map_or(("", ""), |(m, c): (_, Criterion)| (m.name(), c.key()));
-            rows.push(vec![
-                result.claim.id.to_owned(),
-                result.claim.category.key().to_owned(),
-                result.claim.statement.to_owned(),
-                model.to_owned(),
-                criterion.to_owned(),
-                claim_row.failures.to_string(),
-                number(claim_row.value),
-                number(claim_row.interval.map(|i| i.low)),
-                number(claim_row.interval.map(|i| i.high)),
-                claim_row.undefined_draws.to_string(),
-                claim_row.verdict.text().to_owned(),
-                data.to_owned(),
-            ]);
+        let claim = [result.claim.id, result.claim.category.key(), result.claim.statement];
+        let mut add = |cell: [&str; 2], failing: u64, numbers: [Option<f64>; 3], verdict: ClaimVerdict| {
+            let words = claim.into_iter().chain(cell).map(str::to_owned).chain([failing.to_string()]);
+            let numbers = numbers.into_iter().map(number);
+            rows.push(words.chain(numbers).chain([verdict.text().to_owned(), data.to_owned()]).collect());
+        };
+        add(["", ""], result.failing_scenarios, [result.mean, None, None], result.verdict);
+        for cell in &result.rows {
+            let numbers = [cell.value, cell.interval.map(|i| i.low), cell.interval.map(|i| i.high)];
+            add([cell.cell.0.name(), cell.cell.1.key()], cell.failing_scenarios, numbers, cell.verdict);
         }
     }
     text(rows)
@@ -160,7 +153,7 @@ mod tests {
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {
             let counts = Confusion::default();
-            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, undefined_draws: 0 }
+            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, failing_scenarios: 0 }
         };
         let models = [ModelId::Rss, ModelId::Fsm];
         let scores = CategoryScores {
@@ -172,7 +165,6 @@ mod tests {
             models: vec![ModelId::Rss],
             cells: models.into_iter().flat_map(|m| Criterion::ALL.map(|c| cell(m, c))).collect(),
             capped,
-            draws: Vec::new(),
         };
         ScoreTable { categories: vec![scores], headways: Headway::paper(), options: ScoreOptions::default() }
     }

@@ -2,12 +2,13 @@
 
 use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{
-    Cells, Ends, Figure, Fill, FilledCell, Height, INK, Layer, Look, Mark, Name, Plot, PlotAxis, ROW, Rule, Series,
-    Symbol, Value,
+    Cells, Ends, Figure, Fill, FilledCell, HOLLOW, Height, INK, Layer, Look, Mark, Name, Plot, PlotAxis, ROW, Rule,
+    Series, Symbol, Value, is_few,
 };
+use crate::support::readable::counted;
 
 /// One estimate.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ForestRow {
     /// What was estimated or how; wrapped when long.
     pub name: String,
@@ -17,6 +18,10 @@ pub struct ForestRow {
     pub lower: f64,
     /// Upper end of the interval.
     pub upper: f64,
+    /// Ends of an interval that covers more, drawn thinner.
+    pub outer: Option<(f64, f64)>,
+    /// Scenarios with a failure, where it is known.
+    pub failing_scenarios: Option<u64>,
 }
 
 /// Estimates that belong together.
@@ -42,6 +47,8 @@ pub struct ForestFigure {
     /// How the axis places values. On a logarithmic one an estimate of zero is drawn as the interval's upper end
     /// with an arrow to the left.
     pub scale: AxisScale,
+    /// What the intervals cover, in a sentence.
+    pub intervals: String,
     /// The groups, from top to bottom.
     pub groups: Vec<ForestGroup>,
 }
@@ -63,6 +70,11 @@ struct Drawn {
 }
 
 impl ForestRow {
+    /// The scenarios with a failure, where they are few.
+    fn few(&self) -> Option<u64> {
+        self.failing_scenarios.filter(|n| is_few(*n as f64))
+    }
+
     fn drawn(&self, scale: AxisScale) -> Drawn {
         let finite = |v: f64| AxisScale::Linear.shows(v);
         let estimate = self.estimate.filter(|e| finite(*e));
@@ -88,7 +100,10 @@ impl ForestRow {
         };
         let drawn = self.drawn(scale);
         let nowhere = drawn.estimate.is_none() && !drawn.below;
-        format!("{} {interval}{}", number(estimate), if nowhere { " (not on a logarithmic axis)" } else { "" })
+        let off = if nowhere { " (not on a logarithmic axis)" } else { "" };
+        let outer = self.outer.map_or(String::new(), |(low, high)| format!(", [{}, {}]", number(low), number(high)));
+        let few = self.few().map_or(String::new(), |n| format!(", {}", counted(n as usize, "scenario")));
+        format!("{} {interval}{outer}{off}{few}", number(estimate))
     }
 }
 
@@ -131,7 +146,8 @@ impl ForestFigure {
                 let Drawn { estimate, interval, below } = row.drawn(self.scale);
                 if let Some(x) = estimate.or(below.then_some(0.0)) {
                     let y = from - 3.0 - ROW.line_px() / 2.0;
-                    layers[layer].values.push(Value { x, y, interval, tip, ..Value::default() });
+                    let (outer, is_few) = (row.outer, row.few().is_some());
+                    layers[layer].values.push(Value { x, y, interval, outer, is_few, tip, ..Value::default() });
                 }
             }
             y += GROUP_GAP_PX;
@@ -162,9 +178,10 @@ impl ForestFigure {
     fn reach(&self) -> Vec<f64> {
         let mut reach = Vec::new();
         let mut intervals = Vec::new();
-        for drawn in self.all_rows().map(|row| row.drawn(self.scale)) {
+        for (row, drawn) in self.all_rows().map(|row| (row, row.drawn(self.scale))) {
             let estimate = drawn.estimate.or(drawn.below.then_some(0.0));
             let ends = drawn.interval.or(estimate.map(|e| (e, e)));
+            let ends = ends.map(|ends| row.outer.map_or(ends, |o| (o.0.min(ends.0), o.1.max(ends.1))));
             if let Some((lower, upper)) = ends {
                 reach.extend([lower, upper].into_iter().chain(estimate));
                 intervals.push((estimate.unwrap_or(upper), lower, upper));
@@ -179,12 +196,15 @@ impl ForestFigure {
         if drawn.iter().all(|d| d.estimate.is_none() && !d.below) {
             return "There is no estimate to draw.".to_string();
         }
-        let mut words = "Marker: estimate. Line: its interval.".to_string();
+        let mut words = format!("Marker: estimate. {}", self.intervals);
         if self.groups.iter().any(|g| g.reference.is_some()) {
             words.push_str(" Band: interval of the group's reference, the diamond.");
         }
         if drawn.iter().any(|d| d.below) {
             words.push_str(" Arrow: the estimate is zero; the bar is the interval's upper end.");
+        }
+        if self.all_rows().any(|row| row.few().is_some()) {
+            words = [&words, HOLLOW].join(" ");
         }
         let cut = |d: &Drawn| {
             !d.below
@@ -206,7 +226,7 @@ mod tests {
 
     fn row(name: &str, estimate: Option<f64>) -> ForestRow {
         let middle = estimate.unwrap_or(f64::NAN);
-        ForestRow { name: name.into(), estimate, lower: middle * 0.7, upper: middle * 1.4 }
+        ForestRow { name: name.into(), estimate, lower: middle * 0.7, upper: middle * 1.4, ..ForestRow::default() }
     }
 
     fn figure(scale: AxisScale, groups: usize, rows: Vec<ForestRow>) -> ForestFigure {
@@ -216,7 +236,14 @@ mod tests {
             rows: rows.clone(),
         };
         let groups = (0..groups).map(group).collect();
-        ForestFigure { title: "Cut-in".into(), subtitle: None, axis: "Failures (1/h)".into(), scale, groups }
+        ForestFigure {
+            title: "Cut-in".into(),
+            subtitle: None,
+            axis: "Failures (1/h)".into(),
+            scale,
+            intervals: "Line: 95 %.".into(),
+            groups,
+        }
     }
 
     fn marks(svg: &str) -> (usize, usize) {
@@ -238,6 +265,20 @@ mod tests {
     }
 
     #[test]
+    fn an_estimate_from_few_scenarios_is_hollow_and_says_how_many_and_a_second_interval_is_drawn() {
+        let rows = vec![
+            row("plain", Some(1e-4)),
+            ForestRow { outer: Some((1e-5, 1e-3)), failing_scenarios: Some(7), ..row("few", Some(1e-4)) },
+        ];
+        let svg = figure(Logarithmic, 1, rows).figure().svg();
+        assert_eq!(svg.matches("fill=\"#ffffff\" stroke=\"#0072b2\"").count(), 1);
+        let words = words(&svg);
+        for said in ["1e-4 [7e-5, 1.4e-4], [1e-5, 1e-3], 7 scenarios", "Line: 95 %.", "Hollow"] {
+            assert!(words.contains(said), "{said} in {words}");
+        }
+    }
+
+    #[test]
     fn an_undefined_estimate_is_said_and_not_drawn() {
         let nan = ForestRow { estimate: Some(f64::NAN), ..row("nan", Some(1e-4)) };
         let open = ForestRow { upper: f64::INFINITY, ..row("open", Some(1e-4)) };
@@ -253,9 +294,9 @@ mod tests {
 
     #[test]
     fn zero_is_a_limit_on_a_logarithmic_axis_and_a_point_on_a_linear_one() {
-        let zero = ForestRow { name: "zero".into(), estimate: Some(0.0), lower: 0.0, upper: 3e-5 };
+        let zero = ForestRow { upper: 3e-5, ..row("zero", Some(0.0)) };
         let nothing = ForestRow { upper: 0.0, ..zero.clone() };
-        let negative = ForestRow { lower: -2.0, upper: -0.5, estimate: Some(-1.0), name: "negative".into() };
+        let negative = ForestRow { lower: -2.0, upper: -0.5, ..row("negative", Some(-1.0)) };
         let rows = vec![zero, nothing, negative];
         assert_eq!(marks(&figure(Linear, 1, rows.clone()).figure().svg()), (4, 0));
         let svg = figure(Logarithmic, 1, rows).figure().svg();
@@ -281,7 +322,7 @@ mod tests {
             let mut undefined = figure(scale, 1, vec![row("none", None)]);
             undefined.groups[0].reference = None;
             assert!(words(&undefined.figure().svg()).contains("There is no estimate to draw."));
-            let equal = ForestRow { name: "equal".into(), estimate: Some(1.0), lower: 1.0, upper: 1.0 };
+            let equal = ForestRow { lower: 1.0, upper: 1.0, ..row("equal", Some(1.0)) };
             let mut same = figure(scale, 1, vec![equal.clone(), equal]);
             same.groups[0].reference = None;
             assert_eq!(marks(&same.figure().svg()), (2, 0));

@@ -27,6 +27,7 @@ pub mod sampling;
 mod sampling_page;
 pub mod sampling_tables;
 pub mod study;
+mod study_answer;
 pub mod study_figures;
 mod study_page;
 pub mod tables;

@@ -6,7 +6,7 @@
 //!
 //! Several series often share a value (F1 = 1 above all), so lines and markers are thicker than in other figures.
 
-use super::plot::{Figure, Look, Mark, Name, Plot, PlotAxis, Series, Value};
+use super::plot::{Figure, HOLLOW, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
 
 /// One polygon: the scores of one parameterization.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +28,8 @@ pub struct RadarChart {
     pub subtitle: Option<String>,
     /// Names of the spokes, clockwise from the top, such as `Reg157 Collision`.
     pub spokes: Vec<String>,
+    /// Scenarios in which S fails, per spoke; unknown where missing.
+    pub failing: Vec<u64>,
     /// The polygons, in the order of the legend.
     pub series: Vec<RadarSeries>,
 }
@@ -40,13 +42,19 @@ impl RadarChart {
         let is_undefined = |spoke: usize| !scores.is_empty() && scores.iter().all(|s| s[spoke].is_none());
         let name = |(at, words): (usize, &String)| {
             let is_empty = is_undefined(at);
-            let words = format!("{words}{}", if is_empty { " (undefined)" } else { "" });
+            let words = match self.few(at) {
+                _ if is_empty => format!("{words} (undefined)"),
+                Some(1) => format!("{words} (1 scenario)"),
+                Some(failing) => format!("{words} ({failing} scenarios)"),
+                None => words.clone(),
+            };
             Name { at: at as f64, words, is_empty, ..Name::default() }
         };
         let series = scores.iter().zip(&self.series).enumerate().map(|(at, (scores, series))| {
             let value = |(spoke, score): (usize, &Option<f64>)| Value {
                 x: spoke as f64,
                 y: score.unwrap_or(f64::NAN),
+                is_few: self.few(spoke).is_some(),
                 tip: format!("{}; {}: {:.3}", series.name, self.spokes[spoke], score.unwrap_or(f64::NAN)),
                 ..Value::default()
             };
@@ -67,15 +75,26 @@ impl RadarChart {
             is_polar: true,
             ..Plot::default()
         };
-        let caption = "Radius: F1 score, 0 at the centre, 1 at the outer ring.";
+        let mut caption =
+            "Radius: F1 score, 0 at the centre, 1 at the outer ring, without its interval, which the table \
+                           has."
+                .to_owned();
+        if (0..self.spokes.len()).any(|spoke| self.few(spoke).is_some()) {
+            caption = [&caption, HOLLOW].join(" ");
+        }
         let notes = self.undefined(&scores, &is_undefined);
         Figure {
             title: self.title.clone(),
             subtitle: self.subtitle.clone(),
-            caption: if self.spokes.is_empty() { String::new() } else { caption.to_owned() },
+            caption: if self.spokes.is_empty() { String::new() } else { caption },
             plots: if self.spokes.is_empty() { Vec::new() } else { vec![plot] },
             notes: ("Undefined F1 (0/0): no point is drawn and the line is broken there.", notes),
         }
+    }
+
+    /// The failing scenarios of a spoke, where they are few.
+    fn few(&self, spoke: usize) -> Option<u64> {
+        self.failing.get(spoke).copied().filter(|failing| is_few(*failing as f64))
     }
 
     /// Which scores are undefined.
@@ -119,7 +138,13 @@ mod tests {
         let series = (0..series)
             .map(|s| RadarSeries { name: name(s), values: (0..spokes.len()).map(|i| score(s, i)).collect() })
             .collect();
-        RadarChart { title: "Cut-in".into(), subtitle: Some("SYNTHETIC DATA: test".into()), spokes, series }
+        RadarChart {
+            title: "Cut-in".into(),
+            subtitle: Some("SYNTHETIC DATA: test".into()),
+            spokes,
+            failing: vec![],
+            series,
+        }
     }
 
     #[test]
@@ -147,6 +172,19 @@ mod tests {
         assert!(words.contains("b: SVD, 2 coefficients — RSS TTC"), "{words}");
         assert!(words.contains("In every series: FSM BTN"));
         assert!(words.contains("FSM BTN (undefined)"));
+    }
+
+    #[test]
+    fn points_from_few_failing_scenarios_are_hollow_and_have_their_number() {
+        let mut few = chart(2, &[]);
+        few.failing = vec![10; few.spokes.len()];
+        let whole = few.figure().svg();
+        few.failing[4] = 3;
+        let svg = few.figure().svg();
+        let hollow = |svg: &str| svg.matches("fill=\"#ffffff\" stroke").count();
+        assert_eq!(hollow(&svg) - hollow(&whole), 2, "one point of each series");
+        let words = words(&svg);
+        assert!(words.contains("RSS TTC (3 scenarios)") && words.contains("Hollow: fewer than ten failing scenarios"));
     }
 
     #[test]

@@ -29,8 +29,6 @@ pub struct CategoryRecord {
     pub capped_lanes: u64,
     /// Cells of the score table whose F1 is 0/0.
     pub undefined_f1: u64,
-    /// Undefined F1 over all cells and bootstrap draws.
-    pub undefined_draws: u64,
     /// Explained variance of the decomposition by its first coefficients, where there is one.
     pub svd_explained: Vec<f64>,
 }
@@ -44,7 +42,7 @@ pub struct Timings {
     pub plan_s: f64,
     /// Lanes.
     pub sweep_s: f64,
-    /// Scores and bootstrap.
+    /// Scores and claims.
     pub score_s: f64,
 }
 
@@ -133,7 +131,7 @@ pub struct RunRecord {
     pub mining: MiningOptions,
     /// Options of the parameterizations.
     pub parameterization: ParameterizationOptions,
-    /// Bootstrap and its seed.
+    /// How it was scored.
     pub score: ScoreOptions,
     /// Options that were set for this command, and by what. As the backend's, they are of the command and not of the
     /// result: a merge has none, its parts had their own.

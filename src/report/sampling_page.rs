@@ -1,7 +1,7 @@
 //! A sampling run as one page.
 
 use super::html::{Page, PageFigure, PageTable, Section};
-use super::plot::{Figure, Layer, Mark, Plot, PlotAxis, Series};
+use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, interval_text, rate_text, short};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -171,10 +171,15 @@ impl EstimateFile {
         let panel = |&model: &ModelId| {
             let series = |criterion: Criterion| {
                 let own = self.estimates.iter().filter(|row| row.model == model && row.criterion == criterion);
-                let point = |row: &EstimateRow| thw_s(row).map(|thw| (thw, 100.0 * row.estimate.probability));
-                let mut values: Vec<(f64, f64)> = own.filter_map(point).collect();
-                values.sort_by(|a, b| a.0.total_cmp(&b.0));
-                Series::new(criterion.label(), &[Mark::Line, Mark::Points], values)
+                let point = |row: &EstimateRow| {
+                    let few = row.failing_scenarios.filter(|n| is_few(*n));
+                    let label = few.filter(|n| *n > 0.0).map_or(String::new(), |n| format!("{n:.0}"));
+                    let place = (thw_s(row)?, 100.0 * row.estimate.probability);
+                    Some(Value { label, is_few: few.is_some(), ..Value::from(place) })
+                };
+                let mut values: Vec<Value> = own.filter_map(point).collect();
+                values.sort_by(|a, b| a.x.total_cmp(&b.x));
+                Series { values, ..Series::new(criterion.label(), &[Mark::Line, Mark::Points], []) }
             };
             let series = Criterion::ALL.map(series).into_iter().filter(|series| !series.values.is_empty());
             Plot {
@@ -189,7 +194,7 @@ impl EstimateFile {
         (headways > 1).then(|| Figure {
             title: format!("{}: probability of failure against the headway", self.name()),
             subtitle: Some(self.density.provenance.data.clone()),
-            caption: "Each headway of its own; intervals are in estimates.csv.".to_owned(),
+            caption: format!("Each headway of its own, without its interval, which is in estimates.csv. {HOLLOW}"),
             plots: self.models.iter().map(panel).collect(),
             ..Figure::default()
         })

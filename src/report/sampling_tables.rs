@@ -91,22 +91,32 @@ impl EstimateFile {
     }
 }
 
+const CONVERGENCE: [&str; 9] = [
+    "samples",
+    "model",
+    "criterion",
+    "probability",
+    "low",
+    "high",
+    "low_with_data",
+    "high_with_data",
+    "failing_scenarios",
+];
+
 /// `convergence.csv`.
 ///
 /// # Errors
 /// None for what this program made.
 pub fn convergence_csv(checkpoints: &[Checkpoint]) -> Result<Vec<u8>> {
-    let mut rows = vec![["samples", "model", "criterion", "probability", "low", "high"].map(str::to_owned).to_vec()];
+    let mut rows = vec![CONVERGENCE.map(str::to_owned).to_vec()];
     for checkpoint in checkpoints {
         for row in &checkpoint.rows {
-            rows.push(vec![
-                checkpoint.samples.to_string(),
-                row.model.name().to_owned(),
-                row.criterion.key().to_owned(),
-                row.probability.to_string(),
-                row.interval[0].to_string(),
-                row.interval[1].to_string(),
-            ]);
+            let [low, high] = [0, 1].map(|end: usize| row.with_data.map(|(ends, _)| ends[end]));
+            let mut fields = vec![checkpoint.samples.to_string(), row.model.name().to_owned()];
+            fields.push(row.criterion.key().to_owned());
+            fields.extend([row.probability, row.interval[0], row.interval[1]].map(|v| v.to_string()));
+            fields.extend([low, high, row.with_data.map(|(_, scenarios)| scenarios)].map(number));
+            rows.push(fields);
         }
     }
     super::csv::text(rows)

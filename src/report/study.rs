@@ -12,7 +12,9 @@ use super::{csv, tables};
 use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{CategoryScores, ClaimResult, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
+use crate::run::score::{
+    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, f1, published_failures, published_lvd_f1,
+};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
@@ -40,6 +42,8 @@ pub struct StudyReport {
     pub claims: Vec<ClaimResult>,
     /// One per category of the scores.
     pub pictures: Vec<CategoryPictures>,
+    /// The best parameterizations for collisions.
+    pub best: Vec<Best>,
     /// What was run.
     pub run: RunRecord,
     /// Set the paper's published numbers beside.
@@ -49,17 +53,17 @@ pub struct StudyReport {
 }
 
 impl StudyReport {
-    /// The tables for the terminal, 120 columns wide at most; only an unbroken word of the data's description
-    /// (a path) can be longer.
-    pub fn text(&self) -> String {
-        let data = tables::wrap(&self.run.data, tables::WIDTH);
+    /// All tables, so many columns wide at most; only an unbroken word of the data's description (a path) can be
+    /// longer.
+    pub fn text(&self, width: usize) -> String {
+        let data = tables::wrap(&self.run.data, width);
         let mut parts = vec![format!("{data}\n")];
         if self.published {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
-        parts.push(tables::failures(&self.scores, self.published));
-        parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published)));
-        parts.push(tables::claims(&self.claims));
+        parts.push(tables::failures(&self.scores, self.published, width));
+        parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
+        parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(ReferenceComparison::text));
         if self.run.synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
@@ -76,7 +80,7 @@ impl StudyReport {
         results.add("failures.csv", &csv::failures(&self.scores, data)?)?;
         results.add("f1.csv", &csv::f1_scores(&self.scores, data)?)?;
         results.add("claims.csv", &csv::claims(&self.claims, data)?)?;
-        results.add("report.txt", self.text().as_bytes())?;
+        results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", &self.headways(data)?)?;
         for (at, category) in self.scores.categories.iter().enumerate() {
             results.add(&file_name("radar", category.category, "svg"), self.radar(category).as_bytes())?;
@@ -106,6 +110,7 @@ impl StudyReport {
         let chart = RadarChart {
             title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
+            failing: spokes.iter().map(|&(model, criterion)| scores.failing_scenarios(model, criterion)).collect(),
             spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
             series: series.collect(),
         };
@@ -164,6 +169,7 @@ impl StudyReport {
             "f1": records(&csv::f1_scores(&self.scores, "")?)?,
             "claims": records(&csv::claims(&self.claims, "")?)?,
         });
+        value["best"] = self.best.iter().map(best).collect();
         if self.published {
             value["published"] = published(&self.scores);
         }
@@ -172,6 +178,19 @@ impl StudyReport {
         }
         document(&value)
     }
+}
+
+/// A best parameterization; numbers without one are null.
+fn best(best: &Best) -> Value {
+    let score = best.score.as_ref();
+    serde_json::json!({
+        "category": best.category.key(), "model": best.model.name(), "criterion": Criterion::Collision.key(),
+        "s_failures": best.failures, "failing_scenarios": best.failing_scenarios,
+        "parameterization": score.map(|s| &s.variant), "f1": score.map(|s| s.f1),
+        "f1_low": score.map(|s| s.interval.low), "f1_high": score.map(|s| s.interval.high),
+        "hidden": score.map(|s| s.hidden), "not_told_apart": score.map(|s| &s.rivals),
+        "more_data": score.map(|s| s.more_data).filter(|times| times.is_finite()),
+    })
 }
 
 /// The paper's numbers, of highD.

@@ -1,7 +1,7 @@
 //! The figures of a study beside the radar charts: recall and precision, failures against the headway, F1 against the
 //! number of parameters, the shapes of a decomposition, the distributions of parameters.
 
-use super::plot::{Figure, GREY, Mark, Plot, PlotAxis, Rule, Series, Value};
+use super::plot::{Figure, GREY, HOLLOW, Mark, Plot, PlotAxis, Rule, Series, Value, is_few};
 use crate::engine::{Confusion, Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -9,6 +9,7 @@ use crate::run::score::{CategoryScores, f1, precision, recall};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
+use crate::support::readable::counted;
 use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.
@@ -88,12 +89,16 @@ impl HeadwayFailures {
         let panel = |(model, id): (usize, &ModelId)| {
             let series = |criterion: Criterion| {
                 let share = |(at, headway): (usize, &Headway)| {
+                    // One lane per scenario and headway.
                     let failed = self.count((0, at, model, criterion));
-                    Some((thw_s(headway)?, 100.0 * failed as f64 / scores.scenarios.max(1) as f64))
+                    let place = (thw_s(headway)?, 100.0 * failed as f64 / scores.scenarios.max(1) as f64);
+                    let is_few = is_few(failed as f64);
+                    let label = if is_few && failed > 0 { failed.to_string() } else { String::new() };
+                    Some(Value { label, is_few, ..Value::from(place) })
                 };
-                let mut values: Vec<(f64, f64)> = self.headways.iter().enumerate().filter_map(share).collect();
-                values.sort_by(|a, b| a.0.total_cmp(&b.0));
-                Series::new(criterion.label(), &[Mark::Line, Mark::Points], values)
+                let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(share).collect();
+                values.sort_by(|a, b| a.x.total_cmp(&b.x));
+                Series { values, ..Series::new(criterion.label(), &[Mark::Line, Mark::Points], []) }
             };
             Plot {
                 heading: id.name().to_owned(),
@@ -106,7 +111,10 @@ impl HeadwayFailures {
         Figure {
             title: format!("{}: failures of the recorded scenarios against the headway", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
-            caption: "Share of the recorded scenarios (S) in which the driver model fails the criterion.".to_owned(),
+            caption: format!(
+                "Share of the recorded scenarios (S) in which the driver model fails the criterion, without an interval. \
+                 {HOLLOW}"
+            ),
             plots: self.models.iter().enumerate().map(panel).collect(),
             ..Figure::default()
         }
@@ -116,10 +124,12 @@ impl HeadwayFailures {
 /// Recall and precision of every parameterization, a panel per driver model and criterion.
 pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
     let panel = |model: ModelId, criterion: Criterion| {
+        let failing = scores.failing_scenarios(model, criterion);
         let series = |variant: usize| {
             let counts = scores.index(variant, model, criterion).map(|at| scores.cells[at].counts);
             let of = |share: fn(&Confusion) -> Option<f64>| counts.as_ref().and_then(share).unwrap_or(f64::NAN);
-            Series::new(legend_name(scores, variant), &[Mark::Points], [(of(recall), of(precision))])
+            let value = Value { is_few: is_few(failing as f64), ..Value::from((of(recall), of(precision))) };
+            Series { values: vec![value], ..Series::new(legend_name(scores, variant), &[Mark::Points], []) }
         };
         let equal = Rule {
             runs: [0.2, 0.4, 0.6, 0.8].map(equal_f1).to_vec(),
@@ -129,7 +139,7 @@ pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
             attributes: "class=\"equal-f1\"".to_owned(),
         };
         Plot {
-            heading: format!("{}, {}", model.name(), criterion.label()),
+            heading: format!("{}, {}{}", model.name(), criterion.label(), few(failing)),
             x: PlotAxis::exactly("recall", 0.0, 1.0),
             y: PlotAxis::exactly("precision", 0.0, 1.0),
             layers: std::iter::once(equal.into())
@@ -142,13 +152,20 @@ pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
     Figure {
         title: format!("{}: recall and precision of S' against S", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
-        caption: "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of \
-                  their failures that were recorded. Dashed: equal F1, from 0.2 to 0.8. Without a failure on one side a \
-                  share is undefined and has no marker."
-            .to_owned(),
+        caption: format!(
+            "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
+             failures that were recorded; both without an interval. Dashed: equal F1, from 0.2 to 0.8. Without a failure \
+             on one side a share is undefined and has no marker. {HOLLOW}"
+        ),
         plots: plots.collect(),
         ..Figure::default()
     }
+}
+
+/// Words for a heading where scenarios are few.
+fn few(failing_scenarios: u64) -> String {
+    let is_few = is_few(failing_scenarios as f64);
+    if is_few { format!(" ({})", counted(failing_scenarios as usize, "scenario")) } else { String::new() }
 }
 
 /// All pairs of recall and precision with this F1: P = F·R/(2R − F).
@@ -165,19 +182,22 @@ fn equal_f1(f: f64) -> Vec<(f64, f64)> {
 /// and for each; the front of those that no other beats with as few parameters.
 pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
     let panel = |heading: &str, criteria: &[Criterion]| {
-        let means = mean_f1(scores, criteria);
+        let shared = shared_cells(scores, criteria);
+        let fewest = shared.iter().map(|&(model, criterion)| scores.failing_scenarios(model, criterion)).min();
+        let fewest = fewest.unwrap_or(0);
+        let means = mean_f1(scores, &shared);
         let of = |name: &str| {
             let own = means.iter().filter(|(id, _)| id.family.name() == name);
             let values = own.map(|(id, mean)| {
                 let point = Value::from((id.parameter_count() as f64, *mean));
-                Value { label: id.key.to_string(), ..point }
+                Value { label: id.key.to_string(), is_few: is_few(fewest as f64), ..point }
             });
             Series { values: values.collect(), ..Series::new(name, &[Mark::Points], []) }
         };
         let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect();
         let front = "no other is better with as few parameters";
         Plot {
-            heading: heading.to_owned(),
+            heading: if shared.is_empty() { heading.to_owned() } else { format!("{heading}{}", few(fewest)) },
             x: PlotAxis::exactly("parameters beside the headway", 1.0, 8.0),
             y: PlotAxis::exactly("mean F1", 0.0, 1.05),
             layers: vec![
@@ -193,30 +213,34 @@ pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
     Figure {
         title: format!("{}: F1 against the number of parameters", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
-        caption: "Mean over the driver models (and criteria) whose F1 every parameterization defines. The fewer \
-                  parameters, the fewer samples a density needs: of two that are equally good the simpler one is \
-                  preferable."
+        caption: "Mean over the driver models (and criteria) whose F1 every parameterization defines, without an interval. \
+                  The fewer parameters, the fewer samples a density needs: of two that are equally good the simpler one \
+                  is preferable. Hollow: in one of these S fails in fewer than ten scenarios; the smallest number stands \
+                  above."
             .to_owned(),
         plots,
         ..Figure::default()
     }
 }
 
-/// The mean F1 of every parameterization over the cells that all of them define; none where there is no such cell.
-fn mean_f1(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(Parameterization, f64)> {
-    let variants = 1..scores.variants.len();
-    let value = |variant: usize, model: ModelId, criterion: Criterion| {
-        scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
-    };
+fn f1_of(scores: &CategoryScores, variant: usize, (model, criterion): (ModelId, Criterion)) -> Option<f64> {
+    scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
+}
+
+/// The cells whose F1 every parameterization defines.
+fn shared_cells(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
     let cells = scores.models.iter().flat_map(|&model| criteria.iter().map(move |&criterion| (model, criterion)));
-    let shared: Vec<_> =
-        cells.filter(|&(m, c)| variants.clone().all(|variant| value(variant, m, c).is_some())).collect();
+    cells.filter(|&cell| (1..scores.variants.len()).all(|variant| f1_of(scores, variant, cell).is_some())).collect()
+}
+
+/// The mean F1 of every parameterization over these cells; none where there is no cell.
+fn mean_f1(scores: &CategoryScores, cells: &[(ModelId, Criterion)]) -> Vec<(Parameterization, f64)> {
     let mean = |variant: usize| {
-        let sum: f64 = shared.iter().filter_map(|&(m, c)| value(variant, m, c)).sum();
+        let sum: f64 = cells.iter().filter_map(|&cell| f1_of(scores, variant, cell)).sum();
         let id = Parameterization::find(scores.category, &scores.variants[variant])?;
-        (!shared.is_empty()).then(|| (id, sum / shared.len() as f64))
+        (!cells.is_empty()).then(|| (id, sum / cells.len() as f64))
     };
-    variants.clone().filter_map(mean).collect()
+    (1..scores.variants.len()).filter_map(mean).collect()
 }
 
 /// The points that no other reaches with as small an x, from left to right.

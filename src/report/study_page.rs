@@ -37,7 +37,7 @@ impl StudyReport {
         for at in 0..self.scores.categories.len() {
             sections.push(self.category(at));
         }
-        sections.push(self.claims());
+        sections.extend(self.claims());
         sections.extend(self.comparison.as_ref().map(compared));
         sections.push(self.reproduction()?);
         let page = Page {
@@ -144,39 +144,20 @@ impl StudyReport {
         PageTable { caption: format!("F1 with its {level} % interval over scenarios"), header, texts: 2, rows }
     }
 
-    fn claims(&self) -> Section {
-        let row = |result: &crate::run::score::ClaimResult| {
-            let overall = &result.overall;
-            let difference = overall.value.map_or("-".to_owned(), |value| format!("{value:+.3}"));
-            let interval = overall.interval.map_or(String::new(), |i| format!("\n[{:+.3} {:+.3}]", i.low, i.high));
-            let of_verdict = |verdict: ClaimVerdict| result.rows.iter().filter(|row| row.verdict == verdict).count();
-            let all = [
-                ClaimVerdict::Holds,
-                ClaimVerdict::Contradicted,
-                ClaimVerdict::Undecided,
-                ClaimVerdict::TooFew,
-                ClaimVerdict::NotRun,
-            ];
-            let cells =
-                all.into_iter().filter(|v| of_verdict(*v) > 0).map(|v| format!("{} {}", of_verdict(v), v.text()));
-            vec![
-                result.claim.id.to_owned(),
-                result.claim.statement.to_owned(),
-                overall.verdict.text().to_owned(),
-                cells.collect::<Vec<_>>().join("\n"),
-                count(overall.failures),
-                format!("{difference}{interval}"),
-            ]
-        };
-        let header = ["claim", "the paper says", "here it", "cells", "S fails", "difference [interval]"];
-        let rows = self.claims.iter().map(row).collect();
-        Section {
-            intro: "What de Gelder and Op den Camp found on highD, tested here: the mean over the cells (model and \
-                    criterion) with enough failures, and each cell by itself. Files: claims.csv."
-                .to_owned(),
-            tables: vec![table("Claims", &header, 4, rows)],
+    /// `None` where no claim could be computed: of a single model, say.
+    fn claims(&self) -> Option<Section> {
+        let rows = tables::claim_rows(&self.claims);
+        let level = value(100.0 * self.scores.options.confidence);
+        (!rows.is_empty()).then(|| Section {
+            intro: format!(
+                "What de Gelder and Op den Camp found on highD, tested here. A cell holds or contradicts a claim where \
+                 the {level} % interval of its difference over scenarios excludes 0. {} Mean difference: over the \
+                 cells that are judged. File: claims.csv.",
+                ClaimVerdict::RULE
+            ),
+            tables: vec![table("Claims", &tables::CLAIM_COLUMNS, 2, rows)],
             ..Section::new("claims", "The paper's claims on this data")
-        }
+        })
     }
 
     fn reproduction(&self) -> Result<Section> {
@@ -185,7 +166,7 @@ impl StudyReport {
             ("program".to_owned(), run.program.clone()),
             ("profile".to_owned(), run.profile.name.clone()),
             ("time step".to_owned(), format!("{} s", value(run.profile.frame.dt_s))),
-            ("seed of the bootstrap".to_owned(), run.score.seed.to_string()),
+            ("seed of the lanes computed again".to_owned(), run.score.seed.to_string()),
             ("SHA-256 of the plan".to_owned(), run.plan_sha256.clone()),
         ];
         facts.extend(

@@ -1,17 +1,15 @@
 //! Tables for the terminal, as plain text.
 
-use std::fmt::Write;
-
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
-    BootstrapInterval, CategoryScores, ClaimResult, ClaimRow, Misfit, PublishedFailures, ScoreTable, f1,
+    CategoryScores, ClaimResult, ClaimRow, ClaimVerdict, Misfit, PublishedFailures, ScoreInterval, ScoreTable, f1,
     published_failures, published_lvd_f1,
 };
 use crate::support::readable;
 
-/// Columns of a terminal that every table fits in.
+/// Columns that every table fits in where no terminal says how wide it is.
 pub(crate) const WIDTH: usize = 120;
 
 /// An empty table that breaks its cells rather than the terminal's lines.
@@ -30,21 +28,50 @@ pub(super) fn aligned(mut table: Table, texts: usize) -> String {
     format!("{table}\n")
 }
 
+/// A table within so many columns of the terminal, its first `texts` columns to the left. Where it is too wide it becomes
+/// several, each with the first `keys` columns, so that no number and no interval is broken.
+fn fitted(header: &[String], rows: &[Vec<String>], (keys, texts): (usize, usize), width: usize) -> String {
+    let lines = |at: usize| {
+        let cells = std::iter::once(header).chain(rows.iter().map(Vec::as_slice)).filter_map(move |row| row.get(at));
+        cells.flat_map(|cell| cell.lines()).map(|line| line.chars().count())
+    };
+    // With the bars and spaces of the style.
+    let column = |at: usize| lines(at).max().unwrap_or(0) + 3;
+    let fixed: usize = 1 + (0..keys).map(column).sum::<usize>();
+    let (mut parts, mut used) = (vec![(0..keys).collect::<Vec<usize>>()], fixed);
+    for at in keys..header.len() {
+        let last = parts.len() - 1;
+        if used + column(at) > width && parts[last].len() > keys {
+            (used, _) = (fixed, parts.push((0..keys).collect()));
+        }
+        used += column(at);
+        let last = parts.len() - 1;
+        parts[last].push(at);
+    }
+    let text = |columns: &Vec<usize>| {
+        let of =
+            |row: &[String]| columns.iter().map(|&at| row.get(at).cloned().unwrap_or_default()).collect::<Vec<_>>();
+        let mut table = table(of(header));
+        table.set_width(width as u16);
+        for row in rows {
+            table.add_row(of(row));
+        }
+        aligned(table, texts.min(columns.iter().filter(|at| **at < texts).count()))
+    };
+    parts.iter().map(text).collect::<Vec<_>>().join("\n")
+}
+
 /// Failures of S per category, model and criterion, as in the paper's table; where asked, the shares beside the
 /// published ones, with the misfit.
-pub fn failures(scores: &ScoreTable, published: bool) -> String {
+pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
     let mut header: Vec<String> = ["scenario", "model"].map(str::to_owned).to_vec();
     header.extend(["collision", "TTC", "BTN", "simulations", "capped"].map(str::to_owned));
     if published {
         header.extend(PUBLISHED_COLUMNS.map(str::to_owned));
     }
-    let mut table = table(header);
-    for row in failure_rows(scores, published) {
-        table.add_row(row);
-    }
-    let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), WIDTH) + "\n");
-    let misfit = misfit.unwrap_or_default();
-    format!("Failures of the recorded scenarios (S)\n{}{misfit}", aligned(table, 2))
+    let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), width) + "\n");
+    let table = fitted(&header, &failure_rows(scores, published), (2, 2), width);
+    format!("Failures of the recorded scenarios (S)\n{table}{}", misfit.unwrap_or_default())
 }
 
 /// Columns of [`failures`] with the published numbers: collision, TTC and BTN.
@@ -75,19 +102,16 @@ pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<Stri
 }
 
 /// F1 per parameterization, model and criterion, with its interval.
-pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
+pub fn f1_table(scores: &CategoryScores, published: bool, width: usize) -> String {
     let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
     header.extend(scores.variants.iter().skip(1).cloned());
-    let mut table = table(header);
-    for row in f1_rows(scores, published) {
-        table.add_row(row);
-    }
-    format!(
-        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: too few failures\n{}",
+    let heading = format!(
+        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: too few \
+         failures",
         scores.category.label(),
-        readable::count(scores.scenarios),
-        aligned(table, 2)
-    )
+        readable::count(scores.scenarios)
+    );
+    format!("{}\n{}", wrap(&heading, width), fitted(&header, &f1_rows(scores, published), (3, 2), width))
 }
 
 /// The rows of [`f1_table`].
@@ -103,7 +127,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
                 let mut text = cell.map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));
                 let theirs = published_lvd_f1(&scores.variants[variant], model, criterion);
                 if let Some(theirs) = theirs.filter(|_| published) {
-                    let _ = write!(text, "\npaper {theirs:.3}");
+                    text += &format!("\npaper {theirs:.3}");
                 }
                 row.push(text);
             }
@@ -113,7 +137,7 @@ pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<Strin
     rows
 }
 
-fn value(value: Option<f64>, interval: Option<BootstrapInterval>) -> String {
+fn value(value: Option<f64>, interval: Option<ScoreInterval>) -> String {
     match (value, interval) {
         (Some(value), Some(interval)) => format!("{value:.3}\n[{} {}]", short(interval.low), short(interval.high)),
         (Some(value), None) => format!("{value:.3}\n[few]"),
@@ -127,51 +151,39 @@ fn short(value: f64) -> String {
     text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
 }
 
-/// The paper's claims with their numbers and verdicts.
-pub fn claims(results: &[ClaimResult]) -> String {
-    let header = ["claim", "the paper says", "S fails", "difference\n[interval]", "verdict", "cells"];
-    let mut table = table(header.map(str::to_owned).to_vec());
-    for result in results {
-        let row = &result.overall;
-        let count = |verdict| result.rows.iter().filter(|r: &&ClaimRow| r.verdict == verdict).count();
-        let mut verdicts = Vec::new();
-        for verdict in [
-            crate::run::score::ClaimVerdict::Holds,
-            crate::run::score::ClaimVerdict::Contradicted,
-            crate::run::score::ClaimVerdict::Undecided,
-            crate::run::score::ClaimVerdict::TooFew,
-            crate::run::score::ClaimVerdict::NotRun,
-        ] {
-            let n = count(verdict);
-            if n > 0 {
-                verdicts.push(format!("{n} {}", verdict.text()));
-            }
-        }
-        table.add_row([
-            result.claim.id.to_owned(),
-            wrap(result.claim.statement, 34),
-            readable::count(row.failures),
-            difference(row),
-            row.verdict.text().to_owned(),
-            verdicts.join("\n"),
-        ]);
+/// The paper's claims with their numbers and verdicts, in a text; nothing where none could be computed.
+pub fn claims(results: &[ClaimResult], width: usize) -> String {
+    let mut rows = claim_rows(results);
+    if rows.is_empty() {
+        return String::new();
     }
+    rows.iter_mut().for_each(|row| row[1] = wrap(&row[1], 34));
     format!(
-        "The paper's claims on this data (mean over the cells with enough failures; cells: each model and \
-         criterion)\n{}",
-        aligned(table, 2)
+        "The paper's claims on this data\n{}{}\n",
+        fitted(&CLAIM_COLUMNS.map(str::to_owned), &rows, (1, 2), width),
+        wrap(ClaimVerdict::RULE, width)
     )
 }
 
-fn difference(row: &ClaimRow) -> String {
-    let mut text = row.value.map_or("-".to_owned(), |v| format!("{v:+.3}"));
-    if let Some(BootstrapInterval { low, high }) = row.interval {
-        let _ = write!(text, "\n[{low:+.2} {high:+.2}]");
-    }
-    if row.undefined_draws > 0 {
-        let _ = write!(text, "\n{} draws 0/0", row.undefined_draws);
-    }
-    text
+/// Columns of [`claims`].
+pub(super) const CLAIM_COLUMNS: [&str; 6] =
+    ["claim", "the paper says", "failing\nscenarios", "mean\ndifference", "verdict", "cells"];
+
+/// The rows of [`claims`], without those that could not be computed.
+pub(super) fn claim_rows(results: &[ClaimResult]) -> Vec<Vec<String>> {
+    let row = |result: &ClaimResult| {
+        let count = |verdict| result.rows.iter().filter(|r: &&ClaimRow| r.verdict == verdict).count();
+        let cells = ClaimVerdict::ALL.into_iter().filter(|verdict| count(*verdict) > 0);
+        vec![
+            result.claim.id.to_owned(),
+            result.claim.statement.to_owned(),
+            readable::count(result.failing_scenarios),
+            result.mean.map_or("-".to_owned(), |mean| format!("{mean:+.3}")),
+            result.verdict.text().to_owned(),
+            cells.map(|verdict| format!("{} {}", count(verdict), verdict.text())).collect::<Vec<_>>().join("\n"),
+        ]
+    };
+    results.iter().filter(|result| result.verdict != ClaimVerdict::NotRun).map(row).collect()
 }
 
 /// The text broken between words; a longer word stays whole.
@@ -198,6 +210,19 @@ mod tests {
     #[test]
     fn short_numbers_have_three_characters() {
         assert_eq!([0.0, 0.8687, 0.9949, 0.9951, 1.0].map(short), [".00", ".87", ".99", "1.0", "1.0"]);
+    }
+
+    #[test]
+    fn a_table_that_is_too_wide_becomes_several_and_breaks_no_interval() {
+        let header: Vec<String> = ["model", "1", "2", "3", "4"].map(str::to_owned).to_vec();
+        let rows =
+            vec![["FSM", "0.5\n[.40 .60]", "0.6\n[.50 .70]", "0.7\n[.60 .80]", "0.8"].map(str::to_owned).to_vec()];
+        let one = fitted(&header, &rows, (1, 1), 60);
+        let two = fitted(&header, &rows, (1, 1), 35);
+        assert_eq!((one.matches("FSM").count(), two.matches("FSM").count()), (1, 2), "{two}");
+        for text in [one, two, fitted(&header, &rows, (1, 1), 20)] {
+            assert!(["[.40 .60]", "[.50 .70]", "[.60 .80]"].iter().all(|interval| text.contains(interval)), "{text}");
+        }
     }
 
     #[test]

@@ -13,7 +13,14 @@ fn estimate(samples: u64, truth: f64, wave: f64) -> ConvergencePoint {
     let n = samples as f64;
     let probability = ((truth + 1.3 * wave.sin() * (truth / n).sqrt()) * n).round().max(0.0) / n;
     let half = 1.96 * (probability.max(1.0 / n) / n).sqrt();
-    ConvergencePoint { samples, probability, lower: (probability - half).max(0.0), upper: probability + half }
+    ConvergencePoint {
+        samples,
+        probability,
+        lower: (probability - half).max(0.0),
+        upper: probability + half,
+        outer: Some((0.6 * probability, 1.7 * probability)),
+        failing_scenarios: Some(6.0 + n.log10()),
+    }
 }
 
 fn convergence(panels: &[&str], names: &[&str], points: u32, truth: f64) -> ConvergenceFigure {
@@ -27,7 +34,7 @@ fn convergence(panels: &[&str], names: &[&str], points: u32, truth: f64) -> Conv
         }
     }
     let subtitle = Some("SYNTHETIC DATA; Monte Carlo from the density, 95 % intervals".into());
-    ConvergenceFigure { title: "Cut-in: how the failure probability settles".into(), subtitle, series }
+    ConvergenceFigure { title: "Cut-in: how the failure probability settles".into(), subtitle, level: 0.95, series }
 }
 
 fn map(nx: usize, ny: usize, count: impl Fn(usize, usize) -> (u64, u64)) -> FailureMap {
@@ -53,7 +60,14 @@ fn hill(nx: usize, ny: usize) -> FailureMap {
 
 fn row(name: &str, estimate: Option<f64>, spread: f64) -> ForestRow {
     let middle = estimate.unwrap_or(f64::NAN);
-    ForestRow { name: name.into(), estimate, lower: middle / spread, upper: middle * spread }
+    ForestRow {
+        name: name.into(),
+        estimate,
+        lower: middle / spread,
+        upper: middle * spread,
+        outer: Some((middle / spread / spread, middle * spread * spread)),
+        failing_scenarios: Some(if spread > 1.4 { 7 } else { 20 }),
+    }
 }
 
 fn forest(scale: AxisScale, groups: usize, rows: usize) -> ForestFigure {
@@ -63,7 +77,7 @@ fn forest(scale: AxisScale, groups: usize, rows: usize) -> ForestFigure {
             .map(|k| row(&format!("parameterization {}", k + 1), Some(middle * (1.0 + 0.3 * (k as f64).sin())), 1.5))
             .collect();
         list.push(row("importance sampling from a mixture fitted to the failures", None, 1.0));
-        list.push(ForestRow { name: "plain".into(), estimate: Some(0.0), lower: 0.0, upper: middle });
+        list.push(ForestRow { name: "plain".into(), estimate: Some(0.0), upper: middle, ..ForestRow::default() });
         ForestGroup {
             name: format!("{} Collision", MODELS[g % 4]),
             reference: Some(row("recorded scenarios", Some(middle), 1.3)),
@@ -75,6 +89,7 @@ fn forest(scale: AxisScale, groups: usize, rows: usize) -> ForestFigure {
         subtitle: Some("SYNTHETIC DATA; 95 % intervals".into()),
         axis: "Failures per hour (1/h)".into(),
         scale,
+        intervals: "Line: 95 % interval over the draws; thin: over draws and scenarios.".into(),
         groups: groups.collect(),
     }
 }

@@ -222,7 +222,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
     let dir = tempfile::tempdir().unwrap();
     for (name, content) in [
         ("broken.toml", &b"[score\n"[..]),
-        ("wrong.toml", b"[score]\nbootstrap_drawz = 5\n"),
+        ("wrong.toml", b"[score]\nleast_failurez = 5\n"),
         ("profile.toml", b"[run]\nprofile = \"papr\"\n"),
         ("scenarios.csv", b"category,ego_speed\nlvd,30\n"),
         ("d.json", density()),
@@ -245,7 +245,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
         ("-- study --scenarios nothing.jsonl", "nothing.jsonl: cannot read"),
         ("-- study nothing", "nothing"),
         ("broken.toml", "broken.toml"),
-        ("wrong.toml", "bootstrap_drawz"),
+        ("wrong.toml", "least_failurez"),
         ("profile.toml", "papr"),
         ("-- sample d.json --models XYZ", "--models: there is no driver model `XYZ`"),
         ("-- sample d.json --thw 0.6,0.6", "`0.6` is given twice"),

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod claim_coverage;
 mod density;
 mod estimator_coverage;
 mod estimators;

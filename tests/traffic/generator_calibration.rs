@@ -7,7 +7,7 @@ mod traffic;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::score::{ScoreOptions, published_failures};
+use lanesweep::run::score::published_failures;
 use lanesweep::run::study::Study;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::traffic::mining::{Mined, MiningOptions, mine, mine_generated};
@@ -255,8 +255,7 @@ fn recorded_motions_are_neither_straight_lines_nor_sinusoids() {
 fn failures_of_recorded_scenarios_are_near_the_published_ones_on_an_unseen_seed() {
     let options = GeneratorOptions { seed: 1, ..GeneratorOptions::default() };
     let mined = mine_generated(&options, &MiningOptions::default(), || ()).unwrap();
-    let score = ScoreOptions { bootstrap_draws: 20, ..ScoreOptions::default() };
-    let study = Study::builder(&mined, Profile::load("paper").unwrap()).score(score).plan().unwrap();
+    let study = Study::builder(&mined, Profile::load("paper").unwrap()).plan().unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let scores = study.score(&study.run(&Executor::new(&backend)).unwrap().counts).unwrap();
     let mut table = Table::new("Failures of S, per cent of the simulations");

@@ -1,98 +1,26 @@
-//! The layers of a plot: series (line, points, band, intervals, bars), rules and cells, and what each looks like.
+//! The layers of a plot: series (line, points, band, intervals, bars), rules and cells.
 
-use std::f64::consts::TAU;
-
-use super::axis::{Axes, number, on_circle};
+use super::axis::{Axes, number};
 use super::cells::Cells;
+use super::look::Look;
 use super::svg::{Anchor, Canvas, GREY, Paint, Position, Type, WHITE, set};
 
 pub(in crate::report) const TICK: Type = set(13, false, GREY);
 
-/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, too pale as a line on white.
-const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9"];
-/// Line styles (SVG dash arrays); the empty one is solid.
-const DASHES: [&str; 7] = ["", "10,4", "3,3", "12,3,3,3", "18,5", "7,3,2,3,2,3", "5,6"];
-const SYMBOLS: [Symbol; 7] = [
-    Symbol::Disc,
-    Symbol::Polygon(4, 0.5),
-    Symbol::Polygon(3, 0.0),
-    Symbol::Polygon(4, 0.0),
-    Symbol::Polygon(3, 0.5),
-    Symbol::Polygon(5, 0.0),
-    Symbol::Polygon(6, 0.0),
-];
 /// With more values than this a line has no markers: they would hide it.
 const MAX_MARKERS: usize = 40;
 /// With more labelled values than this none is written out.
 const MAX_WORDS: usize = 8;
 
-/// Shape of a marker.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Symbol {
-    /// A filled circle.
-    Disc,
-    /// An empty circle.
-    Ring,
-    /// Two strokes.
-    Cross,
-    /// So many corners; the first so many steps clockwise from the top.
-    Polygon(u32, f64),
-}
+/// Below so many failing scenarios a value is drawn hollow.
+const MIN_SCENARIOS: f64 = 10.0;
 
-/// How a series looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
-    /// `#rrggbb`.
-    pub colour: &'static str,
-    /// Lengths of dashes and gaps, px; solid where empty.
-    pub dash: &'static str,
-    /// Width of the line.
-    pub line_px: f64,
-    /// Marker.
-    pub symbol: Symbol,
-    /// Radius of the marker.
-    pub marker_px: f64,
-}
+/// What a hollow marker means, for captions.
+pub(in crate::report) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios, with their number.";
 
-impl Look {
-    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so no pair repeats
-    /// before 49 series. Lines run from thick to thin and markers from large to small: what lies below stays visible.
-    pub fn of(index: usize, count: usize) -> Self {
-        let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
-        Self {
-            colour: COLOURS[index % COLOURS.len()],
-            dash: DASHES[(index + index / COLOURS.len()) % DASHES.len()],
-            line_px: 2.6 - depth,
-            symbol: SYMBOLS[index % SYMBOLS.len()],
-            marker_px: 6.0 - 2.0 * depth,
-        }
-    }
-
-    pub(in crate::report) fn paint(&self) -> Paint<'static> {
-        Paint { dash: self.dash, ..Paint::line(self.colour, self.line_px) }
-    }
-
-    /// The marker around a point, with a white rim that parts it from the markers below.
-    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
-        let (r, colour) = (self.marker_px, self.colour);
-        let rimmed = Paint { stroke: Some((WHITE, 1.0)), ..Paint::fill(colour) };
-        match self.symbol {
-            Symbol::Disc => canvas.circle((x, y), r * 0.9, rimmed),
-            Symbol::Ring => {
-                canvas.circle((x, y), r * 0.8, Paint { fill: Some(WHITE), ..Paint::line(colour, 2.0) });
-            }
-            Symbol::Cross => {
-                let strokes = [vec![(x - r, y - r), (x + r, y + r)], vec![(x - r, y + r), (x + r, y - r)]];
-                canvas.path(&strokes, false, Paint::line(WHITE, 5.0));
-                canvas.path(&strokes, false, Paint::line(colour, 2.6));
-            }
-            Symbol::Polygon(corners, first) => {
-                let turn = |k: u32| TAU * (f64::from(k) + first) / f64::from(corners);
-                let outline = (0..corners).map(|k| on_circle((x, y), r * 1.1, turn(k))).collect();
-                canvas.path(&[outline], true, rimmed);
-            }
-        }
-    }
+/// Whether a value rests on few failing scenarios; their number may be an effective one.
+pub(in crate::report) fn is_few(failing_scenarios: f64) -> bool {
+    failing_scenarios < MIN_SCENARIOS
 }
 
 /// How the values of a series are drawn.
@@ -120,6 +48,10 @@ pub struct Value {
     pub y: f64,
     /// Ends of its interval.
     pub interval: Option<(f64, f64)>,
+    /// Ends of an interval that covers more, drawn paler and thinner.
+    pub outer: Option<(f64, f64)>,
+    /// It rests on few failing scenarios ([`is_few`]): its marker is hollow.
+    pub is_few: bool,
     /// A word beside it.
     pub label: String,
     /// What a browser shows over its marker; name and numbers where empty.
@@ -232,9 +164,9 @@ impl Series {
         runs.map(|run| (run.iter().copied().flatten().collect(), closes)).collect()
     }
 
-    /// The ends of a value's interval.
-    fn ends(&self, value: &Value, axes: &Axes) -> Option<(Position, Position)> {
-        let (lower, upper) = value.interval?;
+    /// The ends of an interval of a value.
+    fn ends(&self, value: &Value, interval: Option<(f64, f64)>, axes: &Axes) -> Option<(Position, Position)> {
+        let (lower, upper) = interval?;
         let end = |v: f64| axes.at(if self.is_sideways { (v, value.y) } else { (value.x, v) });
         Some((end(lower), end(upper)))
     }
@@ -243,12 +175,16 @@ impl Series {
         if !self.has(Mark::Band) {
             return;
         }
-        for (run, _) in self.runs(axes) {
-            let ends: Vec<(Position, Position)> = run.iter().filter_map(|value| self.ends(value, axes)).collect();
+        type Pick = fn(&Value) -> Option<(f64, f64)>;
+        let intervals: [(Pick, f64); 2] = [(|value| value.outer, 0.09), (|value| value.interval, 0.16)];
+        let runs = self.runs(axes);
+        for ((run, _), (interval, opacity)) in intervals.iter().flat_map(|i| runs.iter().map(move |run| (run, i))) {
+            let ends = run.iter().filter_map(|value| self.ends(value, interval(value), axes));
+            let ends: Vec<(Position, Position)> = ends.collect();
             let outline = ends.iter().map(|ends| ends.1).chain(ends.iter().rev().map(|ends| ends.0)).collect();
             let paint = match ends.len() {
                 1 => Paint::line(look.colour, 1.2),
-                _ => Paint { opacity: Some(0.16), ..Paint::fill(look.colour) },
+                _ => Paint { opacity: Some(*opacity), ..Paint::fill(look.colour) },
             };
             canvas.path(&[outline], ends.len() > 1, paint);
         }
@@ -297,7 +233,8 @@ impl Series {
             let own = (if self.is_sideways { value.x } else { value.y }, value.interval.map_or(f64::NAN, |i| i.1));
             if !axes.shows(value.place()) {
                 let axis = if self.is_sideways { &axes.x } else { &axes.y };
-                if let Some((_, upper)) = self.ends(value, axes).filter(|_| own.0 == 0.0 && axis.shows(own.1)) {
+                let ends = self.ends(value, value.interval, axes);
+                if let Some((_, upper)) = ends.filter(|_| own.0 == 0.0 && axis.shows(own.1)) {
                     canvas.group("class=\"limit\"", &value.tip, |canvas| self.limit(canvas, upper, look));
                 }
                 continue;
@@ -308,15 +245,18 @@ impl Series {
             }
             let place = axes.at((value.x, value.y));
             canvas.group(attributes, &self.tip(value, quantities), |canvas| {
-                if let Some(ends) = self.ends(value, axes).filter(|_| self.has(Mark::Intervals)) {
-                    let axis = if self.is_sideways { &axes.x } else { &axes.y };
-                    let reaches_lower = value.interval.is_some_and(|interval| axis.holds(interval.0));
-                    self.interval(canvas, ends, reaches_lower, look);
+                let axis = if self.is_sideways { &axes.x } else { &axes.y };
+                let thin = Look { line_px: 0.5 * look.line_px, ..*look };
+                for (interval, look) in [(value.outer, &thin), (value.interval, look)] {
+                    if let Some(ends) = self.ends(value, interval, axes).filter(|_| self.has(Mark::Intervals)) {
+                        let reaches_lower = interval.is_some_and(|interval| axis.holds(interval.0));
+                        self.interval(canvas, ends, reaches_lower, look);
+                    }
                 }
-                look.marker(canvas, place);
+                Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
             // A word per value of a few; with many they would cover one another.
-            if !value.label.is_empty() && self.values.len() <= MAX_WORDS {
+            if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
                 label(canvas, place, &value.label, taken);
             }
         }
@@ -397,12 +337,6 @@ fn without_inner_points(places: &[Position]) -> Vec<Position> {
 mod tests {
     use super::super::axis::{Axis, AxisScale};
     use super::*;
-
-    #[test]
-    fn no_two_series_look_alike() {
-        let looks: std::collections::BTreeSet<_> = (0..49).map(|i| (i % COLOURS.len(), Look::of(i, 49).dash)).collect();
-        assert_eq!(looks.len(), 49);
-    }
 
     #[test]
     fn around_a_centre_a_line_is_broken_at_every_gap_and_runs_over_the_top() {

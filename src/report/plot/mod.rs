@@ -8,17 +8,19 @@ mod axis;
 mod cells;
 mod frame;
 mod layer;
+mod look;
 mod svg;
 
 use std::f64::consts::TAU;
 
 pub use axis::AxisScale;
 pub use cells::{Cells, ColourBar, Fill, FilledCell, Hatch};
-pub use layer::{Layer, Look, Mark, Rule, Series, Symbol, Value};
+pub use layer::{Layer, Mark, Rule, Series, Value};
+pub use look::{Look, Symbol};
 
 pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
 pub(super) use frame::ROW;
-pub(super) use layer::TICK;
+pub(super) use layer::{HOLLOW, TICK, is_few};
 #[cfg(test)]
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, WHITE, set};

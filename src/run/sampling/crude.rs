@@ -51,6 +51,9 @@ pub struct CheckpointRow {
     pub probability: f64,
     /// Ends of the interval of the draws alone: more samples make it smaller.
     pub interval: [f64; 2],
+    /// Ends of the interval that has the data's uncertainty in it too, and how many scenarios failures come from;
+    /// unknown where draws do not come from scenarios.
+    pub with_data: Option<([f64; 2], f64)>,
 }
 
 /// What a run of crude Monte Carlo gave.
@@ -214,6 +217,7 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
         criterion: row.criterion,
         probability: row.estimate.probability,
         interval: row.draws,
+        with_data: row.failing_scenarios.map(|n| ([row.estimate.interval.low, row.estimate.interval.high], n)),
     };
     kept.map(of).collect()
 }

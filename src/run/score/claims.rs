@@ -1,32 +1,23 @@
 //! The paper's qualitative claims, judged on the user's data.
 //!
-//! A claim holds if the paired bootstrap interval of its statistic excludes 0 with the claimed sign, is
-//! contradicted if it excludes 0 with the other, and undecided otherwise. Cells with few failures in S are
-//! left out; where none remains the data is too few. It is also too few below ten scenarios: a bootstrap over one
-//! scenario has no width. A claimed equality holds if the interval lies within
-//! ±0.05 and is contradicted if it lies wholly outside; over several cells it is about the mean size of the
-//! difference, so that differences of opposite sign do not cancel.
+//! A cell (model and criterion) of a claim holds if the interval of its statistic excludes 0 with the claimed sign, is
+//! contradicted if it excludes 0 with the other, and undecided otherwise. A claimed equality holds in a cell if the
+//! interval lies within ±0.05 and is contradicted if it lies wholly outside. A cell in which S fails in few scenarios
+//! is not judged.
 //!
-//! The mean over cells is taken over the same cells in every draw: a draw in which one of them is undefined is
-//! undefined, and where more than 5 % of the draws are, the claim is undecided.
+//! The cells decide about the claim: [`ClaimVerdict::of_cells`].
 
-use super::bootstrap::{BootstrapInterval, interval};
-use super::published::PAPER_MODELS;
-use super::statistic::Statistic;
-use super::table::{CategoryScores, ScoreTable};
-use crate::engine::Headway;
+use super::difference::ScoreInterval;
+use super::paper_claims::paper_claims;
+use super::statistic::{Scenarios, Statistic};
+use super::table::ScoreTable;
+use crate::engine::{Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
 
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
-
-/// Below so many scenarios a bootstrap over scenarios says nothing, and no claim is judged.
-const MIN_SCENARIOS: u64 = 10;
-
-/// Share of undefined draws above which a claim is undecided.
-const MAX_UNDEFINED: f64 = 0.05;
 
 /// A claim as data.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,13 +43,28 @@ pub enum ClaimVerdict {
     Contradicted,
     /// The interval holds 0.
     Undecided,
-    /// Fewer failures in S than needed, or fewer than ten scenarios.
+    /// S fails in fewer scenarios than needed.
     TooFew,
     /// A variant, a model or a headway that it speaks of was not run.
     NotRun,
 }
 
 impl ClaimVerdict {
+    /// All, in the order of every table.
+    pub const ALL: [ClaimVerdict; 5] = [
+        ClaimVerdict::Holds,
+        ClaimVerdict::Contradicted,
+        ClaimVerdict::Undecided,
+        ClaimVerdict::TooFew,
+        ClaimVerdict::NotRun,
+    ];
+
+    /// How cells decide about a claim, in words.
+    pub const RULE: &'static str = "A claim holds if it holds in at least half of its cells (driver model and \
+                                    criterion) and no cell contradicts it; it is contradicted if it is in at least \
+                                    half of its cells and holds in none. It has too few failures if more than half \
+                                    of its cells have. Otherwise it is undecided.";
+
     /// In words.
     pub fn text(self) -> &'static str {
         match self {
@@ -69,319 +75,241 @@ impl ClaimVerdict {
             ClaimVerdict::NotRun => "not computed",
         }
     }
+
+    /// Of a number that is claimed to be positive.
+    pub fn of_sign(interval: ScoreInterval) -> ClaimVerdict {
+        match interval {
+            ScoreInterval { low, .. } if low > 0.0 => ClaimVerdict::Holds,
+            ScoreInterval { high, .. } if high < 0.0 => ClaimVerdict::Contradicted,
+            _ => ClaimVerdict::Undecided,
+        }
+    }
+
+    /// Of a number that is claimed to be nearly 0.
+    fn of_nearness(interval: ScoreInterval) -> ClaimVerdict {
+        match interval {
+            ScoreInterval { low, high } if low >= -NEAR && high <= NEAR => ClaimVerdict::Holds,
+            ScoreInterval { low, high } if low > NEAR || high < -NEAR => ClaimVerdict::Contradicted,
+            _ => ClaimVerdict::Undecided,
+        }
+    }
+
+    /// Of a claim, from the verdicts of its cells. If each cell errs in 2.5 % of repeats, at most 5 % of claims that are
+    /// false in all cells hold, however the cells depend on one another (Markov's inequality).
+    pub fn of_cells(cells: &[ClaimVerdict]) -> ClaimVerdict {
+        let count = |verdict: ClaimVerdict| cells.iter().filter(|cell| **cell == verdict).count();
+        let [holding, contradicting, _, too_few, not_run] = ClaimVerdict::ALL.map(count);
+        if not_run > 0 {
+            ClaimVerdict::NotRun
+        } else if 2 * too_few > cells.len() || cells.is_empty() {
+            ClaimVerdict::TooFew
+        } else if contradicting == 0 && 2 * holding >= cells.len() {
+            ClaimVerdict::Holds
+        } else if holding == 0 && 2 * contradicting >= cells.len() {
+            ClaimVerdict::Contradicted
+        } else {
+            ClaimVerdict::Undecided
+        }
+    }
 }
 
-/// A statistic with its interval and verdict, over all usable cells or for one.
+/// A statistic with its interval and verdict in one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClaimRow {
-    /// The cell; `None` for the mean over all usable ones.
-    pub cell: Option<(ModelId, Criterion)>,
-    /// Failures of S: in the cell, or in all cells of the claim, those that are left out included.
-    pub failures: u64,
+    /// The cell.
+    pub cell: (ModelId, Criterion),
+    /// Scenarios in which S fails, in any of the cells that are compared.
+    pub failing_scenarios: u64,
     /// Value on the whole sample.
     pub value: Option<f64>,
-    /// Paired bootstrap interval.
-    pub interval: Option<BootstrapInterval>,
-    /// Draws in which the statistic is undefined.
-    pub undefined_draws: u32,
+    /// Interval over scenarios.
+    pub interval: Option<ScoreInterval>,
     /// Verdict.
     pub verdict: ClaimVerdict,
 }
 
-/// A claim with its rows: first the mean, then each cell.
+/// A claim with its cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClaimResult {
     /// The claim.
     pub claim: Claim,
-    /// Mean over the usable cells.
-    pub overall: ClaimRow,
+    /// Scenarios in which S fails in any cell of the claim.
+    pub failing_scenarios: u64,
+    /// Mean over the cells that are judged; of a claimed equality the mean size.
+    pub mean: Option<f64>,
+    /// The verdict of the cells together.
+    pub verdict: ClaimVerdict,
     /// Each cell.
     pub rows: Vec<ClaimRow>,
-    /// Cells left out for too few failures.
-    pub left_out: usize,
-}
-
-impl ClaimRow {
-    /// Says nothing of what was not run.
-    fn leave_out(&mut self) {
-        (self.value, self.interval, self.undefined_draws) = (None, None, 0);
-        self.verdict = ClaimVerdict::NotRun;
-    }
-}
-
-fn cells(models: &[ModelId], criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
-    models.iter().flat_map(|&m| criteria.iter().map(move |&c| (m, c))).collect()
-}
-
-/// The claims of the paper, sections on results and discussion.
-pub fn paper_claims() -> Vec<Claim> {
-    use Category::{CutIn, CutOut, Lvd};
-    use Criterion::{Btn, Collision, Ttc};
-    use ModelId::{Cchdm, Fsm, Reg157, Rss};
-    use Statistic::*;
-    let all = || cells(&PAPER_MODELS, &Criterion::ALL);
-    let elsewhere = || {
-        let mut list = all();
-        list.retain(|&(m, c)| m != Reg157 || c == Collision);
-        list
-    };
-    let reg157_rest = || cells(&[Reg157], &[Ttc, Btn]);
-    let careful = || cells(&[Rss, Fsm], &Criterion::ALL);
-    let hasty = || cells(&[Reg157, Cchdm], &Criterion::ALL);
-    let often = || cells(&[Reg157], &[Ttc, Btn]);
-    let claim = |id, category, statement, cells, statistic| Claim { id, category, statement, cells, statistic };
-    let mut claims = vec![
-        claim("cut-in 2 > 1", CutIn, "2 is better than 1", all(), F1Above(&["2"], &["1"])),
-        claim("cut-in 3 < 1", CutIn, "3 is clearly worse than 1", elsewhere(), F1Above(&["1"], &["3"])),
-        claim("cut-in 4 < 2", CutIn, "4 is clearly worse than 2", elsewhere(), F1Above(&["2"], &["4"])),
-        claim(
-            "cut-in 3, 4 FP",
-            CutIn,
-            "3 and 4 err by false positives",
-            elsewhere(),
-            FalsePositivesDominate(&["3", "4"]),
-        ),
-        claim(
-            "cut-in Reg157 2, 4",
-            CutIn,
-            "Reg157 with TTC and BTN: 2 and 4 are best",
-            reg157_rest(),
-            F1Above(&["2", "4"], &["1", "3", "5", "6", "7"]),
-        ),
-        claim(
-            "cut-in 6, 7 best",
-            CutIn,
-            "elsewhere 6 and 7 are best",
-            elsewhere(),
-            F1Above(&["6", "7"], &["1", "2", "3", "4", "5"]),
-        ),
-        claim("cut-out b = d", CutOut, "b and d are nearly the same", all(), F1Near("b", "d")),
-        claim(
-            "cut-out b, d best",
-            CutOut,
-            "Reg157 and CCHDM are low for all but b and d",
-            hasty(),
-            F1Above(&["b", "d"], &["a", "c", "e", "f", "g"]),
-        ),
-        claim("cut-out c ~ 0", CutOut, "RSS and FSM: c is almost zero (F1 below 0.1)", careful(), F1Below("c", 0.1)),
-        claim("cut-out c < a", CutOut, "RSS and FSM: c is below a", careful(), F1Above(&["a"], &["c"])),
-        claim(
-            "cut-out c FN",
-            CutOut,
-            "RSS and FSM: c errs by false negatives",
-            careful(),
-            FalseNegativesDominate(&["c"]),
-        ),
-        claim(
-            "cut-out e, f low",
-            CutOut,
-            "RSS and FSM: e and f are below b, d and g",
-            careful(),
-            F1Above(&["b", "d", "g"], &["e", "f"]),
-        ),
-        claim(
-            "LVD iii-v > i, ii",
-            Lvd,
-            "RSS and FSM: iii to v are far above i and ii",
-            careful(),
-            F1Above(&["iii", "iv", "v"], &["i", "ii"]),
-        ),
-        claim(
-            "LVD i, ii FN",
-            Lvd,
-            "RSS and FSM: i and ii err by false negatives",
-            careful(),
-            FalseNegativesDominate(&["i", "ii"]),
-        ),
-        claim("LVD v best", Lvd, "v is best in all cases", all(), F1Above(&["v"], &["i", "ii", "iii", "iv"])),
-    ];
-    let fails = ["cut-in failures", "cut-out failures", "LVD failures"];
-    for (category, id) in Category::ALL.into_iter().zip(fails) {
-        let statement = "Reg157 and CCHDM fail TTC and BTN more often than RSS and FSM";
-        claims.push(claim(id, category, statement, often(), FailsMoreOften(&[Reg157, Cchdm], &[Rss, Fsm])));
-    }
-    claims.push(claim(
-        "cut-in side hits",
-        CutIn,
-        "side collisions make collisions outnumber TTC failures",
-        cells(&[Cchdm, Rss, Fsm], &[Collision]),
-        FailsMoreThan(Ttc),
-    ));
-    claims
 }
 
 /// Judges every claim whose category was simulated. The paper's are about all its headways and models: without one of
-/// them a claim is [`ClaimVerdict::NotRun`].
-pub fn judge_claims(table: &ScoreTable) -> Vec<ClaimResult> {
-    let paper = Headway::paper();
-    let has_paper_headways =
-        table.headways.len() == paper.len() && paper.iter().all(|headway| table.headways.contains(headway));
+/// them a claim is [`ClaimVerdict::NotRun`]. `counts` are those that the table scores.
+pub fn judge_claims(table: &ScoreTable, plan: &LanePlan, counts: &Partial) -> Vec<ClaimResult> {
     let judge = |claim: Claim| {
         let scores = table.categories.iter().find(|c| c.category == claim.category)?;
-        let mut judged = judge_claim(claim, scores, table.options.least_failures, table.options.confidence);
-        if !has_paper_headways {
-            std::iter::once(&mut judged.overall).chain(&mut judged.rows).for_each(ClaimRow::leave_out);
-        }
-        Some(judged)
+        Some(judge_claim(claim, Scenarios { scores, units: units_of(plan, counts, scores.category) }, table))
     };
     paper_claims().into_iter().filter_map(judge).collect()
 }
 
-fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f64) -> ClaimResult {
-    let statistic = claim.statistic;
-    let has_model = |m: &ModelId| scores.models.contains(m);
-    let runnable =
-        statistic.variants().iter().all(|v| scores.variant(v).is_some()) && statistic.models().iter().all(has_model);
-    let has_all_models = claim.cells.iter().all(|(model, _)| has_model(model));
-    let failures = |&(model, criterion): &(ModelId, Criterion)| statistic.failures(scores, model, criterion);
-    let of_draw = |draw: Option<usize>, (model, criterion): (ModelId, Criterion)| {
-        let counts = |at: usize| draw.map_or(scores.cells[at].counts, |d| scores.draws[d][at]);
-        statistic.value(scores, &counts, model, criterion)
+/// The counts of a category's scenarios.
+pub(super) fn units_of<'a>(plan: &LanePlan, counts: &'a Partial, category: Category) -> &'a [UnitCounts] {
+    let range = |block: &crate::engine::Block| {
+        let first = block.first_unit as usize;
+        first..first + block.units.len() as usize
     };
-    // `cells` are those that are judged; the claim speaks of all.
-    let row = |cell: Option<(ModelId, Criterion)>, all: &[(ModelId, Criterion)], cells: &[(ModelId, Criterion)]| {
-        let sizes = matches!(statistic, Statistic::F1Near(..)) && cells.len() > 1;
-        let mean = |draw: Option<usize>| {
-            let values: Option<Vec<f64>> = cells.iter().map(|&c| of_draw(draw, c)).collect();
-            let values = values.filter(|v| !v.is_empty())?;
-            Some(values.iter().map(|v| if sizes { v.abs() } else { *v }).sum::<f64>() / values.len() as f64)
-        };
-        let values: Vec<f64> = (0..scores.draws.len()).filter_map(|d| mean(Some(d))).collect();
-        let undefined_draws = (scores.draws.len() - values.len()) as u32;
-        let value = mean(None);
-        let interval = interval(values, confidence).filter(|_| value.is_some());
-        let total: u64 = all.iter().map(failures).sum();
-        let verdict = if scores.scenarios < MIN_SCENARIOS || cells.is_empty() || total < u64::from(least) {
-            ClaimVerdict::TooFew
-        } else if f64::from(undefined_draws) > MAX_UNDEFINED * scores.draws.len() as f64 {
-            ClaimVerdict::Undecided
-        } else {
-            verdict(&statistic, interval)
-        };
-        let mut row = ClaimRow { cell, failures: total, value, interval, undefined_draws, verdict };
-        if !runnable || !cell.map_or(has_all_models, |(model, _)| has_model(&model)) {
-            row.leave_out();
-        }
-        row
-    };
-    let usable: Vec<_> = claim.cells.iter().copied().filter(|c| failures(c) >= u64::from(least)).collect();
-    let overall = row(None, &claim.cells, &usable);
-    let rows = claim.cells.iter().map(|&cell| row(Some(cell), &[cell], &[cell])).collect();
-    ClaimResult { left_out: claim.cells.len() - usable.len(), claim, overall, rows }
+    let block = plan.blocks.iter().find(|block| block.category == category);
+    block.and_then(|block| counts.units().get(range(block))).unwrap_or_default()
 }
 
-fn verdict(statistic: &Statistic, interval: Option<BootstrapInterval>) -> ClaimVerdict {
-    let Some(BootstrapInterval { low, high }) = interval else { return ClaimVerdict::Undecided };
-    let (holds, contradicted) = match statistic {
-        Statistic::F1Near(..) => (low >= -NEAR && high <= NEAR, low > NEAR || high < -NEAR),
-        _ => (low > 0.0, high < 0.0),
+fn judge_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
+    let statistic = claim.statistic;
+    let paper = Headway::paper();
+    let has_headways = table.headways.len() == paper.len() && paper.iter().all(|h| table.headways.contains(h));
+    let is_runnable = has_headways
+        && statistic.variants().iter().all(|v| of.scores.variant(v).is_some())
+        && statistic.models().iter().all(|m| of.scores.models.contains(m));
+    let row = |&cell: &(ModelId, Criterion)| {
+        let failing_scenarios = of.failing(&statistic.judged_by(cell));
+        let has_run = is_runnable && of.scores.models.contains(&cell.0);
+        let measured = statistic.value(of, cell, table.options.confidence).filter(|_| has_run);
+        let verdict = match measured {
+            _ if !has_run => ClaimVerdict::NotRun,
+            _ if failing_scenarios < u64::from(table.options.least_failures) => ClaimVerdict::TooFew,
+            None => ClaimVerdict::Undecided,
+            Some((_, interval)) if matches!(statistic, Statistic::F1Near(..)) => ClaimVerdict::of_nearness(interval),
+            Some((_, interval)) => ClaimVerdict::of_sign(interval),
+        };
+        let (value, interval) = (measured.map(|m| m.0), measured.map(|m| m.1));
+        ClaimRow { cell, failing_scenarios, value, interval, verdict }
     };
-    if holds {
-        ClaimVerdict::Holds
-    } else if contradicted {
-        ClaimVerdict::Contradicted
-    } else {
-        ClaimVerdict::Undecided
-    }
+    let rows: Vec<ClaimRow> = claim.cells.iter().map(row).collect();
+    let verdict = ClaimVerdict::of_cells(&rows.iter().map(|row| row.verdict).collect::<Vec<_>>());
+    let size = |v: f64| if matches!(statistic, Statistic::F1Near(..)) { v.abs() } else { v };
+    let judged = rows.iter().filter(|row| row.verdict != ClaimVerdict::TooFew);
+    let values: Option<Vec<f64>> = judged.map(|row| row.value.map(size)).collect();
+    let values = values.filter(|v| !v.is_empty() && verdict != ClaimVerdict::NotRun);
+    let mean = values.map(|v| v.iter().sum::<f64>() / v.len() as f64);
+    let compared: Vec<_> = claim.cells.iter().flat_map(|cell| statistic.judged_by(*cell)).collect();
+    ClaimResult { failing_scenarios: of.failing(&compared), mean, verdict, rows, claim }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::published::PAPER_MODELS;
+    use super::super::table::CategoryScores;
     use super::*;
-    use crate::engine::{Confusion, Headway};
+    use crate::engine::Confusion;
     use crate::run::score::ScoreOptions;
-    use crate::run::score::table::ScoreCell;
 
-    /// Cut-out scores in which S fails as given per model (same for every criterion) and b and d differ from it
-    /// as given; every draw equals the sample.
-    fn table(failures: [u64; 4], b: Confusion, d: Confusion) -> ScoreTable {
-        let variants = ["S", "a", "b", "c", "d", "e", "f", "g"];
-        let mut cells = Vec::new();
-        for (variant, name) in variants.iter().enumerate() {
-            for (model, &tp) in PAPER_MODELS.into_iter().zip(&failures) {
-                for criterion in Criterion::ALL {
-                    let counts = match *name {
-                        "b" => b,
-                        "d" => d,
-                        _ => Confusion { tp, tn: 1000 - tp, ..Confusion::default() },
-                    };
-                    cells.push(ScoreCell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
-                }
-            }
+    const VARIANTS: [&str; 8] = ["S", "a", "b", "c", "d", "e", "f", "g"];
+    const GOOD: Confusion<u32> = Confusion { tp: 9, fn_: 1, fp: 1, tn: 0 };
+    const BAD: Confusion<u32> = Confusion { tp: 2, fn_: 8, fp: 0, tn: 1 };
+
+    /// Cut-outs of which so many fail per model, from ten headways each, and b and d differ from S as given.
+    struct CutOuts {
+        scenarios: u64,
+        failing: [u64; 4],
+        b: Confusion<u32>,
+        d: Confusion<u32>,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
+    }
+
+    impl Default for CutOuts {
+        fn default() -> CutOuts {
+            let (models, headways) = (PAPER_MODELS.to_vec(), Headway::paper());
+            CutOuts { scenarios: 100, failing: [50; 4], b: GOOD, d: GOOD, models, headways }
         }
-        let counts: Vec<Confusion> = cells.iter().map(|c| c.counts).collect();
-        let scores = CategoryScores {
-            category: Category::CutOut,
-            scenarios: 100,
-            simulations: 1000,
-            variants: variants.map(str::to_owned).to_vec(),
-            models: PAPER_MODELS.to_vec(),
-            cells,
-            capped: Vec::new(),
-            draws: vec![counts; 20],
-        };
-        ScoreTable { categories: vec![scores], headways: Headway::paper(), options: ScoreOptions::default() }
     }
 
-    fn verdict_of(table: &ScoreTable, id: &str) -> ClaimVerdict {
-        judge_claims(table).into_iter().find(|r| r.claim.id == id).map(|r| r.overall.verdict).unwrap()
-    }
+    impl CutOuts {
+        fn judged(&self) -> Vec<ClaimResult> {
+            let cell = |unit: u64, variant: &str, model: ModelId| {
+                let at = PAPER_MODELS.iter().position(|m| *m == model).unwrap();
+                match (unit < self.failing[at], variant) {
+                    (false, _) => Confusion { tn: 10, ..Confusion::default() },
+                    (true, "b") => self.b,
+                    (true, "d") => self.d,
+                    (true, _) => Confusion { tp: 10, ..Confusion::default() },
+                }
+            };
+            let unit = |unit: u64| {
+                let cells = VARIANTS.iter().flat_map(|variant| self.models.iter().map(move |m| (*variant, *m)));
+                let cells = cells.flat_map(|(variant, m)| [cell(unit, variant, m); 3]).collect();
+                UnitCounts { unit, cells, capped: vec![] }
+            };
+            let units: Vec<UnitCounts> = (0..self.scenarios).map(unit).collect();
+            let scores = CategoryScores {
+                category: Category::CutOut,
+                scenarios: self.scenarios,
+                simulations: 10 * self.scenarios,
+                variants: VARIANTS.map(str::to_owned).to_vec(),
+                models: self.models.clone(),
+                cells: Vec::new(),
+                capped: Vec::new(),
+            };
+            let (headways, options) = (self.headways.clone(), ScoreOptions::default());
+            let table = ScoreTable { categories: Vec::new(), headways, options };
+            let of = Scenarios { scores: &scores, units: &units };
+            let claims = paper_claims().into_iter().filter(|claim| claim.category == Category::CutOut);
+            claims.map(|claim| judge_claim(claim, of, &table)).collect()
+        }
 
-    const GOOD: Confusion = Confusion { tp: 90, fn_: 10, fp: 10, tn: 890 };
-    const BAD: Confusion = Confusion { tp: 20, fn_: 80, fp: 0, tn: 900 };
+        fn of(&self, id: &str) -> ClaimResult {
+            self.judged().into_iter().find(|result| result.claim.id == id).unwrap()
+        }
+    }
 
     #[test]
     fn equal_scores_are_nearly_the_same_and_distant_ones_contradict_it() {
-        assert_eq!(verdict_of(&table([100; 4], GOOD, GOOD), "cut-out b = d"), ClaimVerdict::Holds);
-        assert_eq!(verdict_of(&table([100; 4], GOOD, BAD), "cut-out b = d"), ClaimVerdict::Contradicted);
+        let many = CutOuts { scenarios: 2000, failing: [1000; 4], ..CutOuts::default() };
+        assert_eq!(many.of("cut-out b = d").verdict, ClaimVerdict::Holds);
+        assert_eq!(CutOuts { d: BAD, ..CutOuts::default() }.of("cut-out b = d").verdict, ClaimVerdict::Contradicted);
     }
 
     #[test]
     fn a_claim_of_the_paper_without_all_its_headways_or_models_is_not_computed() {
-        let mut some = table([100; 4], GOOD, GOOD);
-        some.headways.pop();
-        assert!(
-            judge_claims(&some).iter().all(|r| r.overall.verdict == ClaimVerdict::NotRun && r.overall.value.is_none())
+        let mut headways = Headway::paper();
+        headways.reverse();
+        let reordered = CutOuts { headways: headways.clone(), ..CutOuts::default() }.of("cut-out c < a");
+        assert_ne!(reordered.verdict, ClaimVerdict::NotRun);
+        headways.pop();
+        let fewer = CutOuts { headways, ..CutOuts::default() };
+        assert!(fewer.judged().iter().all(|r| r.verdict == ClaimVerdict::NotRun && r.mean.is_none()));
+        let three = CutOuts { models: PAPER_MODELS[..3].to_vec(), ..CutOuts::default() };
+        assert_eq!(three.of("cut-out b = d").verdict, ClaimVerdict::NotRun);
+        assert_ne!(three.of("cut-out b, d best").verdict, ClaimVerdict::NotRun, "it is about Reg157 and CCHDM");
+    }
+
+    #[test]
+    fn a_claim_about_few_failing_scenarios_is_not_judged_however_many_lanes_fail() {
+        let nine = CutOuts { failing: [9; 4], d: BAD, ..CutOuts::default() }.of("cut-out b = d");
+        assert_eq!((nine.verdict, nine.failing_scenarios), (ClaimVerdict::TooFew, 9), "90 lanes in each cell");
+        assert_ne!(
+            CutOuts { failing: [10; 4], ..CutOuts::default() }.of("cut-out b = d").verdict,
+            ClaimVerdict::TooFew
         );
-        let mut reordered = table([100; 4], GOOD, GOOD);
-        reordered.headways.reverse();
-        assert_eq!(verdict_of(&reordered, "cut-out b = d"), ClaimVerdict::Holds);
-        let mut three = table([100; 4], GOOD, GOOD);
-        let scores = &mut three.categories[0];
-        scores.models.retain(|model| *model != ModelId::Fsm);
-        scores.cells.retain(|cell| cell.model != ModelId::Fsm);
-        scores.draws = vec![scores.cells.iter().map(|c| c.counts).collect(); 20];
-        let judged = judge_claims(&three);
-        let verdict = |id: &str| judged.iter().find(|r| r.claim.id == id).unwrap().overall.verdict;
-        assert_eq!(verdict("cut-out b = d"), ClaimVerdict::NotRun);
-        assert_ne!(verdict("cut-out b, d best"), ClaimVerdict::NotRun, "it is about Reg157 and CCHDM");
     }
 
     #[test]
-    fn a_claim_about_few_failures_is_not_judged() {
-        assert_eq!(verdict_of(&table([3; 4], GOOD, GOOD), "cut-out c < a"), ClaimVerdict::TooFew);
-    }
-
-    #[test]
-    fn a_claim_about_fewer_than_ten_scenarios_is_not_judged_however_many_lanes_fail() {
-        let mut one = table([100; 4], GOOD, GOOD);
-        let scenarios = |table: &mut ScoreTable, count| table.categories[0].scenarios = count;
-        scenarios(&mut one, 9);
-        assert!(judge_claims(&one).iter().all(|r| r.overall.verdict == ClaimVerdict::TooFew));
-        scenarios(&mut one, 10);
-        assert_eq!(verdict_of(&one, "cut-out b = d"), ClaimVerdict::Holds);
-    }
-
-    #[test]
-    fn failures_that_are_too_few_to_judge_by_are_still_told() {
-        let judged = judge_claims(&table([3; 4], GOOD, GOOD));
-        let claim = judged.iter().find(|r| r.claim.id == "cut-out c < a").unwrap();
-        assert_eq!((claim.overall.verdict, claim.overall.failures), (ClaimVerdict::TooFew, 18), "2 models, 3 criteria");
+    fn a_claim_that_holds_in_one_cell_of_twelve_does_not_hold() {
+        use ClaimVerdict::{Contradicted, Holds, NotRun, TooFew, Undecided};
+        let of = |counts: [usize; 5]| {
+            let cells = ClaimVerdict::ALL.iter().zip(counts).flat_map(|(verdict, n)| vec![*verdict; n]);
+            ClaimVerdict::of_cells(&cells.collect::<Vec<_>>())
+        };
+        assert_eq!([of([1, 0, 11, 0, 0]), of([1, 0, 0, 11, 0])], [Undecided, TooFew]);
+        assert_eq!([of([6, 0, 6, 0, 0]), of([5, 0, 7, 0, 0]), of([11, 1, 0, 0, 0])], [Holds, Undecided, Undecided]);
+        assert_eq!([of([0, 6, 6, 0, 0]), of([1, 11, 0, 0, 0])], [Contradicted, Undecided]);
+        assert_eq!([of([6, 0, 0, 6, 0]), of([11, 0, 0, 0, 1]), of([0; 5])], [Holds, NotRun, TooFew]);
     }
 
     #[test]
     fn a_model_that_never_fails_contradicts_that_it_fails_more_often() {
-        assert_eq!(verdict_of(&table([500, 0, 20, 20], GOOD, GOOD), "cut-out failures"), ClaimVerdict::Contradicted);
-        assert_eq!(verdict_of(&table([500, 300, 20, 20], GOOD, GOOD), "cut-out failures"), ClaimVerdict::Holds);
+        let of = |failing| CutOuts { failing, ..CutOuts::default() }.of("cut-out failures").verdict;
+        assert_eq!(of([50, 0, 30, 30]), ClaimVerdict::Contradicted);
+        assert_eq!(of([60, 50, 4, 4]), ClaimVerdict::Holds);
     }
 }

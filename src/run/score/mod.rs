@@ -1,18 +1,24 @@
 //! Scores: how far S' agrees with S.
 //!
-//! Here live recall, precision and F1 ([`ScoreTable`]), the bootstrap over scenarios, the paper's claims
-//! as data with their verdicts, and the paper's published numbers. Here lives nothing about lanes. Counts
-//! come from [`crate::engine`]'s partials; scores go to [`crate::report`].
+//! Here live recall, precision and F1 ([`ScoreTable`]), intervals of their differences over scenarios, the best
+//! parameterizations, the paper's claims as data with their verdicts, and the paper's published numbers. Here lives
+//! nothing about lanes. Counts come from [`crate::engine`]'s partials; scores go to [`crate::report`].
 
-mod bootstrap;
+mod best;
 mod claims;
 mod contradiction;
+mod difference;
+mod options;
+mod paper_claims;
 mod published;
 mod statistic;
 mod table;
 
-pub use bootstrap::{BootstrapInterval, ScoreOptions};
-pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, judge_claims, paper_claims};
+pub use best::{Best, BestScore, best_parameterizations};
+pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, judge_claims};
+pub use difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+pub use options::ScoreOptions;
+pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
 pub use table::{CategoryScores, ScoreCell, ScoreTable, f1, f1_interval, precision, recall, score};

@@ -1,7 +1,8 @@
-//! The statistics that claims are about: functions of the counts of one category, per model and criterion.
+//! The statistics that claims are about: the smallest of some differences of scores, per model and criterion.
 
-use super::table::{CategoryScores, f1};
-use crate::engine::Confusion;
+use super::difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+use super::table::CategoryScores;
+use crate::engine::{Confusion, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 
@@ -25,58 +26,101 @@ pub enum Statistic {
     FailsMoreThan(Criterion),
 }
 
-impl Statistic {
-    /// Its value on one set of counts (the whole sample or a bootstrap draw); `None` where it is 0/0.
-    pub fn value(
-        &self,
-        scores: &CategoryScores,
-        counts: &dyn Fn(usize) -> Confusion,
+/// One category's scenarios with the counts of each.
+#[derive(Clone, Copy)]
+pub(super) struct Scenarios<'a> {
+    pub scores: &'a CategoryScores,
+    pub units: &'a [UnitCounts],
+}
+
+impl<'a> Scenarios<'a> {
+    /// The counts of a cell in every scenario; `None` where it was not run.
+    fn counts(
+        self,
+        variant: &str,
         model: ModelId,
         criterion: Criterion,
-    ) -> Option<f64> {
-        let cell = |variant: &str, model: ModelId, criterion: Criterion| -> Option<Confusion> {
-            scores.index(scores.variant(variant)?, model, criterion).map(counts)
-        };
-        let f1_of = |variant: &&str| f1(&cell(variant, model, criterion)?);
-        let mean = |values: Option<Vec<f64>>| values.map(|v| v.iter().sum::<f64>() / v.len() as f64);
-        let rate = |c: Confusion| c.tp as f64 / (c.tp as f64 + c.tn as f64).max(1.0);
-        match *self {
-            Statistic::F1Above(better, worse) => {
-                let better = better.iter().map(f1_of).collect::<Option<Vec<f64>>>()?;
-                let worse = worse.iter().map(f1_of).collect::<Option<Vec<f64>>>()?;
-                let least = better.into_iter().fold(f64::INFINITY, f64::min);
-                Some(least - worse.into_iter().fold(f64::NEG_INFINITY, f64::max))
-            }
-            Statistic::F1Below(variant, bound) => Some(bound - f1_of(&variant)?),
-            Statistic::F1Near(a, b) => Some(f1_of(&a)? - f1_of(&b)?),
-            Statistic::FalsePositivesDominate(variants) => {
-                mean(variants.iter().map(|v| excess(&cell(v, model, criterion)?)).collect())
-            }
-            Statistic::FalseNegativesDominate(variants) => {
-                mean(variants.iter().map(|v| excess(&cell(v, model, criterion)?)).collect()).map(|e| -e)
-            }
-            Statistic::FailsMoreOften(often, seldom) => {
-                let rates = |models: &[ModelId]| -> Option<Vec<f64>> {
-                    models.iter().map(|m| Some(rate(cell("S", *m, criterion)?))).collect()
-                };
-                let least = rates(often)?.into_iter().fold(f64::INFINITY, f64::min);
-                Some(least - rates(seldom)?.into_iter().fold(f64::NEG_INFINITY, f64::max))
-            }
-            Statistic::FailsMoreThan(other) => {
-                Some(rate(cell("S", model, criterion)?) - rate(cell("S", model, other)?))
-            }
-        }
+    ) -> Option<impl Iterator<Item = &'a Confusion<u32>> + Clone> {
+        let at = self.scores.index(self.scores.variant(variant)?, model, criterion)?;
+        Some(self.units.iter().filter_map(move |unit| unit.cells.get(at)))
     }
 
-    /// Failures of S that this cell has to judge the claim by: those of every model and criterion compared.
-    pub fn failures(&self, scores: &CategoryScores, model: ModelId, criterion: Criterion) -> u64 {
-        let of = |model: ModelId, criterion: Criterion| {
-            scores.index(0, model, criterion).map_or(0, |at| scores.cells[at].counts.tp)
+    fn f1(self, variant: &str, model: ModelId, criterion: Criterion) -> Option<ScenarioRate> {
+        Some(ScenarioRate::f1(self.counts(variant, model, criterion)?))
+    }
+
+    /// One kind of error over 2TP + FP + FN.
+    fn share(
+        self,
+        variant: &str,
+        (model, criterion): (ModelId, Criterion),
+        error: fn(&Confusion<u32>) -> u32,
+    ) -> Option<ScenarioRate> {
+        let all = |c: &Confusion<u32>| 2 * u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
+        let (runs, hits) = self.counts(variant, model, criterion)?.map(|c| (all(c), u64::from(error(c)))).unzip();
+        Some(ScenarioRate::new(runs, hits))
+    }
+
+    /// Failures of S.
+    fn failures(self, model: ModelId, criterion: Criterion) -> Option<ScenarioRate> {
+        let of = |c: &Confusion<u32>| (u64::from(c.tp) + u64::from(c.tn), u64::from(c.tp));
+        let (runs, hits) = self.counts("S", model, criterion)?.map(of).unzip();
+        Some(ScenarioRate::new(runs, hits))
+    }
+
+    /// Scenarios in which S fails in one of these cells.
+    pub fn failing(self, cells: &[(ModelId, Criterion)]) -> u64 {
+        let places: Vec<usize> = cells.iter().filter_map(|&(m, c)| self.scores.index(0, m, c)).collect();
+        let fails = |unit: &&UnitCounts| places.iter().any(|&at| unit.cells.get(at).is_some_and(|c| c.tp > 0));
+        self.units.iter().filter(fails).count() as u64
+    }
+}
+
+impl Statistic {
+    /// Its value with its interval; `None` where it is 0/0 or was not run.
+    pub(super) fn value(&self, of: Scenarios, cell: (ModelId, Criterion), level: f64) -> Option<(f64, ScoreInterval)> {
+        let (model, criterion) = cell;
+        let f1 = |variant: &&str| of.f1(variant, model, criterion);
+        let pairs = |first: usize, second: usize| {
+            let pair = move |k: usize| (first..first + second).map(move |l| Contrast::difference(k, l));
+            (0..first).flat_map(pair).collect::<Vec<_>>()
         };
+        let excess = |variants: &[&str], sign: f64| {
+            let rates = variants.iter().flat_map(|v| [of.share(v, cell, |c| c.fp), of.share(v, cell, |c| c.fn_)]);
+            let rates = rates.collect::<Option<Vec<_>>>()?;
+            let factor = |at: usize| sign / variants.len() as f64 * if at.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let terms = (0..rates.len()).map(|at| (factor(at), at)).collect();
+            Some((rates, vec![Contrast { constant: 0.0, terms }]))
+        };
+        let (rates, contrasts) = match *self {
+            Statistic::F1Above(better, worse) => {
+                let rates = better.iter().chain(worse).map(f1).collect::<Option<Vec<_>>>()?;
+                (rates, pairs(better.len(), worse.len()))
+            }
+            Statistic::F1Below(variant, bound) => {
+                (vec![f1(&variant)?], vec![Contrast { constant: bound, terms: vec![(-1.0, 0)] }])
+            }
+            Statistic::F1Near(a, b) => (vec![f1(&a)?, f1(&b)?], pairs(1, 1)),
+            Statistic::FalsePositivesDominate(variants) => excess(variants, 1.0)?,
+            Statistic::FalseNegativesDominate(variants) => excess(variants, -1.0)?,
+            Statistic::FailsMoreOften(often, seldom) => {
+                let models = often.iter().chain(seldom);
+                let rates = models.map(|m| of.failures(*m, criterion)).collect::<Option<Vec<_>>>()?;
+                (rates, pairs(often.len(), seldom.len()))
+            }
+            Statistic::FailsMoreThan(other) => {
+                (vec![of.failures(model, criterion)?, of.failures(model, other)?], pairs(1, 1))
+            }
+        };
+        least_contrast(&rates, &contrasts, level)
+    }
+
+    /// The cells of S whose failures a cell judges the claim by: those of every model and criterion compared.
+    pub(super) fn judged_by(&self, (model, criterion): (ModelId, Criterion)) -> Vec<(ModelId, Criterion)> {
         match *self {
-            Statistic::FailsMoreOften(often, seldom) => often.iter().chain(seldom).map(|m| of(*m, criterion)).sum(),
-            Statistic::FailsMoreThan(other) => of(model, criterion) + of(model, other),
-            _ => of(model, criterion),
+            Statistic::FailsMoreOften(often, seldom) => often.iter().chain(seldom).map(|m| (*m, criterion)).collect(),
+            Statistic::FailsMoreThan(other) => vec![(model, criterion), (model, other)],
+            _ => vec![(model, criterion)],
         }
     }
 
@@ -100,20 +144,34 @@ impl Statistic {
     }
 }
 
-/// (FP − FN)/(2TP + FP + FN); `None` where neither S nor S' ever fails.
-fn excess(c: &Confusion) -> Option<f64> {
-    let (fn_, fp) = (c.fn_ as f64, c.fp as f64);
-    let all = 2.0 * c.tp as f64 + fn_ + fp;
-    (all > 0.0).then(|| (fp - fn_) / all)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn an_excess_past_2_to_the_32_is_that_of_its_shares() {
-        let c = Confusion { tp: 3 << 31, fn_: 1 << 31, fp: 5 << 31, tn: 0 };
-        assert_eq!(excess(&c), Some(4.0 / 12.0));
+    fn an_excess_of_errors_is_the_difference_of_their_shares() {
+        let counts = Confusion { tp: 3, fn_: 1, fp: 5, tn: 1 };
+        let variants = ["S", "c"].map(str::to_owned).to_vec();
+        let cells =
+            vec![Confusion { tp: 4, tn: 6, ..Confusion::default() }, Confusion::default(), Confusion::default()];
+        let scores = CategoryScores {
+            category: crate::scenario::Category::CutOut,
+            scenarios: 20,
+            simulations: 200,
+            variants,
+            models: vec![ModelId::Fsm],
+            cells: Vec::new(),
+            capped: Vec::new(),
+        };
+        let cells: Vec<_> = cells.into_iter().chain([counts; 3]).collect();
+        let units: Vec<_> = (0..20).map(|unit| UnitCounts { unit, cells: cells.clone(), capped: vec![] }).collect();
+        let of = Scenarios { scores: &scores, units: &units };
+        let cell = (ModelId::Fsm, Criterion::Collision);
+        let value = |statistic: Statistic| statistic.value(of, cell, 0.95).unwrap().0;
+        assert!((value(Statistic::FalsePositivesDominate(&["c"])) - 4.0 / 12.0).abs() < 1e-12);
+        assert!((value(Statistic::FalseNegativesDominate(&["c"])) + 4.0 / 12.0).abs() < 1e-12);
+        assert!((value(Statistic::F1Below("c", 0.1)) - (0.1 - 0.5)).abs() < 1e-12);
+        assert_eq!((of.failing(&[cell]), of.failing(&[(ModelId::Fsm, Criterion::Btn)])), (20, 0));
+        assert_eq!(Statistic::F1Below("a", 0.1).value(of, cell, 0.95), None, "a was not run");
     }
 }

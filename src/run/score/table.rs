@@ -3,13 +3,13 @@
 
 use rayon::prelude::*;
 
-use super::bootstrap::{BootstrapInterval, ScoreOptions, bootstrap_draws};
 use super::contradiction::contradiction;
+use super::difference::{ScenarioRate, ScoreInterval};
+use super::options::ScoreOptions;
 use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
-use crate::stats::estimate::{Clusters, cluster_rate};
 use crate::{Error, Place, Result};
 
 /// Recall TP/(TP + FN); `None` where S never fails.
@@ -43,24 +43,16 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
     (denominator > 0.0).then(|| numerator / denominator)
 }
 
-/// The interval of F1 from the counts of each scenario. F1 = 2J/(1 + J) rises with J = TP/(TP + FP + FN), the share of
-/// agreement among all failures, so the interval of J over scenarios as clusters gives that of F1.
+/// The interval of F1 from the counts of each scenario, with scenarios as clusters ([`ScenarioRate::f1`]).
 ///
 /// `None` below [`ScoreOptions::least_failures`] failures of S.
 pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
-) -> Option<BootstrapInterval> {
+) -> Option<ScoreInterval> {
     let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.tp) + u64::from(c.fn_)).sum();
-    if failures_of_s < u64::from(options.least_failures.max(1)) {
-        return None;
-    }
-    let any = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
-    let (runs, agreed): (Vec<u64>, Vec<u64>) =
-        scenarios.map(|c| (any(c), u64::from(c.tp))).filter(|(any, _)| *any > 0).unzip();
-    let share = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
-    let f1 = |j: f64| 2.0 * j / (1.0 + j);
-    Some(BootstrapInterval { low: f1(share.low), high: f1(share.high) })
+    let is_enough = failures_of_s >= u64::from(options.least_failures.max(1));
+    is_enough.then(|| ScenarioRate::f1(scenarios).interval(options.confidence))
 }
 
 /// One cell of the table.
@@ -75,9 +67,9 @@ pub struct ScoreCell {
     /// Counts over (scenario, THW) pairs.
     pub counts: Confusion,
     /// Interval of F1 over scenarios; `None` below [`ScoreOptions::least_failures`] failures of S.
-    pub f1_interval: Option<BootstrapInterval>,
-    /// Bootstrap draws in which F1 is 0/0: claims about it leave them out. Its interval needs no draws.
-    pub undefined_draws: u32,
+    pub f1_interval: Option<ScoreInterval>,
+    /// Scenarios in which S fails from some headway.
+    pub failing_scenarios: u64,
 }
 
 /// Scores of one category.
@@ -97,8 +89,6 @@ pub struct CategoryScores {
     pub cells: Vec<ScoreCell>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u64>,
-    /// Bootstrap draws: the cells' counts in each.
-    pub draws: Vec<Vec<Confusion>>,
 }
 
 impl CategoryScores {
@@ -106,6 +96,11 @@ impl CategoryScores {
     pub fn index(&self, variant: usize, model: ModelId, criterion: Criterion) -> Option<usize> {
         let model = self.models.iter().position(|m| *m == model)?;
         Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
+    }
+
+    /// Scenarios in which S fails a criterion with a model; 0 for a model that was not run.
+    pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
+        self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)
     }
 
     /// A variant by its name.
@@ -121,7 +116,7 @@ pub struct ScoreTable {
     pub categories: Vec<CategoryScores>,
     /// Headways of the simulations.
     pub headways: Vec<Headway>,
-    /// How the intervals were made.
+    /// How they were made.
     pub options: ScoreOptions,
 }
 
@@ -156,18 +151,17 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
             totals.iter_mut().zip(&unit.cells).for_each(|(total, cell)| total.add(cell));
             capped.iter_mut().zip(&unit.capped).for_each(|(total, &count)| *total += u64::from(count));
         }
-        let draws = bootstrap_draws(units, width, block.category, options);
         let cells = (0..width)
             .into_par_iter()
             .map(|at| {
-                let undefined = draws.iter().filter(|draw| f1(&draw[at]).is_none()).count();
+                let counts = units.iter().map(|unit| &unit.cells[at]);
                 ScoreCell {
                     variant: at / (plan.models.len() * criteria),
                     model: plan.models[at / criteria % plan.models.len()],
                     criterion: Criterion::ALL[at % criteria],
                     counts: totals[at],
-                    undefined_draws: undefined as u32,
-                    f1_interval: f1_interval(units.iter().map(|unit| &unit.cells[at]), options),
+                    failing_scenarios: counts.clone().filter(|c| c.tp + c.fn_ > 0).count() as u64,
+                    f1_interval: f1_interval(counts, options),
                 }
             })
             .collect();
@@ -179,7 +173,6 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
             models: plan.models.clone(),
             cells,
             capped,
-            draws,
         });
     }
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })

@@ -74,9 +74,9 @@ pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
 pub fn counts_text(scenarios: &[Scenario]) -> String {
     let part = |category: Category| {
         let count = count(scenarios, category);
-        format!("{} {} found, {} kept", category.label(), readable::count(count.found), readable::count(count.kept))
+        format!("{} of {} {}s", readable::count(count.kept), readable::count(count.found), category.label())
     };
-    Category::ALL.map(part).join("; ")
+    format!("kept: {}", Category::ALL.map(part).join(", "))
 }
 
 struct MinedPart {

@@ -1,0 +1,105 @@
+//! What a series looks like: colour, dash, marker.
+
+use std::f64::consts::TAU;
+
+use super::axis::on_circle;
+use super::svg::{Canvas, Paint, Position, WHITE};
+
+/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, too pale as a line on white.
+const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9"];
+/// Line styles (SVG dash arrays); the empty one is solid.
+const DASHES: [&str; 7] = ["", "10,4", "3,3", "12,3,3,3", "18,5", "7,3,2,3,2,3", "5,6"];
+const SYMBOLS: [Symbol; 7] = [
+    Symbol::Disc,
+    Symbol::Polygon(4, 0.5),
+    Symbol::Polygon(3, 0.0),
+    Symbol::Polygon(4, 0.0),
+    Symbol::Polygon(3, 0.5),
+    Symbol::Polygon(5, 0.0),
+    Symbol::Polygon(6, 0.0),
+];
+/// Shape of a marker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Symbol {
+    /// A filled circle.
+    Disc,
+    /// An empty circle.
+    Ring,
+    /// Two strokes.
+    Cross,
+    /// So many corners; the first so many steps clockwise from the top.
+    Polygon(u32, f64),
+}
+
+/// How a series looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// `#rrggbb`.
+    pub colour: &'static str,
+    /// Lengths of dashes and gaps, px; solid where empty.
+    pub dash: &'static str,
+    /// Width of the line.
+    pub line_px: f64,
+    /// Marker.
+    pub symbol: Symbol,
+    /// Radius of the marker.
+    pub marker_px: f64,
+    /// The marker is an outline.
+    pub is_hollow: bool,
+}
+
+impl Look {
+    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so no pair repeats
+    /// before 49 series. Lines run from thick to thin and markers from large to small: what lies below stays visible.
+    pub fn of(index: usize, count: usize) -> Self {
+        let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
+        Self {
+            colour: COLOURS[index % COLOURS.len()],
+            dash: DASHES[(index + index / COLOURS.len()) % DASHES.len()],
+            line_px: 2.6 - depth,
+            symbol: SYMBOLS[index % SYMBOLS.len()],
+            marker_px: 6.0 - 2.0 * depth,
+            is_hollow: false,
+        }
+    }
+
+    pub(in crate::report) fn paint(&self) -> Paint<'static> {
+        Paint { dash: self.dash, ..Paint::line(self.colour, self.line_px) }
+    }
+
+    /// The marker around a point, with a white rim that parts it from the markers below.
+    pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
+        let (r, colour) = (self.marker_px, self.colour);
+        let rimmed = match self.is_hollow {
+            true => Paint { fill: Some(WHITE), ..Paint::line(colour, 1.6) },
+            false => Paint { stroke: Some((WHITE, 1.0)), ..Paint::fill(colour) },
+        };
+        match self.symbol {
+            Symbol::Disc => canvas.circle((x, y), r * 0.9, rimmed),
+            Symbol::Ring => {
+                canvas.circle((x, y), r * 0.8, Paint { fill: Some(WHITE), ..Paint::line(colour, 2.0) });
+            }
+            Symbol::Cross => {
+                let strokes = [vec![(x - r, y - r), (x + r, y + r)], vec![(x - r, y + r), (x + r, y - r)]];
+                canvas.path(&strokes, false, Paint::line(WHITE, 5.0));
+                canvas.path(&strokes, false, Paint::line(colour, 2.6));
+            }
+            Symbol::Polygon(corners, first) => {
+                let turn = |k: u32| TAU * (f64::from(k) + first) / f64::from(corners);
+                let outline = (0..corners).map(|k| on_circle((x, y), r * 1.1, turn(k))).collect();
+                canvas.path(&[outline], true, rimmed);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_series_look_alike() {
+        let looks: std::collections::BTreeSet<_> = (0..49).map(|i| (i % COLOURS.len(), Look::of(i, 49).dash)).collect();
+        assert_eq!(looks.len(), 49);
+    }
+}

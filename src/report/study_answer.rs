@@ -1,0 +1,141 @@
+//! What a study answers, on one screen of a terminal: which parameterization is best, what it hides, and what the data
+//! does not tell.
+
+use super::study::StudyReport;
+use super::tables::wrap;
+use crate::run::score::Best;
+use crate::support::readable::{count, count_of, counted};
+
+/// Columns of the screen, and of a narrower one at least.
+const WIDTH: usize = 80;
+const MIN_WIDTH: usize = 40;
+/// Rows of the table: with the lines around it and those on stderr the screen has 24 lines.
+const MAX_ROWS: usize = 12;
+/// Characters of a list of parameterizations.
+const LIST: usize = 14;
+
+const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "hides", "not told apart", "needs"];
+/// Columns of numbers.
+const NUMBERS: [usize; 2] = [4, 6];
+
+impl StudyReport {
+    /// The answer in at most 20 lines of 80 columns, or fewer columns where the terminal is narrower.
+    pub fn answer(&self, width: usize) -> String {
+        let width = width.clamp(MIN_WIDTH, WIDTH);
+        let made_up = if self.run.synthetic { ". No number here is a statement about real traffic." } else { "" };
+        let kinds = self.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
+        let models = self.scores.categories.first().map_or(0, |c| c.models.len());
+        let size = format!(
+            "{}; {}, {}: {} lanes",
+            kinds.collect::<Vec<_>>().join(", "),
+            counted(self.scores.headways.len(), "headway"),
+            counted(models, "driver"),
+            count(self.run.lanes)
+        );
+        let level = 100.0 * self.scores.options.confidence;
+        let mut lines = vec![
+            wrap(&format!("{}{made_up}", self.run.data), width),
+            wrap(&size, width),
+            String::new(),
+            wrap(&format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:"), width),
+        ];
+        lines.extend(self.rows());
+        lines
+            .extend(self.comparison.iter().filter_map(|comparison| Some(comparison.text().lines().next()?.to_owned())));
+        let legend = "hides: collisions of S that the best does not have. not told apart: F1 within chance of the \
+                      best's. needs: times as many scenarios to tell, if F1 stays.";
+        lines.push(wrap(legend, width));
+        let claims = if self.claims.is_empty() { "" } else { ", claims" };
+        lines.push(wrap(&format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt."), width));
+        lines.join("\n") + "\n"
+    }
+
+    fn rows(&self) -> Vec<String> {
+        let known: Vec<[String; 7]> = self.best.iter().take(MAX_ROWS).map(|best| self.row(best)).collect();
+        let width = |at: usize| {
+            // A sentence in place of an answer runs on over the columns after it.
+            let cells = known.iter().filter(|row| at != 3 || !row[4].is_empty() || row[3].is_empty());
+            cells.map(|row| row[at].chars().count()).chain([HEADER[at].len()]).max().unwrap_or(0)
+        };
+        let widths: [usize; 7] = std::array::from_fn(width);
+        let line = |row: &[String; 7]| {
+            let mut line = String::new();
+            for (at, cell) in row.iter().enumerate() {
+                let end: usize = widths[..=at].iter().sum::<usize>() + 2 * at;
+                let is_number = NUMBERS.contains(&at);
+                let gap = if at == 0 { 0 } else { end - widths[at] };
+                let start = if is_number { end.saturating_sub(cell.chars().count()) } else { gap };
+                if cell.is_empty() {
+                    continue;
+                }
+                line += &" ".repeat(start.saturating_sub(line.chars().count()));
+                line += cell;
+            }
+            line
+        };
+        let header = HEADER.map(str::to_owned);
+        let mut lines: Vec<String> = std::iter::once(&header).chain(&known).map(line).collect();
+        let more = self.best.len().saturating_sub(MAX_ROWS);
+        if more > 0 {
+            lines.push(format!("… and {} more: --tables", count_of(more)));
+        }
+        lines
+    }
+
+    fn row(&self, best: &Best) -> [String; 7] {
+        let least = u64::from(self.scores.options.least_failures.max(1));
+        let name = [best.category.label(), best.model.name()].map(str::to_owned);
+        let Some(score) = &best.score else {
+            let scenarios = best.failing_scenarios;
+            let times = least as f64 / scenarios as f64;
+            let text = match scenarios {
+                0 => "S never collides: nothing to compare".to_owned(),
+                1 => format!("too few: S collides in 1 scenario; {least} are needed"),
+                _ => format!("too few: S collides in {} scenarios; {least} are needed", count(scenarios)),
+            };
+            let needs = if scenarios == 0 { "-".to_owned() } else { factor(times) };
+            let [category, model] = name;
+            return [category, model, "-".to_owned(), text, String::new(), String::new(), needs];
+        };
+        let interval = format!("{:.2} [{:.2} {:.2}]", score.f1, score.interval.low, score.interval.high);
+        let hidden = format!("{} of {}", count(score.hidden), count(best.failures));
+        let (rivals, needs) = match score.rivals.is_empty() {
+            true => ("-".to_owned(), "-".to_owned()),
+            false => (list(&score.rivals), factor(score.more_data)),
+        };
+        let [category, model] = name;
+        [category, model, score.variant.clone(), interval, hidden, rivals, needs]
+    }
+}
+
+/// The names, as many as fit.
+fn list(names: &[String]) -> String {
+    let text = names.join(", ");
+    if text.chars().count() <= LIST { text } else { format!("{} others", names.len()) }
+}
+
+/// `1.3x`, rounded up: so much more data, or more than anybody has.
+fn factor(times: f64) -> String {
+    match times {
+        t if t >= 100.0 || t.is_nan() => ">100x".to_owned(),
+        t if t >= 9.95 => format!("{:.0}x", t.ceil()),
+        t => format!("{:.1}x", (10.0 * t).ceil() / 10.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_is_rounded_up_and_ends_at_a_hundred() {
+        assert_eq!([1.01, 1.3, 9.96, 40.2, 400.0].map(factor), ["1.1x", "1.3x", "10x", "41x", ">100x"]);
+        assert_eq!([f64::INFINITY, f64::NAN].map(factor), [">100x", ">100x"]);
+    }
+
+    #[test]
+    fn names_that_do_not_fit_are_counted() {
+        let names = |n: usize| (1..=n).map(|k| k.to_string()).collect::<Vec<_>>();
+        assert_eq!((list(&names(3)), list(&names(6))), ("1, 2, 3".to_owned(), "6 others".to_owned()));
+    }
+}

@@ -1,0 +1,96 @@
+//! The parameterization that agrees best with S, per category and driver model, and what the data leaves open about it.
+
+use super::claims::units_of;
+use super::difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+use super::table::{CategoryScores, ScoreTable, f1};
+use crate::engine::{LanePlan, Partial, UnitCounts};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::scenario::Category;
+
+/// The best parameterization of one category for one model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Best {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Driver model.
+    pub model: ModelId,
+    /// Failures of S.
+    pub failures: u64,
+    /// Scenarios in which S fails.
+    pub failing_scenarios: u64,
+    /// The answer; `None` where S fails in fewer scenarios than [`super::ScoreOptions::least_failures`].
+    pub score: Option<BestScore>,
+}
+
+/// What is known of a best parameterization.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BestScore {
+    /// Its name.
+    pub variant: String,
+    /// Its F1, the largest of the category's.
+    pub f1: f64,
+    /// Interval of F1 over scenarios.
+    pub interval: ScoreInterval,
+    /// Failures of S that it does not have.
+    pub hidden: u64,
+    /// Those whose F1 the data does not tell from its own.
+    pub rivals: Vec<String>,
+    /// Times as many scenarios that would tell it from all of them, if the scores stay as they are; infinite where one
+    /// has the same F1.
+    pub more_data: f64,
+}
+
+/// One per category and model of a table, for a criterion. `counts` are those that the table scores.
+pub fn best_parameterizations(
+    table: &ScoreTable,
+    plan: &LanePlan,
+    counts: &Partial,
+    criterion: Criterion,
+) -> Vec<Best> {
+    let of = |scores: &CategoryScores, model: ModelId| {
+        let s = &scores.cells[scores.index(0, model, criterion)?];
+        let is_enough = s.failing_scenarios >= u64::from(table.options.least_failures.max(1));
+        let units = units_of(plan, counts, scores.category);
+        let score = || best_score(scores, units, (model, criterion), table.options.confidence);
+        Some(Best {
+            category: scores.category,
+            model,
+            failures: s.counts.tp,
+            failing_scenarios: s.failing_scenarios,
+            score: is_enough.then(score).flatten(),
+        })
+    };
+    let pairs = table.categories.iter().flat_map(|scores| scores.models.iter().map(move |model| (scores, *model)));
+    pairs.filter_map(|(scores, model)| of(scores, model)).collect()
+}
+
+fn best_score(
+    scores: &CategoryScores,
+    units: &[UnitCounts],
+    (model, criterion): (ModelId, Criterion),
+    level: f64,
+) -> Option<BestScore> {
+    let places = (1..scores.variants.len()).filter_map(|variant| scores.index(variant, model, criterion));
+    let scored: Vec<(usize, f64)> = places.filter_map(|at| Some((at, f1(&scores.cells[at].counts)?))).collect();
+    // The first of equals: parameterizations are in the order of the paper.
+    let &(best, value) = scored.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let rate = |at: usize| ScenarioRate::f1(units.iter().filter_map(|unit| unit.cells.get(at)));
+    let name = |at: usize| scores.variants[scores.cells[at].variant].clone();
+    // The best is chosen by the data: every other is compared at a share of the level (Bonferroni).
+    let shared = 1.0 - (1.0 - level) / scored.len().saturating_sub(1).max(1) as f64;
+    let (mut rivals, mut more_data) = (Vec::new(), 1.0_f64);
+    for &(other, theirs) in scored.iter().filter(|(at, _)| *at != best) {
+        let contrast = [Contrast::difference(0, 1)];
+        let (_, interval) = least_contrast(&[rate(best), rate(other)], &contrast, shared)?;
+        if interval.low <= 0.0 {
+            rivals.push(name(other));
+            let distance = value - theirs;
+            // An interval narrows with the square root of the number of scenarios.
+            let times = ((distance - interval.low) / distance).powi(2);
+            more_data = more_data.max(if distance > 0.0 { times } else { f64::INFINITY });
+        }
+    }
+    let (interval, hidden) = (rate(best).interval(level), scores.cells[best].counts.fn_);
+    Some(BestScore { variant: name(best), f1: value, interval, hidden, rivals, more_data })
+}

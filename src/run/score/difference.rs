@@ -1,0 +1,179 @@
+//! Differences of scores that are measured on the same scenarios, with intervals over scenarios.
+//!
+//! Each score is a rate with scenarios as clusters and has an interval of its own. The intervals are combined with the
+//! correlation of the scores (Zou, "Toward using confidence intervals to compare correlations", Psychological Methods
+//! 12, 2007). Percentiles of resampled differences cover far less: see the chapter on validation.
+
+use crate::engine::Confusion;
+use crate::stats::estimate::{Clusters, cluster_rate};
+
+/// Ends of an interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoreInterval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// What a score counts in each scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenarioRate {
+    runs: Vec<u64>,
+    hits: Vec<u64>,
+    is_f1: bool,
+}
+
+impl ScenarioRate {
+    /// Hits over runs. Both are one per scenario, in the same order for all rates of a contrast.
+    pub fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
+        ScenarioRate { runs, hits, is_f1: false }
+    }
+
+    /// F1 = 2J/(1 + J), which rises with J = TP/(TP + FP + FN), the rate of agreement among all failures.
+    pub fn f1<'a>(scenarios: impl Iterator<Item = &'a Confusion<u32>>) -> ScenarioRate {
+        let any = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
+        let (runs, hits) = scenarios.map(|c| (any(c), u64::from(c.tp))).unzip();
+        ScenarioRate { runs, hits, is_f1: true }
+    }
+
+    /// The score of a rate.
+    fn score(&self, rate: f64) -> f64 {
+        if self.is_f1 { 2.0 * rate / (1.0 + rate) } else { rate }
+    }
+
+    fn clusters(&self) -> Clusters<'_> {
+        Clusters { runs: &self.runs, failures: &self.hits }
+    }
+
+    /// The score; `None` where it is 0/0.
+    pub fn value(&self) -> Option<f64> {
+        self.runs.iter().any(|runs| *runs > 0).then(|| self.score(self.clusters().rate()))
+    }
+
+    /// Its interval over the scenarios that have a run.
+    pub fn interval(&self, level: f64) -> ScoreInterval {
+        let with_runs = self.runs.iter().zip(&self.hits).filter(|(runs, _)| **runs > 0);
+        let (runs, hits): (Vec<u64>, Vec<u64>) = with_runs.unzip();
+        let rate = cluster_rate(Clusters { runs: &runs, failures: &hits }, level).interval;
+        ScoreInterval { low: self.score(rate.low), high: self.score(rate.high) }
+    }
+
+    /// What each scenario adds to the rate, scaled to a length of 1; all 0 where every scenario has the same rate.
+    fn direction(&self) -> Vec<f64> {
+        let rate = self.clusters().rate();
+        let influence = self.hits.iter().zip(&self.runs).map(|(&hits, &runs)| hits as f64 - rate * runs as f64);
+        let mut direction: Vec<f64> = influence.collect();
+        let length = direction.iter().map(|z| z * z).sum::<f64>().sqrt();
+        if length > 0.0 {
+            direction.iter_mut().for_each(|z| *z /= length);
+        }
+        direction
+    }
+}
+
+/// A constant and rates with factors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contrast {
+    /// Added to the sum.
+    pub constant: f64,
+    /// Factors and places of the rates.
+    pub terms: Vec<(f64, usize)>,
+}
+
+impl Contrast {
+    /// One rate minus another.
+    pub fn difference(minuend: usize, subtrahend: usize) -> Contrast {
+        Contrast { constant: 0.0, terms: vec![(1.0, minuend), (-1.0, subtrahend)] }
+    }
+}
+
+/// The smallest of some contrasts and its interval; `None` where a rate is 0/0.
+///
+/// The lower end is the smallest lower end at `level`: the smallest contrast lies below its own end as often as any
+/// other does. The upper end is the smallest upper end at 1 − (1 − level)/n for n contrasts (Bonferroni), since each of
+/// them may be the one that is too low by chance.
+pub fn least_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) -> Option<(f64, ScoreInterval)> {
+    let values = rates.iter().map(ScenarioRate::value).collect::<Option<Vec<f64>>>()?;
+    let directions: Vec<Vec<f64>> = rates.iter().map(ScenarioRate::direction).collect();
+    let correlation = |k: usize, l: usize| match k == l {
+        true => 1.0,
+        false => directions[k].iter().zip(&directions[l]).map(|(a, b)| a * b).sum(),
+    };
+    let correlations: Vec<Vec<f64>> =
+        (0..rates.len()).map(|k| (0..rates.len()).map(|l| correlation(k, l)).collect()).collect();
+    let intervals_at = |level: f64| rates.iter().map(|rate| rate.interval(level)).collect::<Vec<_>>();
+    let (own, shared) = (intervals_at(level), intervals_at(1.0 - (1.0 - level) / contrasts.len().max(1) as f64));
+    // How far a sum may lie below its value (`sign` −1) or above.
+    let reach = |contrast: &Contrast, intervals: &[ScoreInterval], sign: f64| {
+        let part = |&(factor, at): &(f64, usize)| {
+            let ScoreInterval { low, high } = intervals[at];
+            factor * if factor * sign > 0.0 { high - values[at] } else { values[at] - low }
+        };
+        let parts: Vec<(f64, usize)> = contrast.terms.iter().map(|term| (part(term), term.1)).collect();
+        let with_all = |a: &(f64, usize)| parts.iter().map(|b| a.0 * b.0 * correlations[a.1][b.1]).sum::<f64>();
+        parts.iter().map(with_all).sum::<f64>().max(0.0).sqrt()
+    };
+    let value =
+        |contrast: &Contrast| contrast.constant + contrast.terms.iter().map(|(c, at)| c * values[*at]).sum::<f64>();
+    let least = |of: &dyn Fn(&Contrast) -> f64| contrasts.iter().map(of).fold(f64::INFINITY, f64::min);
+    let interval = ScoreInterval {
+        low: least(&|contrast| value(contrast) - reach(contrast, &own, -1.0)),
+        high: least(&|contrast| value(contrast) + reach(contrast, &shared, 1.0)),
+    };
+    (!contrasts.is_empty()).then(|| (least(&value), interval))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each scenario fails `hits` of 10 times.
+    fn rate(hits: &[u64]) -> ScenarioRate {
+        ScenarioRate::new(vec![10; hits.len()], hits.to_vec())
+    }
+
+    fn some(n: u64) -> Vec<u64> {
+        (0..n).map(|k| [0, 3, 10, 1, 0][(k % 5) as usize]).collect()
+    }
+
+    #[test]
+    fn one_rate_keeps_its_own_interval() {
+        let rates = [rate(&some(50))];
+        let one = [Contrast { constant: 0.5, terms: vec![(-1.0, 0)] }];
+        let (value, interval) = least_contrast(&rates, &one, 0.95).unwrap();
+        let own = rates[0].interval(0.95);
+        assert!((value - (0.5 - rates[0].value().unwrap())).abs() < 1e-12);
+        assert!((interval.low - (0.5 - own.high)).abs() < 1e-12 && (interval.high - (0.5 - own.low)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rates_that_rise_together_differ_by_less_than_independent_ones() {
+        let hits = some(60);
+        let shifted: Vec<u64> = hits.iter().map(|k| (k + 1).min(10)).collect();
+        let turned: Vec<u64> = shifted.iter().rev().copied().collect();
+        let width = |other: &[u64]| {
+            let (_, interval) =
+                least_contrast(&[rate(&hits), rate(other)], &[Contrast::difference(1, 0)], 0.95).unwrap();
+            interval.high - interval.low
+        };
+        assert!(width(&shifted) < 0.5 * width(&turned), "{} {}", width(&shifted), width(&turned));
+    }
+
+    #[test]
+    fn equals_differ_by_nothing_and_the_more_rivals_the_wider() {
+        let hits = some(40);
+        let equal = vec![rate(&hits); 6];
+        let contrasts = |n: usize| (1..=n).map(|k| Contrast::difference(0, k)).collect::<Vec<_>>();
+        let (value, one) = least_contrast(&equal, &contrasts(1), 0.95).unwrap();
+        assert!(value == 0.0 && one.low <= 0.0 && one.high >= 0.0);
+        let (_, five) = least_contrast(&equal, &contrasts(5), 0.95).unwrap();
+        assert!(five.high >= one.high && five.low == one.low);
+    }
+
+    #[test]
+    fn without_a_run_there_is_no_difference() {
+        let none = ScenarioRate::new(vec![0; 5], vec![0; 5]);
+        assert_eq!(least_contrast(&[rate(&some(5)), none], &[Contrast::difference(0, 1)], 0.95), None);
+    }
+}

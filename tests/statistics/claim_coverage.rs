@@ -1,0 +1,236 @@
+//! How often the intervals of differences hold the truth, and how often verdicts about claims are wrong, over 1,000
+//! simulated studies of populations whose scores are known. Minutes long:
+//!
+//! ```text
+//! cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture
+//! ```
+
+use lanesweep::engine::Confusion;
+use lanesweep::run::score::{ClaimVerdict, Contrast, ScenarioRate, ScoreInterval, f1, least_contrast};
+use rand_chacha::ChaCha8Rng;
+use rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+
+const REPEATS: u64 = 1000;
+/// As the claims and the answer of a study have it.
+const LEAST_FAILING: usize = 10;
+
+/// Scenarios from which parameterizations are scored.
+#[derive(Clone)]
+struct Population {
+    /// Share of scenarios in which S fails from some headway.
+    failing: f64,
+    /// Share of these in which each parameterization is wrong.
+    wrong: Vec<f64>,
+    /// Parameterizations that the claim calls better; the others follow.
+    better: usize,
+    /// Share of scenarios in which all parameterizations err together.
+    common: f64,
+}
+
+struct Uniform(ChaCha8Rng);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// One or two headways more or fewer.
+    fn shift(&mut self) -> i32 {
+        let size = 1 + (2.0 * self.next()) as i32;
+        if self.next() < 0.5 { size } else { -size }
+    }
+}
+
+impl Population {
+    /// The counts of one scenario, a parameterization after the other.
+    fn scenario(&self, random: &mut Uniform) -> Vec<Confusion<u32>> {
+        let s = if random.next() < self.failing { 1 + (10.0 * random.next() * random.next()) as i32 } else { 0 };
+        let (shared, is_shared) = ((random.next(), random.shift()), random.next() < self.common);
+        let count = |n: i32| n.max(0) as u32;
+        let counts = |wrong: &f64| {
+            let own = (random.next(), random.shift());
+            let (chance, shift) = if is_shared { shared } else { own };
+            let limit = if s > 0 { *wrong } else { 0.2 * wrong * self.failing };
+            let s_prime = if chance < limit { (s + shift).clamp(0, 10) } else { s };
+            let (tp, fn_, fp) = (count(s.min(s_prime)), count(s - s_prime), count(s_prime - s));
+            Confusion { tp, fn_, fp, tn: 10 - count(s.max(s_prime)) }
+        };
+        self.wrong.iter().map(counts).collect()
+    }
+
+    fn scenarios(&self, n: usize, seed: u64) -> Vec<Vec<Confusion<u32>>> {
+        let mut random = Uniform(ChaCha8Rng::seed_from_u64(seed));
+        (0..n).map(|_| self.scenario(&mut random)).collect()
+    }
+
+    /// Least F1 of the better less the largest of the others.
+    fn difference<'a>(&self, scenarios: impl Iterator<Item = &'a Vec<Confusion<u32>>>) -> Option<f64> {
+        let mut sums = vec![Confusion::<u64>::default(); self.wrong.len()];
+        scenarios.for_each(|scenario| sums.iter_mut().zip(scenario).for_each(|(sum, counts)| sum.add(counts)));
+        let scores = sums.iter().map(f1).collect::<Option<Vec<f64>>>()?;
+        let (better, others) = scores.split_at(self.better);
+        Some(better.iter().fold(f64::INFINITY, |a, b| a.min(*b)) - others.iter().fold(0.0, |a: f64, b| a.max(*b)))
+    }
+
+    fn truth(&self) -> f64 {
+        // Equals do not differ; of a finite sample they would.
+        let is_one = self.wrong.iter().all(|wrong| *wrong == self.wrong[0]);
+        if is_one { 0.0 } else { self.difference(self.scenarios(400_000, 1).iter()).expect("failures") }
+    }
+
+    fn ours(&self, scenarios: &[Vec<Confusion<u32>>]) -> ScoreInterval {
+        let rates: Vec<_> =
+            (0..self.wrong.len()).map(|at| ScenarioRate::f1(scenarios.iter().map(|s| &s[at]))).collect();
+        let pairs = (0..self.better).flat_map(|a| (self.better..rates.len()).map(move |b| Contrast::difference(a, b)));
+        least_contrast(&rates, &pairs.collect::<Vec<_>>(), 0.95).expect("failures").1
+    }
+
+    /// The percentiles of resampled differences, mean over cells of the same scenarios: what the claims had before.
+    fn resampled(&self, cells: &[&[Vec<Confusion<u32>>]], seed: u64) -> ScoreInterval {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(1);
+        let n = cells[0].len();
+        let mut draw = || -> Option<f64> {
+            let picks: Vec<usize> = (0..n).map(|_| (random.next_u64() % n as u64) as usize).collect();
+            let of = |cell: &&[Vec<Confusion<u32>>]| self.difference(picks.iter().map(|pick| &cell[*pick]));
+            let values = cells.iter().map(of).collect::<Option<Vec<f64>>>()?;
+            Some(values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let mut values: Vec<f64> = (0..200).filter_map(|_| draw()).collect();
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
+        ScoreInterval { low: at(0.025), high: at(0.975) }
+    }
+}
+
+fn fails(scenario: &[Confusion<u32>]) -> bool {
+    scenario[0].tp + scenario[0].fn_ > 0
+}
+
+/// Shares of repeats, per cent: intervals that hold the truth, false "holds", false "contradicted".
+fn rates(truth: f64, intervals: &[ScoreInterval]) -> [f64; 3] {
+    let share = |is: &dyn Fn(&ScoreInterval) -> bool| {
+        100.0 * intervals.iter().filter(|interval| is(interval)).count() as f64 / intervals.len() as f64
+    };
+    let verdict = |interval: &ScoreInterval| ClaimVerdict::of_sign(*interval);
+    [
+        share(&|i| i.low <= truth + 1e-12 && truth - 1e-12 <= i.high),
+        share(&|i| truth <= 0.0 && verdict(i) == ClaimVerdict::Holds),
+        share(&|i| truth >= 0.0 && verdict(i) == ClaimVerdict::Contradicted),
+    ]
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture"]
+fn intervals_of_differences_hold() {
+    let pairs =
+        [[0.02, 0.02], [0.1, 0.1], [0.3, 0.3], [0.0, 0.02], [0.02, 0.1], [0.1, 0.3]].map(|wrong| (1, wrong.to_vec()));
+    let several = [(2, vec![0.1; 5]), (1, vec![0.1; 5]), (2, vec![0.05, 0.05, 0.2, 0.2, 0.3, 0.3, 0.2])];
+    println!(
+        "{:22} {:>9} {:>7} {:>6} {:>8} |  resampled: held, false holds, false contradicted |  ours; mean widths",
+        "better of, wrong", "scenarios", "failing", "common", "truth"
+    );
+    let mut missed = Vec::new();
+    for (better, wrong) in pairs.into_iter().chain(several) {
+        for (n, failing) in [(30, 0.3), (100, 0.3), (400, 0.05), (400, 0.3)] {
+            for common in [0.0, 0.8] {
+                let population = Population { failing, wrong: wrong.clone(), better, common };
+                let truth = population.truth();
+                let of = |repeat: u64| {
+                    let scenarios = population.scenarios(n, 1000 + repeat);
+                    let failing = scenarios.iter().filter(|scenario| fails(scenario)).count();
+                    (failing >= LEAST_FAILING)
+                        .then(|| [population.resampled(&[&scenarios], repeat), population.ours(&scenarios)])
+                };
+                let all: Vec<[ScoreInterval; 2]> = (0..REPEATS).into_par_iter().filter_map(of).collect();
+                let ways = [0, 1].map(|way| all.iter().map(|i| i[way]).collect::<Vec<_>>());
+                let [before, ours] = [0, 1].map(|way| rates(truth, &ways[way]));
+                let widths =
+                    [0, 1].map(|way: usize| ways[way].iter().map(|i| i.high - i.low).sum::<f64>() / all.len() as f64);
+                println!(
+                    "{:22} {n:9} {failing:7} {common:6} {truth:8.4} | {:6.1} {:6.1} {:6.1} | {:6.1} {:6.1} {:6.1} | {:.3} {:.3}",
+                    format!("{better} of {wrong:?}").chars().take(22).collect::<String>(),
+                    before[0],
+                    before[1],
+                    before[2],
+                    ours[0],
+                    ours[1],
+                    ours[2],
+                    widths[0],
+                    widths[1]
+                );
+                if ours[0] < 94.0 || ours[1] > 3.5 || ours[2] > 3.5 {
+                    missed.push((wrong.clone(), n, failing, common, ours));
+                }
+            }
+        }
+    }
+    assert!(missed.is_empty(), "below 94 %, or more than 3.5 % of verdicts are wrong: {missed:?}");
+}
+
+/// A claim about twelve cells of one study: four drivers that fail the more often the more careless, three criteria of which
+/// one failure often brings the next. The cells share their scenarios.
+fn claim(population: &Population, n: usize, seed: u64) -> [ClaimVerdict; 2] {
+    let mut random = Uniform(ChaCha8Rng::seed_from_u64(seed));
+    let scenarios: Vec<Vec<Confusion<u32>>> = (0..n).map(|_| population.scenario(&mut random)).collect();
+    // A harder criterion and a more careful driver fail in fewer of the same scenarios.
+    let mut cell = |at: u32| {
+        let kept = 1.0 - 0.07 * f64::from(at);
+        let mut cell = scenarios.clone();
+        for scenario in cell.iter_mut().filter(|_| random.next() > kept) {
+            scenario.iter_mut().for_each(|counts| *counts = Confusion { tn: 10, ..Confusion::default() });
+        }
+        cell
+    };
+    let cells: Vec<_> = (0..12).map(&mut cell).collect();
+    let is_enough = |cell: &[Vec<Confusion<u32>>]| cell.iter().filter(|s| fails(s)).count() >= LEAST_FAILING;
+    let verdict = |cell: &Vec<Vec<Confusion<u32>>>| match is_enough(cell) {
+        true => ClaimVerdict::of_sign(population.ours(cell)),
+        false => ClaimVerdict::TooFew,
+    };
+    let of_cells: Vec<ClaimVerdict> = cells.iter().map(verdict).collect();
+    let judged: Vec<_> = cells.iter().map(Vec::as_slice).filter(|cell| is_enough(cell)).collect();
+    let mean = match judged.is_empty() {
+        true => ClaimVerdict::TooFew,
+        false => ClaimVerdict::of_sign(population.resampled(&judged, seed)),
+    };
+    [mean, ClaimVerdict::of_cells(&of_cells)]
+}
+
+#[test]
+#[ignore = "long: cargo test --release --test statistics claim_coverage:: -- --ignored --nocapture"]
+fn verdicts_about_claims_are_seldom_wrong() {
+    println!(
+        "{:30} {:>9} {:>8} | by resampled means: holds, contradicted, undecided, too few, per cent | by our rule",
+        "better of, wrong", "scenarios", "truth"
+    );
+    let mut missed = Vec::new();
+    for (better, wrong) in [
+        (1, vec![0.1; 2]),
+        (1, vec![0.1; 5]),
+        (2, vec![0.1; 5]),
+        (1, vec![0.02, 0.1, 0.1]),
+        (1, vec![0.1, 0.02]),
+        (1, vec![0.02, 0.5]),
+    ] {
+        for n in [40, 100, 400] {
+            let population = Population { failing: 0.3, wrong: wrong.clone(), better, common: 0.4 };
+            let truth = population.truth();
+            let all: Vec<[ClaimVerdict; 2]> =
+                (0..REPEATS).into_par_iter().map(|repeat| claim(&population, n, 1000 + repeat)).collect();
+            let share = |way: usize, verdict| {
+                100.0 * all.iter().filter(|one| one[way] == verdict).count() as f64 / all.len() as f64
+            };
+            let verdicts =
+                [ClaimVerdict::Holds, ClaimVerdict::Contradicted, ClaimVerdict::Undecided, ClaimVerdict::TooFew];
+            let [before, ours] = [0, 1].map(|way| verdicts.map(|verdict| share(way, verdict)));
+            println!("{:30} {n:9} {truth:8.4} | {before:5.1?} | {ours:5.1?}", format!("{better} of {wrong:?}"));
+            let is_wrong = [truth <= 0.0 && ours[0] > 5.0, truth >= 0.0 && ours[1] > 5.0];
+            if is_wrong.contains(&true) {
+                missed.push((wrong.clone(), n, ours));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "more than 5 % of verdicts are wrong: {missed:?}");
+}
