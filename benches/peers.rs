@@ -181,7 +181,9 @@ fn write_manifest(folder: &Path, profile: &Profile, category: Category, ours: &[
         .iter()
         .map(|headway| match headway {
             Headway::ThwS(s) => *s,
-            Headway::GapM(_) | Headway::MinFollowing => unreachable!("the paper's headways are times"),
+            Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => {
+                unreachable!("the paper's headways are times")
+            }
         })
         .collect();
     let models: Vec<_> = ours

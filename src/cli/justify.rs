@@ -55,8 +55,8 @@ pub struct Justify {
     models: String,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2
-    #[arg(long, value_name = "s,s,…|paper|r157", default_value = "paper")]
+    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
     thw: String,
     /// Folder for report.html, dossier.json and hidden.csv
     #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier")]

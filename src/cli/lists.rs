@@ -192,20 +192,25 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
             Error::usage(Place::item("--thw"), problem, help)
         })
     };
+    if list.split(',').any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {
+        let problem = "`observed` starts each scenario from its recorded gap and stands alone";
+        return Err(Error::usage(Place::item("--thw"), problem, "give `observed`, or a list of headways without it"));
+    }
     let found = list.split(',').map(parse).collect::<Result<Vec<_>>>()?;
     let meanings = found.iter().map(|headway| headway.identity());
     refuse_repeats(|| Place::item("--thw"), meanings.zip(list.split(',').map(str::trim)))?;
     Ok(found)
 }
 
-/// The same, or `paper`: the ten of the paper.
+/// The same, or `paper`: the ten of the paper, or `observed`: the recorded gaps.
 ///
 /// # Errors
 /// As [`headways`].
 pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
     match text.trim() {
         "paper" => Ok(Headway::paper()),
-        list => headways(list, "`paper`"),
+        text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
+        list => headways(list, "`paper`, or `observed`"),
     }
 }
 

@@ -83,8 +83,9 @@ pub struct Sample {
     criterion: lists::CriterionFlag,
     /// Time headways [default: the density's, else paper]
     ///
-    /// paper is 2.0, 1.8, … 0.2; sampled needs a density fitted with --with-thw. The adaptive estimators take one headway.
-    #[arg(long, value_name = "s,s,…|paper|sampled")]
+    /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
+    /// the density, which needs `fit --with-thw`. The adaptive estimators take one headway.
+    #[arg(long, value_name = "s,s,…|paper|observed")]
     thw: Option<String>,
     #[arg(long, value_name = "random|sobol", value_enum, hide_possible_values = true)]
     pub(super) points: PointsFlag,
@@ -196,10 +197,10 @@ impl Sample {
 
     pub(super) fn headways(&self, density: &DensityModel) -> Result<SampleHeadways> {
         match self.thw.as_deref().map(str::trim) {
-            Some("sampled") => Ok(SampleHeadways::Sampled),
+            Some("sampled" | "observed") => Ok(SampleHeadways::Sampled),
             None if density.space.has_thw() => Ok(SampleHeadways::Sampled),
             None | Some("paper") => Ok(SampleHeadways::Each(Headway::paper())),
-            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `sampled`")?)),
+            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `observed`")?)),
         }
     }
 }

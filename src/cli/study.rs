@@ -82,11 +82,11 @@ pub struct Study {
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; r157 the regulation's distance
+    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
     ///
     /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
-    /// ego's speed; may stand in a list.
-    #[arg(long, value_name = "s,s,…|paper|r157", default_value = "paper")]
+    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap; stands alone.
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
     thw: String,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"])]

@@ -14,6 +14,7 @@ use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
+use crate::run::close_following::CloseFollowing;
 use crate::run::score::{ScoreTable, best_parameterizations, f1, judge_claims};
 use crate::run::study::{CategoryFacts, Study, StudyCases, WINDOW};
 use crate::support::atomic_file::StagedFile;
@@ -134,6 +135,7 @@ pub(super) fn finish_study(
             parameters: of.parameters.clone(),
             modes: of.modes.clone(),
             svd_explained: of.svd_explained.clone(),
+            close_following: CloseFollowing::of_recorded(plan, partial, block, &of.close_units)?,
         })
     };
     let pictures = study.facts().categories.iter().enumerate().map(picture).collect::<Result<_>>()?;

@@ -77,6 +77,13 @@ impl LaneCase<f64> {
         }
     }
 
+    /// The same case with the others this much farther ahead, m: of a headway or gap that belongs to the case.
+    #[must_use]
+    pub(crate) fn ahead_by(mut self, gap_m: f64) -> Self {
+        self.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
+        self
+    }
+
     /// The host's one rounding.
     pub fn cast<R: Real>(&self) -> LaneCase<R> {
         LaneCase {

@@ -50,7 +50,7 @@ pub use lane_case::{LaneCase, LaneOther};
 pub use lane_step::Seen;
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Partial, UnitCounts, WORST_LANES, WorstLane};
-pub use plan::{Block, CaseSource, Headway, LaneKey, LanePlan};
+pub use plan::{Block, CLOSE_HEADWAY_S, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, RecheckOptions, same_words, words};
 pub use scene::Scene;
 pub use time_step::check_time_step;

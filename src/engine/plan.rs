@@ -23,6 +23,10 @@ use super::version::Canonical;
 
 /// Text of [`Headway::MinFollowing`].
 const R157: &str = "r157";
+/// Text of [`Headway::Observed`].
+const OBSERVED: &str = "observed";
+/// Headways below this are close following, s: reports say how many failures come from them.
+pub const CLOSE_HEADWAY_S: f64 = 0.5;
 
 /// Headway of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -35,6 +39,9 @@ pub enum Headway {
     /// Minimum following distance of UN R157, 5.2.3.3, at the ego's initial speed: `r157`.
     #[serde(rename = "r157")]
     MinFollowing,
+    /// The recorded gap of each scenario: `observed`. The case has it in its gap offsets, so no other headway stands
+    /// beside it.
+    Observed,
 }
 
 impl Headway {
@@ -43,10 +50,12 @@ impl Headway {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
     }
 
-    /// From its text, `1.2s`, `30m` or `r157`; `2.0s`, as tables have it, is `2s`.
+    /// From its text, `1.2s`, `30m`, `r157` or `observed`; `2.0s`, as tables have it, is `2s`.
     pub fn parse(text: &str) -> Option<Headway> {
-        if text == R157 {
-            return Some(Headway::MinFollowing);
+        match text {
+            R157 => return Some(Headway::MinFollowing),
+            OBSERVED => return Some(Headway::Observed),
+            _ => {}
         }
         let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
         match text.strip_suffix('s') {
@@ -57,11 +66,29 @@ impl Headway {
 
     /// What tells it from others: two that start every lane alike are one.
     pub(crate) fn identity(self) -> (u8, u32) {
-        match self.start::<f32>() {
-            Start::Headway(s) => (0, s.to_bits()),
-            Start::Gap(m) => (1, m.to_bits()),
-            Start::MinFollowing => (2, 0),
+        match (self, self.start::<f32>()) {
+            (Headway::Observed, _) => (3, 0),
+            (_, Start::Headway(s)) => (0, s.to_bits()),
+            (_, Start::Gap(m)) => (1, m.to_bits()),
+            (_, Start::MinFollowing) => (2, 0),
         }
+    }
+
+    /// Whether these are the recorded gaps.
+    pub(crate) fn is_observed(list: &[Headway]) -> bool {
+        list.contains(&Headway::Observed)
+    }
+
+    /// Refuses the recorded gap beside another headway: the gap is part of the case, which all headways share.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub(crate) fn refuse_mixture(list: &[Headway]) -> Result<()> {
+        if list.len() > 1 && Headway::is_observed(list) {
+            let problem = format!("`{OBSERVED}` starts each scenario from its recorded gap and stands alone");
+            return Err(Error::usage(Place::option("thw"), problem, "run the other headways by themselves"));
+        }
+        Ok(())
     }
 
     /// As a lane starts, rounded once.
@@ -70,6 +97,7 @@ impl Headway {
             Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
             Headway::GapM(m) => Start::Gap(R::from_f64(m)),
             Headway::MinFollowing => Start::MinFollowing,
+            Headway::Observed => Start::Gap(R::ZERO),
         }
     }
 }
@@ -80,6 +108,7 @@ impl std::fmt::Display for Headway {
             Headway::ThwS(s) => write!(f, "{s}s"),
             Headway::GapM(m) => write!(f, "{m}m"),
             Headway::MinFollowing => f.write_str(R157),
+            Headway::Observed => f.write_str(OBSERVED),
         }
     }
 }
@@ -175,6 +204,7 @@ impl LanePlan {
         }
         refuse_repeats(|| Place::option("models"), models.iter().map(|model| (*model, model.name())))?;
         refuse_repeats(|| Place::option("headways"), headways.iter().map(|headway| (headway.identity(), headway)))?;
+        Headway::refuse_mixture(&headways)?;
         for block in &blocks {
             refuse_repeats(|| Place::item("variants"), block.variants.iter().map(|variant| (variant, variant)))?;
         }

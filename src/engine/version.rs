@@ -251,7 +251,7 @@ mod tests {
         for category in Category::ALL {
             for number in 0..2 {
                 record.clear();
-                unit_record::write(&scenario(category, number), &mut record);
+                unit_record::write(&scenario(category, number), None, &mut record);
                 held.push(&record);
             }
             blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options))));

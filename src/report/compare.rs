@@ -3,11 +3,13 @@
 use serde::Serialize;
 use std::fmt::Write;
 
+use super::close_following::{CloseRow, close_following};
 use super::forest::{ForestFigure, ForestGroup, ForestRow};
 use super::html::{Page, PageFigure, Section};
 use super::plot::AxisScale;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, aligned, table, wrap};
+use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{
@@ -165,17 +167,28 @@ impl CompareFile {
         for category in &self.categories {
             let _ = writeln!(
                 text,
-                "\n{}: {} scenarios from {} headways (S); {} samples of each density from the same",
+                "\n{}: {} scenarios from {} (S); {} samples of each density from {}",
                 category.category.label(),
                 readable::count(category.scenarios),
-                self.headways.len(),
-                readable::count(self.samples)
+                if self.is_observed() {
+                    "their recorded gaps".to_owned()
+                } else {
+                    format!("{} headways", self.headways.len())
+                },
+                readable::count(self.samples),
+                if self.is_observed() { "drawn headways" } else { "the same" }
             );
             for criterion in Criterion::ALL {
                 text.push_str(&self.block(category, criterion));
             }
             text.push_str(&summary(category));
         }
+        let close = self.categories.iter().filter_map(|comparison| {
+            let close = comparison.close_following.as_ref()?;
+            Some(CloseRow { category: comparison.category, models: &self.models, close })
+        });
+        let headways: Vec<Headway> = self.headways.iter().filter_map(|text| Headway::parse(text)).collect();
+        text.push_str(&close_following(&close.collect::<Vec<_>>(), "S", &headways));
         for reason in &self.left_out {
             let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));
         }
@@ -231,6 +244,11 @@ impl CompareFile {
         page.html()
     }
 
+    /// Scenarios start from their recorded gaps.
+    fn is_observed(&self) -> bool {
+        self.headways.iter().any(|text| Headway::parse(text) == Some(Headway::Observed))
+    }
+
     /// How to read a cell.
     fn rule(&self) -> String {
         let Enough { failures, clusters, margin } = self.enough;
@@ -239,13 +257,14 @@ impl CompareFile {
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
              beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {failures} failed \
              lanes or fewer than {clusters} failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn. \
-             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, from headways that are imposed, not observed. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
+             S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, {}. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
              says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \
              most 1 in 20 is marked too high or too low by chance. Risks \
              have the ratios of the rates: S and densities have the same exposure.",
             100.0 * self.level,
-            1.0 / margin
+            1.0 / margin,
+            if self.is_observed() { "from the recorded gaps" } else { "from headways that are imposed, not observed" }
         );
         wrap(&text, WIDTH)
     }
@@ -288,7 +307,11 @@ impl CompareFile {
 
 fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
     let mark = ratio.verdict.mark();
-    let Some(value) = ratio.ratio else { return format!("{} {mark}", short(rate.rate)) };
+    let Some(value) = ratio.ratio else {
+        // S never fails: only the lower end is a number.
+        let low = ratio.low.filter(|low| *low > 0.0).map_or(String::new(), |low| format!("{}… ", factor(low)));
+        return format!("{} {low}{mark}", short(rate.rate));
+    };
     let ends = match (ratio.low, ratio.high) {
         (Some(low), Some(high)) => format!("{}…{}", factor(low), factor(high)),
         (Some(low), None) => format!("{}…", factor(low)),

@@ -69,7 +69,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
         let thw = match plan.headways[key.headway] {
             // 2 as `2.0`, like the golden lanes.
             Headway::ThwS(thw) => Cell::Decimal(thw),
-            Headway::GapM(_) | Headway::MinFollowing => Cell::Null,
+            Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => Cell::Null,
         };
         let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
         let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt)));

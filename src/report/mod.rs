@@ -5,6 +5,7 @@
 
 mod case_sentences;
 pub mod case_sheet;
+mod close_following;
 pub mod compare;
 pub mod convergence;
 pub mod csv;

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::close_following::{CloseRow, close_following};
 use super::run_record::DeviceRecord;
 pub use super::run_record::RunFacts;
 use super::tables::{WIDTH, aligned, table, wrap};
@@ -11,6 +12,7 @@ use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, Levels, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
@@ -69,6 +71,8 @@ pub struct DrawRecord {
     pub lanes: u64,
     /// Lanes that ended at the time cap.
     pub capped_lanes: u64,
+    /// Failures from headways below 0.5 s.
+    pub close_following: CloseFollowing,
 }
 
 impl DrawRecord {
@@ -83,6 +87,7 @@ impl DrawRecord {
             rejected_share: rejected as f64 / tally.tries.max(1) as f64,
             lanes: tally.samples() * plan.lanes_per_unit(&plan.blocks[0]),
             capped_lanes: tally.capped.iter().sum(),
+            close_following: tally.close_following(),
         }
     }
 }
@@ -309,6 +314,7 @@ impl EstimateFile {
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
             text.push_str(&self.weights_text());
         }
+        text.push_str(&self.close_following());
         if let Some(rule) = self.mean_rule() {
             let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         }
@@ -339,6 +345,15 @@ impl EstimateFile {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
+    }
+
+    /// Which failures come from close following, of crude Monte Carlo.
+    fn close_following(&self) -> String {
+        let Some((draws, category)) = self.draws.as_ref().zip(Category::parse(self.density.category)) else {
+            return String::new();
+        };
+        let row = CloseRow { category, models: &self.models, close: &draws.close_following };
+        close_following(&[row], "the density", &self.plan_headways)
     }
 
     /// What the weights of importance samples say.

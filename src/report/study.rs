@@ -1,5 +1,6 @@
 //! A study as text for the terminal, as one JSON document and as files in the output folder.
 
+use super::close_following::{CloseRow, close_following};
 use super::plot::Figure;
 use super::radar::{RadarChart, RadarSeries};
 use super::records::{document, records};
@@ -10,8 +11,10 @@ use super::study_figures::{
 };
 use super::{csv, tables};
 use crate::Result;
+use crate::engine::CLOSE_HEADWAY_S;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
+use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
     Best, CategoryScores, ClaimResult, Misfit, ScoreTable, f1, published_failures, published_lvd_f1,
 };
@@ -32,6 +35,8 @@ pub struct CategoryPictures {
     pub modes: Vec<ModeShape>,
     /// What its first coefficients explain together.
     pub svd_explained: Vec<f64>,
+    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
+    pub close_following: Option<CloseFollowing>,
 }
 
 /// Everything a study says.
@@ -62,6 +67,7 @@ impl StudyReport {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
         parts.push(tables::failures(&self.scores, self.published, width));
+        parts.push(self.close_following());
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
         parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(ReferenceComparison::text));
@@ -69,6 +75,18 @@ impl StudyReport {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
         parts.join("\n")
+    }
+
+    /// Which failures of S come from close following.
+    pub(super) fn close_following(&self) -> String {
+        let rows = self.scores.categories.iter().zip(&self.pictures).filter_map(|(scores, pictures)| {
+            Some(CloseRow {
+                category: scores.category,
+                models: &scores.models,
+                close: pictures.close_following.as_ref()?,
+            })
+        });
+        close_following(&rows.collect::<Vec<_>>(), "S", &self.scores.headways)
     }
 
     /// Puts CSV tables, figures, what is in `results` already and `run.json` into their folder.
@@ -170,6 +188,13 @@ impl StudyReport {
             "claims": records(&csv::claims(&self.claims, "")?)?,
         });
         value["best"] = self.best.iter().map(best).collect();
+        let close = self.scores.categories.iter().zip(&self.pictures).map(|(scores, pictures)| {
+            serde_json::json!({
+                "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
+                "counts": pictures.close_following,
+            })
+        });
+        value["close_following"] = close.collect();
         if self.published {
             value["published"] = published(&self.scores);
         }

@@ -82,8 +82,8 @@ impl HeadwayFailures {
         let thw_s = |headway: &Headway| match headway {
             Headway::ThwS(seconds) => Some(*seconds),
             Headway::GapM(metres) => Some(*metres),
-            // It is another one at every speed.
-            Headway::MinFollowing => None,
+            // It is another one in every scenario.
+            Headway::MinFollowing | Headway::Observed => None,
         };
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
         let panel = |(model, id): (usize, &ModelId)| {

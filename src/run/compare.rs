@@ -1,8 +1,9 @@
 //! A comparison: rates of failure of recorded scenarios (S), of their parameterized replays (S') and of densities fitted on
 //! the same scenarios, set beside one another.
 
-use crate::engine::{Block, Executor, LanePlan, Partial, SweepSummary, Wanted};
+use crate::engine::{Block, Executor, Headway, LanePlan, Partial, SweepSummary, Wanted};
 use crate::model::profile::Profile;
+use crate::run::close_following::{CloseFollowing, close_units};
 use crate::run::sampling::{
     CategoryComparison, ComparedParameterization, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts,
     compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
@@ -10,7 +11,7 @@ use crate::run::sampling::{
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions};
+use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions, Fitted};
 use crate::stats::estimate::Enough;
 use crate::support::error::push_once;
 use crate::traffic::mining::counts_text;
@@ -155,9 +156,14 @@ impl<'a> Compare<'a> {
         let mut result =
             CompareResult { categories: recorded.collect::<Result<_>>()?, summary, ..CompareResult::default() };
         for id in &self.options.parameterizations {
-            match self.parameterization(id.clone(), counts, executor, &mut result.summary, &mut progress) {
-                Ok((cells, left_out)) => {
-                    result.left_out.extend(left_out);
+            let mut sampled = || -> Result<ComparedParameterization> {
+                let Fitted { model, left_out, .. } = self.fit(id, false)?;
+                let cells = self.sample_density(&model, counts, executor, &mut result.summary, &mut progress)?;
+                result.left_out.extend(left_out);
+                Ok(cells)
+            };
+            match sampled() {
+                Ok(cells) => {
                     let of = result.categories.iter_mut().find(|c| c.category == id.category);
                     of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
                 }
@@ -178,35 +184,47 @@ impl<'a> Compare<'a> {
     fn recorded(&self, counts: &Partial, block: usize) -> Result<CategoryComparison> {
         let of = &self.plan.blocks[block];
         let exposure = self.facts.driven.map(|driven| Exposure::new(of.units.len(), driven));
+        let close_units = close_units(self.scenarios.iter().filter(|s| s.kept && s.category == of.category));
+        let close_following = CloseFollowing::of_recorded(&self.plan, counts, block, &close_units)?;
         let counts = ScenarioCounts::of_variant(&self.plan, counts, block, 0)?;
         Ok(CategoryComparison {
             category: of.category,
             scenarios: of.units.len(),
             exposure,
             recorded: recorded_cells(&self.plan, &counts, exposure.as_ref(), Self::LEVEL),
+            close_following,
             parameterizations: Vec::new(),
         })
     }
 
-    /// One parameterization, with the scenarios that its density leaves out.
-    fn parameterization(
+    /// Fits the density of a parameterization; where S starts from the recorded gaps, with the headway as a parameter.
+    ///
+    /// # Errors
+    /// As [`DensityModel::fit`].
+    pub(crate) fn fit(&self, id: &Parameterization, representativeness: bool) -> Result<Fitted> {
+        let fit = FitOptions {
+            parameterization: self.options.study.parameterization.clone(),
+            with_thw: Headway::is_observed(&self.options.study.headways),
+            rule: BandwidthRule::Reduction,
+            representativeness,
+            ..FitOptions::default()
+        };
+        DensityModel::fit(id.clone(), self.scenarios, self.facts, &fit)
+    }
+
+    /// Samples a density of [`Compare::fit`].
+    ///
+    /// # Errors
+    /// As [`Executor::sweep`]; [`Error::Usage`] for a density that the profile cannot sample.
+    pub(crate) fn sample_density(
         &self,
-        id: Parameterization,
+        density: &DensityModel,
         counts: &Partial,
         executor: &Executor,
         summary: &mut SweepSummary,
         progress: impl FnMut(u64),
-    ) -> Result<(ComparedParameterization, Vec<Error>)> {
-        let options = &self.options;
-        let fit = FitOptions {
-            parameterization: options.study.parameterization.clone(),
-            with_thw: false,
-            rule: BandwidthRule::Reduction,
-            representativeness: false,
-            ..FitOptions::default()
-        };
-        let fitted = DensityModel::fit(id.clone(), self.scenarios, self.facts, &fit)?;
-        let density = fitted.model;
+    ) -> Result<ComparedParameterization> {
+        let (options, id) = (&self.options, density.space.id());
         let find = |(at, block): (usize, &Block)| {
             let variant = block.variants.iter().position(|v| *v == id.key)?;
             (block.category == id.category).then_some((at, variant))
@@ -219,15 +237,18 @@ impl<'a> Compare<'a> {
             seed: options.seed,
             source: SampleSource::Random,
             models: options.study.models.clone(),
-            headways: SampleHeadways::Each(options.study.headways.clone()),
+            headways: match density.space.has_thw() {
+                true => SampleHeadways::Sampled,
+                false => SampleHeadways::Each(options.study.headways.clone()),
+            },
         };
-        let plan = plan_samples(&density, &density.mixture()?, &self.profile, &plan_options)?;
-        let kernels = kernel_scenarios(&density, self.scenarios)?;
+        let plan = plan_samples(density, &density.mixture()?, &self.profile, &plan_options)?;
+        let kernels = kernel_scenarios(density, self.scenarios)?;
         let scenarios = self.plan.blocks[block].units.len() as usize;
         let exposure = density.exposure.as_ref();
         let sampled = sample_by_scenario(&plan, &kernels, scenarios, executor, exposure, Self::LEVEL, progress)?;
         summary.add(&sampled.summary);
-        let compared = ComparedParameterization {
+        Ok(ComparedParameterization {
             key: id.key.to_string(),
             parameters: id.parameter_count(),
             density_sha256: density.content_sha256()?,
@@ -235,7 +256,6 @@ impl<'a> Compare<'a> {
             plan_sha256: plan.hash().to_owned(),
             voids: sampled.tally.voids,
             cells: compare_cells(&self.plan, counts, block, variant, &sampled, options.enough, Self::LEVEL)?,
-        };
-        Ok((compared, fitted.left_out))
+        })
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
 //! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
+//! [`close_following`] tells how many failures come from headways below 0.5 s.
 //! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
 
 pub mod check;
+pub mod close_following;
 pub mod compare;
 pub mod grid;
 pub mod justify;

@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::case::Category;
+use crate::{Error, Place, Result};
 
 /// Side of the ego's lane, in the direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -138,5 +139,27 @@ impl Scenario {
     /// Duration T = (n − 1)/fps, s.
     pub fn duration_s(&self) -> f64 {
         (self.target.v.len().saturating_sub(1)) as f64 / self.fps
+    }
+
+    /// Recorded gap at the start over the speed that a lane's ego starts with, s (in LVD the leader's); `None` where
+    /// neither gap nor headway is known, or the ego stands.
+    pub fn start_headway_s(&self) -> Option<f64> {
+        let leader = self.target.v.first().copied().unwrap_or(0.0);
+        let ego_mps = if self.category == Category::Lvd { leader } else { self.ego.v0 };
+        self.gap0.filter(|_| ego_mps > 0.0).map(|gap_m| gap_m / ego_mps).or(self.thw0)
+    }
+
+    /// Recorded gap at the start, m: `gap0`, else `thw0` times the ego's speed.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a scenario with neither.
+    pub fn start_gap_m(&self) -> Result<f64> {
+        self.gap0.or(self.thw0.map(|thw_s| thw_s * self.ego.v0)).ok_or_else(|| {
+            Error::input(
+                Place::item(format!("scenario {}", self.id)).column("gap0"),
+                "the recorded gap at the start is absent, but option `thw = observed` starts from it",
+                "give gap0 (m) or thw0 (s), or headways in seconds",
+            )
+        })
     }
 }

@@ -11,6 +11,7 @@ mod kills;
 mod map;
 mod mutations;
 mod nothing_is_lost;
+mod observed;
 mod parts;
 mod reruns;
 mod sampling;

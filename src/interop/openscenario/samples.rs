@@ -195,9 +195,7 @@ impl DistributionSamples {
             tries += u64::from(sampled.tries);
             let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
             let gap_m = point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0);
-            let mut encoded = LaneCase::encode(&case, profile, &mut source.tables);
-            encoded.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
-            source.cases.push(encoded);
+            source.cases.push(LaneCase::encode(&case, profile, &mut source.tables).ahead_by(gap_m));
         }
         let block = Block {
             category: self.category,

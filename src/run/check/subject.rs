@@ -128,7 +128,9 @@ impl Subject {
 fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
     match headway {
         Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
-        Headway::GapM(_) | Headway::MinFollowing => (MapQuantity::Gap, headway.start().gap(ego_mps)),
+        Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => {
+            (MapQuantity::Gap, headway.start().gap(ego_mps))
+        }
     }
 }
 

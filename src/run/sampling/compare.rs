@@ -18,6 +18,7 @@ use super::tally::{SampleTally, TallyOptions};
 use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
+use crate::run::close_following::CloseFollowing;
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::{DensityModel, Exposure};
 use crate::stats::estimate::{
@@ -272,6 +273,8 @@ pub struct CategoryComparison {
     pub exposure: Option<Exposure>,
     /// S: model × criterion.
     pub recorded: Vec<RecordedCell>,
+    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
+    pub close_following: Option<CloseFollowing>,
     /// Parameterizations, in the registry's order.
     pub parameterizations: Vec<ComparedParameterization>,
 }

@@ -104,7 +104,7 @@ fn plan(
         (SampleHeadways::Sampled, false) => {
             return Err(Error::usage(
                 Place::option("thw"),
-                "this density has no parameter `thw_s`, so headways cannot be drawn from it",
+                "this density has no parameter `thw_s`, so observed headways cannot be drawn from it",
                 "fit it with option `with_thw`, or give a headway in seconds",
             ));
         }
@@ -113,6 +113,13 @@ fn plan(
                 Place::option("thw"),
                 "this density draws the headway itself (parameter `thw_s`)",
                 "use option `thw = sampled`, or fit it without option `with_thw`",
+            ));
+        }
+        (SampleHeadways::Each(list), false) if Headway::is_observed(list) => {
+            return Err(Error::usage(
+                Place::option("thw"),
+                "this density has no observed headways (parameter `thw_s`)",
+                "fit it with option `with_thw`, or give a headway in seconds",
             ));
         }
         (SampleHeadways::Each(list), false) => list.clone(),

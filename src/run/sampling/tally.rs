@@ -10,9 +10,11 @@ use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
 use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
-use crate::engine::{Chunk, LanePlan};
+use crate::engine::{CLOSE_HEADWAY_S, Chunk, Headway, LanePlan};
 use crate::model::criterion::Criterion;
+use crate::run::close_following::CloseFollowing;
 use crate::run::parts::Countable;
+use crate::scenario::parameterization::Variable;
 use crate::{Error, Place, Result};
 
 /// Samples that one task counts.
@@ -55,6 +57,10 @@ pub struct SampleTally {
     pub squares: Vec<u64>,
     /// Lanes that ended at the time cap: headway × model.
     pub capped: Vec<u64>,
+    /// Lanes per model from headways below [`CLOSE_HEADWAY_S`].
+    pub close_lanes: u64,
+    /// Failed lanes from such headways: model × criterion.
+    pub close_failures: Vec<u64>,
     /// The worst lanes of each model, ascending by (value, lane).
     pub worst: Vec<Vec<WorstSample>>,
     worst_limit: usize,
@@ -76,6 +82,8 @@ impl SampleTally {
             failures: vec![0; headways * models * criteria],
             squares: vec![0; models * criteria],
             capped: vec![0; headways * models],
+            close_lanes: 0,
+            close_failures: vec![0; models * criteria],
             worst: vec![Vec::new(); models],
             worst_limit: options.worst,
             map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), models)),
@@ -146,6 +154,8 @@ impl SampleTally {
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
         let first = (unit - chunk.units.start) as usize * headways * models;
         let lanes = &chunk.verdicts[first..first + headways * models];
+        let is_close = |headway: usize| is_close(plan, drawn.as_ref(), unit, headway);
+        self.close_lanes += (0..headways).filter(|at| is_close(*at)).count() as u64;
         let cell = self.map.as_ref().zip(drawn.as_ref()).and_then(|(map, drawn)| map.axes.cell(&drawn.values));
         for model in 0..models {
             let mut failed = [0_u64; Criterion::ALL.len()];
@@ -157,6 +167,9 @@ impl SampleTally {
                     let fails = u64::from(verdicts.failed(criterion));
                     self.failures[at * criteria + criterion.index()] += fails;
                     failed[criterion.index()] += fails;
+                    if fails > 0 && is_close(headway) {
+                        self.close_failures[model * criteria + criterion.index()] += 1;
+                    }
                 }
                 if self.worst_limit > 0
                     && let Some(outcome) = chunk.outcomes.get(first + at)
@@ -201,6 +214,8 @@ impl SampleTally {
         sum(&mut self.failures, &other.failures);
         sum(&mut self.squares, &other.squares);
         sum(&mut self.capped, &other.capped);
+        self.close_lanes = self.close_lanes.saturating_add(other.close_lanes);
+        sum(&mut self.close_failures, &other.close_failures);
         for (model, lanes) in other.worst.into_iter().enumerate() {
             for lane in lanes {
                 self.offer(model, lane);
@@ -252,9 +267,10 @@ impl SampleTally {
     }
 
     /// Numbers of cells: they follow from models, headways and criteria.
-    fn shape(&self) -> [usize; 6] {
+    fn shape(&self) -> [usize; 7] {
         let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
-        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts]
+        let close = self.close_failures.len();
+        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts, close]
     }
 
     /// Whether counts that were read from a file can be those of a run.
@@ -270,6 +286,8 @@ impl SampleTally {
         let cells = self.capped.len();
         let mut problems = vec![
             (self.squares.len() != models * criteria || self.failures.len() != cells * criteria, "lengths differ"),
+            (self.close_failures.len() != models * criteria, "lengths differ"),
+            (!self.holds_its_close(), "more failures from short headways than failures"),
             (models == 0 || cells == 0 || !cells.is_multiple_of(models), "no whole number of headways per model"),
             (self.worst.iter().any(|lanes| lanes.len() > self.worst_limit), "more worst lanes than are kept"),
             (!self.holds_its_worst(), "a worst lane is not among the lanes that were counted"),
@@ -286,6 +304,22 @@ impl SampleTally {
             problems.push((!adds_up, "the counts by kernel do not add up"));
         }
         problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
+    }
+
+    /// Are no more failures from short headways than there are failures?
+    fn holds_its_close(&self) -> bool {
+        let cells = self.close_failures.len().max(1);
+        let all = |at: usize| self.failures.iter().skip(at).step_by(cells).fold(0, |a: u64, b| a.saturating_add(*b));
+        self.close_failures.iter().enumerate().all(|(at, close)| *close <= all(at))
+    }
+
+    /// Lanes and failures, with those from short headways.
+    pub fn close_following(&self) -> CloseFollowing {
+        let cells = self.close_failures.len().max(1);
+        let all = |at: usize| self.failures.iter().skip(at).step_by(cells).sum();
+        let lanes = self.valid() * (self.failures.len() / cells) as u64;
+        let failures = self.close_failures.iter().enumerate().map(|(at, close)| [*close, all(at)]);
+        CloseFollowing { close_lanes: self.close_lanes, lanes, failures: failures.collect() }
     }
 
     /// Does every worst lane belong to its model and to a sample that was counted? A sample has its lanes in a row, headway
@@ -338,6 +372,21 @@ impl Countable for SampleTally {
     fn check(&self) -> std::result::Result<(), String> {
         SampleTally::check(self)
     }
+}
+
+/// Does the lane of a sample start below [`CLOSE_HEADWAY_S`]? A drawn headway is the point's; where the plan holds the
+/// cases, it is in the gap of the case.
+fn is_close(plan: &LanePlan, drawn: Option<&DrawnPoint>, unit: u64, headway: usize) -> bool {
+    let start = match (plan.headways[headway], plan.generator().zip(drawn)) {
+        (Headway::ThwS(thw_s), _) => return thw_s < CLOSE_HEADWAY_S,
+        (_, Some((generator, drawn))) => {
+            let slot = generator.recipe.slots[Variable::TimeHeadway as usize] as usize;
+            return drawn.values.get(slot).is_some_and(|thw_s| f64::from(*thw_s) < CLOSE_HEADWAY_S);
+        }
+        (headway, None) => headway.start::<f64>(),
+    };
+    let case = plan.case(0, unit, 0);
+    start.gap(case.ego_speed) + case.others[0].gap_offset < CLOSE_HEADWAY_S * case.ego_speed
 }
 
 /// A total order: smaller value first, then the lane.

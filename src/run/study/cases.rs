@@ -94,10 +94,12 @@ impl StudyCases {
             while from < inside.end {
                 let to = inside.end.min(from + ENCODED_AT_ONCE);
                 // Cases in parallel, records in order: the tables must not depend on the number of threads.
-                let cases: Vec<Vec<Case>> =
+                let cases: Vec<(Vec<Case>, f64)> =
                     (from..to).into_par_iter().map(|unit| self.cases(at, unit)).collect::<Result<_>>()?;
-                let records = cases.iter().flatten().map(|case| LaneCase::encode(case, profile, &mut table.tables));
-                table.cases[at].extend(records);
+                for (cases, gap_m) in &cases {
+                    let encode = |case| LaneCase::encode(case, profile, &mut table.tables).ahead_by(*gap_m);
+                    table.cases[at].extend(cases.iter().map(encode));
+                }
                 from = to;
             }
         }
@@ -174,8 +176,8 @@ impl StudyCases {
         self.outline.segments(units).into_iter().map(of_segment).sum()
     }
 
-    /// S, then every S', of a unit of a block.
-    fn cases(&self, at: usize, unit: u64) -> Result<Vec<Case>> {
+    /// S, then every S', of a unit of a block, and the gap that all of them start from where no headway sets it, m.
+    fn cases(&self, at: usize, unit: u64) -> Result<(Vec<Case>, f64)> {
         let block = &self.outline.blocks[at];
         let record = self.held.get(block.first_unit + unit);
         let scenario = record.and_then(|record| unit_record::read(record, block.category));
@@ -183,7 +185,8 @@ impl StudyCases {
         let reduction = self.reductions[at].as_ref();
         let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
         let grid = TimeGrid::of(&self.outline.profile);
-        cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)
+        let cases = cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)?;
+        Ok((cases, scenario.gap0.unwrap_or(0.0)))
     }
 }
 

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::histogram::{ParameterHistogram, parameter_histograms};
 use super::plan::StudyOutline;
 use crate::Result;
-use crate::engine::Block;
+use crate::engine::{Block, Headway};
+use crate::run::close_following::close_units;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::{ModeShape, ParameterizationOptions, Reduction};
@@ -25,6 +26,9 @@ pub struct CategoryFacts {
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition's first directions.
     pub modes: Vec<ModeShape>,
+    /// Scenarios (by index among the kept ones) whose recorded headway is below 0.5 s; empty where headways are imposed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub close_units: Vec<u64>,
 }
 
 /// What a report says beside the lanes' outcomes.
@@ -73,7 +77,9 @@ pub(super) fn category_facts(
         let kept: Vec<&Scenario> =
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
         let parameters = parameter_histograms(block.category, &kept, options)?;
-        Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes })
+        let is_observed = Headway::is_observed(&planned.cases.outline().headways);
+        let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
+        Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes, close_units })
     };
     planned.cases.outline().blocks.iter().map(facts).collect()
 }

@@ -79,6 +79,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
     refuse_repeats(|| Place::item("scenarios"), kept.map(|scenario| (&scenario.id, &scenario.id)))?;
     let dt_s = profile.frame.dt_s;
     let parameterization = &options.parameterization;
+    let is_observed = Headway::is_observed(&options.headways);
     let grid = TimeGrid::of(profile);
     let (mut entries, mut values) = (0.0, 0.0);
     let mut held = UnitRecords::default();
@@ -113,7 +114,8 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
                 vehicle_ahead(scenario)?;
             }
             record.clear();
-            unit_record::write(scenario, &mut record);
+            let gap_m = is_observed.then(|| scenario.start_gap_m()).transpose()?;
+            unit_record::write(scenario, gap_m, &mut record);
             held.push(&record);
         }
         blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref()));

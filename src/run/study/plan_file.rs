@@ -121,13 +121,14 @@ impl StudyHead {
         if (0..self.models.len()).any(|at| self.models[..at].contains(&self.models[at])) {
             return wrong("a driver model is there twice");
         }
+        Headway::refuse_mixture(&self.headways)?;
         let headways = self.headways.iter().map(|headway| (headway.identity(), headway));
         if let Some(problem) = repeated(headways) {
             return wrong(&format!("a headway is there twice: {problem}"));
         }
         let number = |headway: &Headway| match *headway {
             Headway::ThwS(number) | Headway::GapM(number) => number,
-            Headway::MinFollowing => 0.0,
+            Headway::MinFollowing | Headway::Observed => 0.0,
         };
         if !self.headways.iter().all(|headway| (0.0..1e6).contains(&number(headway))) {
             return wrong("a headway is out of range (0 to 1e6)");
@@ -158,6 +159,9 @@ impl StudyHead {
         });
         let scenario = block.and_then(|block| unit_record::read(record, block.category));
         let scenario = scenario.ok_or_else(|| format!("scenario {unit} is not whole"))?;
+        if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
+            return Err(format!("scenario {}: it has no recorded gap", scenario.id));
+        }
         problem_of(&scenario).map_or(Ok(()), |problem| Err(format!("scenario {}: {problem}", scenario.id)))
     }
 }

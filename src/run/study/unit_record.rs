@@ -8,24 +8,28 @@ use crate::scenario::{Category, Ego, Other, Scenario, Side};
 /// Bits of the byte of flags.
 const RIGHT: u8 = 1;
 const HAS_LEAD: u8 = 2;
+const HAS_GAP: u8 = 4;
 /// Largest record: hours at 1000 samples a second fit.
 pub(crate) const MAX_RECORD: usize = 256 << 20;
 
 /// Bytes that the record of a scenario has at most.
 pub(crate) fn max_bytes(scenario: &Scenario) -> usize {
     let series = if scenario.category == Category::Lvd { 1 } else { 2 + usize::from(scenario.lead.is_some()) };
-    13 + scenario.id.len() + 8 * (9 + series * scenario.target.v.len())
+    13 + scenario.id.len() + 8 * (10 + series * scenario.target.v.len())
 }
 
-/// Appends the record of a scenario.
-pub(crate) fn write(scenario: &Scenario, bytes: &mut Vec<u8>) {
+/// Appends the record of a scenario; with the gap that it starts from, where no headway sets it.
+pub(crate) fn write(scenario: &Scenario, gap_m: Option<f64>, bytes: &mut Vec<u8>) {
     let ahead = scenario.lead.as_ref().zip(scenario.lead_gap).filter(|_| scenario.category == Category::CutOut);
     let begin = bytes.len();
     bytes.extend([0; 4]);
     bytes.extend((scenario.id.len() as u32).to_le_bytes());
     bytes.extend(scenario.id.as_bytes());
     bytes.extend((scenario.target.v.len() as u32).to_le_bytes());
-    bytes.push(if scenario.side == Side::Right { RIGHT } else { 0 } | if ahead.is_some() { HAS_LEAD } else { 0 });
+    let flag = |is_set: bool, bit: u8| if is_set { bit } else { 0 };
+    bytes.push(
+        flag(scenario.side == Side::Right, RIGHT) | flag(ahead.is_some(), HAS_LEAD) | flag(gap_m.is_some(), HAS_GAP),
+    );
     let ego = &scenario.ego;
     let mut floats = |list: &[f64]| list.iter().for_each(|value| bytes.extend(value.to_bits().to_le_bytes()));
     floats(&[scenario.fps, ego.v0, ego.length, ego.width, scenario.target.length, scenario.target.width]);
@@ -37,6 +41,7 @@ pub(crate) fn write(scenario: &Scenario, bytes: &mut Vec<u8>) {
         floats(&[lead.length, lead.width, gap]);
         floats(&lead.v);
     }
+    floats(gap_m.as_slice());
     let size = (bytes.len() - begin - 4) as u32;
     bytes[begin..begin + 4].copy_from_slice(&size.to_le_bytes());
 }
@@ -85,7 +90,7 @@ pub(crate) fn read(record: &[u8], category: Category) -> Option<Scenario> {
     let samples = parts.word()? as usize;
     let flags = *parts.bytes(1)?.first()?;
     let has_lead = flags & HAS_LEAD != 0;
-    if flags > RIGHT | HAS_LEAD || has_lead != (category == Category::CutOut) {
+    if flags > RIGHT | HAS_LEAD | HAS_GAP || has_lead != (category == Category::CutOut) {
         return None;
     }
     let [fps, v0, length, width] = [parts.float()?, parts.float()?, parts.float()?, parts.float()?];
@@ -99,6 +104,7 @@ pub(crate) fn read(record: &[u8], category: Category) -> Option<Scenario> {
         lead_gap = Some(parts.float()?);
         lead = Some(Other { length, width, v: parts.floats(samples)?, y: vec![0.0; samples] });
     }
+    let gap0 = if flags & HAS_GAP != 0 { Some(parts.float()?) } else { None };
     let is_whole = parts.0.is_empty();
     is_whole.then(|| Scenario {
         id,
@@ -121,7 +127,7 @@ pub(crate) fn read(record: &[u8], category: Category) -> Option<Scenario> {
         target,
         lead,
         thw0: None,
-        gap0: None,
+        gap0,
         lead_gap,
         peak_decel: None,
         truncated_start: None,
@@ -179,7 +185,8 @@ mod tests {
         let mined = mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios;
         let of = |scenario: Scenario| {
             let mut bytes = Vec::new();
-            write(&scenario, &mut bytes);
+            // Every second with a gap.
+            write(&scenario, scenario.gap0.filter(|_| scenario.frame0 % 2 == 0), &mut bytes);
             (scenario, bytes)
         };
         mined.into_iter().filter(|scenario| scenario.kept).map(of).collect()
@@ -194,7 +201,7 @@ mod tests {
             assert!(bytes.len() <= max_bytes(scenario));
             let read = read(bytes, scenario.category).unwrap();
             let mut again = Vec::new();
-            write(&read, &mut again);
+            write(&read, read.gap0, &mut again);
             assert!(&again == bytes && read.id == scenario.id, "{}", scenario.id);
         }
         let mean = records.iter().map(|(_, bytes)| bytes.len()).sum::<usize>() / records.len();
@@ -233,6 +240,7 @@ mod tests {
             category in prop::sample::select(Category::ALL.to_vec()),
             is_right in any::<bool>(),
             sizes in prop::array::uniform9(float()),
+            gap_m in prop::option::of(float()),
             series in prop::collection::vec([float(), float(), float()], 0..80),
         ) {
             let [fps, v0, ego_length, ego_width, target_length, target_width, lead_length, lead_width, gap] = sizes;
@@ -245,11 +253,12 @@ mod tests {
             let lead = Other { length: lead_length, width: lead_width, v: of(2), y: Vec::new() };
             (scenario.lead, scenario.lead_gap) = (Some(lead), Some(gap));
             let mut bytes = Vec::new();
-            write(&scenario, &mut bytes);
+            write(&scenario, gap_m, &mut bytes);
             prop_assert!(bytes.len() <= max_bytes(&scenario));
             prop_assert_eq!(length(&bytes), Some(bytes.len()));
             let back = read(&bytes, category).unwrap();
             prop_assert_eq!((&back.id, back.side), (&scenario.id, scenario.side));
+            prop_assert_eq!(back.gap0.map(f64::to_bits), gap_m.map(f64::to_bits));
             prop_assert_eq!(bits(&back, category), bits(&scenario, category));
         }
     }

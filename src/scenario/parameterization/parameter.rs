@@ -122,6 +122,10 @@ impl Variable {
             Variable::Duration => duration_s,
             Variable::FinalSpeed => after(),
             Variable::MeanDeceleration => (before - after()) / duration_s,
+            // A drawn ego of an LVD starts at the leader's speed, from the recorded gap like that of S.
+            Variable::TimeHeadway if scenario.category == Category::Lvd && scenario.thw0.is_some() && before > 0.0 => {
+                scenario.start_headway_s().unwrap_or_default()
+            }
             Variable::TimeHeadway => scenario.thw0.ok_or_else(|| {
                 Error::input(
                     Place::item(format!("scenario {}", scenario.id)).column("thw0"),
