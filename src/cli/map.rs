@@ -91,7 +91,7 @@ pub struct Map {
     /// Time step [default: the profile's]
     #[arg(long, value_name = "s")]
     dt: Option<f64>,
-    /// Mark cells whose verdict changes with a tenth of the time step, 1 cm, 0.1 km/h
+    /// Mark cells whose outcome changes with a tenth of the time step, 1 cm, 0.1 km/h
     ///
     /// They are undecided: each cell is simulated eight times, and sheets show them in their own colour.
     #[arg(long)]

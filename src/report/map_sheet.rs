@@ -5,7 +5,8 @@
 //! readers and in grey print. What a page of three plots in a row shows stays readable at the width of a column.
 
 use super::plot::{Cells, Figure, Fill, FilledCell, Hatch, Height, INK, Plot, PlotAxis, Rule};
-use crate::run::grid::{Grid, boundary, runs};
+use crate::run::check::Answer;
+use crate::run::grid::{Agreement, CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
 pub struct MapSheet<'a> {
@@ -19,38 +20,43 @@ pub struct MapSheet<'a> {
     pub kinds: Vec<(String, Fill)>,
     /// Kind of every cell, in the grid's order.
     pub cells: Vec<u8>,
-    /// Is each cell preventable? Its boundary is drawn where that is known.
-    pub preventable: Option<Vec<bool>>,
+    /// Is each cell not preventable? Its boundary is drawn where that is known.
+    pub not_preventable: Option<Vec<bool>>,
     /// Lines at the foot.
     pub notes: Vec<String>,
 }
 
-/// Kind of an undecided cell among the outcomes.
-pub const UNDECIDED: u8 = 2;
-/// Colour of the boundary of preventable cases.
+/// Colour of the boundary of cases that are not preventable.
 const BOUNDARY: &str = "#c40000";
 
-/// A cell in which nothing fails, one in which it does, and one whose verdict a perturbation changes.
-pub fn outcomes(with_undecided: bool) -> Vec<(String, Fill)> {
-    let kinds = [kind("pass", "#f7f1dc", Hatch::None), kind("fail", "#6f86ad", Hatch::None), undecided()];
-    kinds.into_iter().take(if with_undecided { 3 } else { 2 }).collect()
+/// Name and look of an outcome.
+pub fn outcome(outcome: CellOutcome) -> (String, Fill) {
+    let (colour, hatch) = match outcome {
+        CellOutcome::NoConflict => NO_CONFLICT,
+        CellOutcome::Pass => ("#f7f1dc", Hatch::None),
+        CellOutcome::Fail => ("#6f86ad", Hatch::None),
+        CellOutcome::FailByReaction => ("#6f86ad", Hatch::Rising),
+        CellOutcome::Undecided => UNDECIDED,
+    };
+    kind(outcome.label(), colour, hatch)
 }
 
-fn undecided() -> (String, Fill) {
-    kind("undecided", "#e69f00", Hatch::None)
+/// Name and look of an agreement of two.
+pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, Fill) {
+    let label = agreement.label();
+    match agreement {
+        Agreement::BothPass => kind(label, "#f7f1dc", Hatch::None),
+        Agreement::BothFail => kind(label, "#b9b9b9", Hatch::None),
+        Agreement::OnlyFirst => kind(format!("only {first} fails"), "#0072b2", Hatch::Rising),
+        Agreement::OnlySecond => kind(format!("only {second} fails"), "#e08a00", Hatch::Falling),
+        Agreement::NoConflict => kind(label, NO_CONFLICT.0, NO_CONFLICT.1),
+        Agreement::Undecided => kind(label, UNDECIDED.0, UNDECIDED.1),
+    }
 }
 
-/// The kinds of a difference, in the order of [`crate::run::grid::Agreement::ALL`].
-pub fn agreements(first: &str, second: &str, with_undecided: bool) -> Vec<(String, Fill)> {
-    let kinds = [
-        kind("both pass", "#f7f1dc", Hatch::None),
-        kind("both fail", "#b9b9b9", Hatch::None),
-        kind(format!("only {first} fails"), "#0072b2", Hatch::Rising),
-        kind(format!("only {second} fails"), "#e08a00", Hatch::Falling),
-        kind("undecided", "#ffffff", Hatch::Grey),
-    ];
-    kinds.into_iter().take(if with_undecided { 5 } else { 4 }).collect()
-}
+/// The same in every map. In grey print the second lies midway between pass and fail.
+const NO_CONFLICT: (&str, Hatch) = ("#ffffff", Hatch::Grey);
+const UNDECIDED: (&str, Hatch) = ("#f0b429", Hatch::Crossed);
 
 fn kind(name: impl Into<String>, colour: &str, hatch: Hatch) -> (String, Fill) {
     (name.into(), Fill { colour: colour.to_owned(), hatch, ..Fill::default() })
@@ -64,16 +70,11 @@ impl MapSheet<'_> {
             title: self.title.clone(),
             subtitle: Some(self.subtitle.clone()),
             plots: (0..panels).map(|panel| self.plot(panel)).collect(),
-            caption: match &self.preventable {
-                None => "Black lines: the boundary, between cells of different kinds.",
-                Some(cells) if cells.iter().all(|is_preventable| *is_preventable) => {
-                    "Black lines: the boundary, between cells of different kinds. Every case is preventable: CCHDM or FSM \
-                     avoids it."
+            caption: match &self.not_preventable {
+                Some(cells) if !cells.contains(&true) => {
+                    "Black lines: the boundary, between cells of different kinds. In no cell do CCHDM and FSM both collide."
                 }
-                Some(_) => {
-                    "Black lines: the boundary, between cells of different kinds. Red dashes: the boundary of preventable \
-                     cases, which CCHDM or FSM avoids."
-                }
+                _ => "Black lines: the boundary, between cells of different kinds.",
             }
             .to_owned(),
             notes: ("Notes:", self.notes.clone()),
@@ -95,14 +96,22 @@ impl MapSheet<'_> {
         let at = |(i, j): (usize, usize)| (across[i], up[j]);
         let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
         let attributes = "class=\"boundary\" stroke-linecap=\"square\"".to_owned();
-        let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.8, dash: "", attributes };
-        let preventable = self.preventable.iter().map(|cells| {
+        let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.8, attributes, ..Rule::default() };
+        let not_preventable = self.not_preventable.iter().filter(|cells| cells.contains(&true)).map(|cells| {
             let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
             let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
-            let attributes = "class=\"preventable\"".to_owned();
-            Rule { runs: lines.collect(), colour: BOUNDARY, width_px: 2.2, dash: "5 3", attributes }
+            let count = cells.iter().filter(|is_not_preventable| **is_not_preventable).count();
+            let (word, all) = (Answer::NotPreventable.label(), cells.len());
+            Rule {
+                runs: lines.collect(),
+                name: format!("around what is {word}, CCHDM and FSM both collide: {count} of {all}"),
+                colour: BOUNDARY,
+                width_px: 2.2,
+                dash: "5 3",
+                attributes: "class=\"not-preventable\"".to_owned(),
+            }
         });
-        let layers = [cells.into(), rule.into()].into_iter().chain(preventable.map(Into::into));
+        let layers = [cells.into(), rule.into()].into_iter().chain(not_preventable.map(Into::into));
         let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel),

@@ -137,6 +137,7 @@ pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
             width_px: 0.9,
             dash: "4,4",
             attributes: "class=\"equal-f1\"".to_owned(),
+            ..Rule::default()
         };
         Plot {
             heading: format!("{}, {}{}", model.name(), criterion.label(), few(failing)),

@@ -13,7 +13,7 @@ fn check(args: &[&str]) -> (i32, String, String) {
 
 fn json(args: &[&str]) -> Value {
     let (code, out, error) = check(&[args, &["--format", "json"]].concat());
-    assert!([0, 1, 8, 9].contains(&code), "{code} {error}");
+    assert!([0, 1, 8, 9, 10].contains(&code), "{code} {error}");
     serde_json::from_str(&out).unwrap()
 }
 
@@ -392,4 +392,61 @@ fn an_end_speed_a_perturbation_away_from_the_initial_one_is_still_a_case() {
     let case = "check --category lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 29.99 --profiles paper";
     let (code, out, error) = check(&case.split(' ').collect::<Vec<_>>());
     assert!(code == 9 && out.contains("no conflict"), "{code} {out} {error}");
+}
+
+/// The table, the figure of the page, the series and the JSON take the time of braking from one place.
+#[test]
+fn braking_begins_at_one_time_in_table_figure_series_and_json() {
+    let dir = tempfile::tempdir().unwrap();
+    let (page, series) = (dir.path().join("case.html"), dir.path().join("case.csv"));
+    let case = ["check", "--category", "cut-in", "--ego-speed", "60km/h", "--speed", "40km/h", "--gap", "15"];
+    let more = ["--lateral-speed", "1", "--profiles", "un-r157"];
+    let files = ["--sheet", text(&page), "--series", text(&series)];
+    let sheet = json(&[&case[..], &more, &files].concat());
+    let (page, series) = (std::fs::read_to_string(&page).unwrap(), std::fs::read_to_string(&series).unwrap());
+    for model in sheet["profiles"][0]["models"].as_array().unwrap() {
+        let (name, brakes_s) = (model["model"].as_str().unwrap(), model["t_brake_s"].as_f64().unwrap());
+        let marked = series.lines().find(|row| row.starts_with(name) && row.ends_with("braking")).unwrap();
+        let of_series: f64 = marked.split(',').nth(1).unwrap().parse().unwrap();
+        assert!((of_series - brakes_s).abs() < 1e-9, "{name}: {of_series} {brakes_s}");
+        // The legend of the figure, and the row of the table.
+        let shown = format!("{:.3}", brakes_s);
+        let shown = shown.trim_end_matches('0');
+        let times = page.matches(&format!(">{shown} s<")).count() + page.matches(&format!(">{shown}<")).count();
+        assert!(times >= 2, "{name}: {shown} s is there {times} times");
+    }
+}
+
+/// 60 behind 45 km/h at 7.2 m: 0.628 s at lane intrusion, between the EU's threshold of 0.597 s and R157's of 0.697 s.
+#[test]
+fn the_demand_of_the_eu_stands_beside_that_of_r157() {
+    let case = ["check", "--category", "cut-in", "--ego-speed", "60km/h", "--speed", "45km/h", "--gap", "7.2"];
+    let (_, out, _) = check(&[&case[..], &["--lateral-speed", "1"]].concat());
+    assert!(
+        out.contains("5.2.5.2: no demand: (c) TTC at lane intrusion is 0.628 s, and has to be > 0.6972 s"),
+        "{out}"
+    );
+    assert!(out.contains("EU 2022/1426, 1.4.2: the system has to avoid the collision (robust)"), "{out}");
+    assert!(out.contains("EU 2022/1426, 1.4.2, standing: no demand: (c)"), "{out}");
+    let sheet = json(&[&case[..], &["--lateral-speed", "1"]].concat());
+    let demanded: Vec<_> = sheet["profiles"].as_array().unwrap().iter().map(|p| p["demanded"].as_bool()).collect();
+    assert_eq!(demanded[..3], [Some(false), Some(true), Some(false)]);
+}
+
+#[test]
+fn a_case_that_annex_3_does_not_describe_has_its_own_answer_and_status() {
+    let lvd = ["check", "--category", "lvd", "--ego-speed", "60km/h", "--speed", "20km/h", "--gap", "100"];
+    let (code, out, _) = check(&[&lvd[..], &["--acceleration=-0.01"]].concat());
+    assert_eq!(code, 10, "{out}");
+    let mut lines = out.lines();
+    let first = lines.next().unwrap();
+    assert!(first.starts_with("LVD under un-r157 (leader beyond 5 m/s², else the delay only): "), "{first}");
+    assert!(lines.next().unwrap().starts_with("outside Annex 3: the ego is faster than the leader from the start"));
+    let cut_out = |thw: &str| {
+        let flags = "check --category cut-out --ego-speed 70km/h --lateral-speed 1.5 --ahead-gap 8 --profiles un-r157";
+        let flags: Vec<&str> = flags.split(' ').chain(["--thw", thw]).collect();
+        check(&flags)
+    };
+    assert_eq!(cut_out("2.01").0, 10);
+    assert_ne!(cut_out("2.0").0, 10);
 }

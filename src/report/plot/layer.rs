@@ -92,6 +92,8 @@ pub struct Series {
 pub struct Rule {
     /// The lines, inside the plot's ranges.
     pub runs: Vec<Vec<(f64, f64)>>,
+    /// Name in the legend, which an empty one is not in.
+    pub name: String,
     /// `#rrggbb`.
     pub colour: &'static str,
     /// Width.
@@ -137,6 +139,12 @@ impl Rule {
             self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
         canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
+    }
+
+    /// A sample for the legend.
+    pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64) {
+        let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
+        canvas.path(&[vec![(x, y), (x + width_px, y)]], false, paint);
     }
 }
 

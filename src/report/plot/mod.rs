@@ -273,6 +273,11 @@ impl Figure {
                 entries.push((name, Entry::Fill(fill)));
             }
         }
+        for rule in self.plots.iter().flat_map(Plot::rules).filter(|rule| !rule.name.is_empty()) {
+            if entries.iter().all(|entry| entry.0 != rule.name.as_str()) {
+                entries.push((&rule.name, Entry::Rule(rule)));
+            }
+        }
         let half_px = TEXT_WIDTH_PX / 2.0;
         let fits = entries.iter().all(|(name, _)| TEXT.text_px(name) <= half_px - SAMPLE_TEXT_PX - 12.0);
         let columns = if fits { 2 } else { 1 };
@@ -284,6 +289,7 @@ impl Figure {
                 let middle = y + TEXT.line_px() / 2.0;
                 canvas.group("class=\"legend\"", "", |canvas| match entry {
                     Entry::Series(series, look) => series.sample(canvas, (x, middle), SAMPLE_PX, look),
+                    Entry::Rule(rule) => rule.sample(canvas, (x, middle), SAMPLE_PX),
                     Entry::Fill(fill) => fill.sample(canvas, (x + 17.0, middle - 9.0), (x + 39.0, middle + 9.0)),
                 });
                 let below = canvas.paragraph((x + SAMPLE_TEXT_PX, y), name, TEXT, width_px);
@@ -299,6 +305,7 @@ impl Figure {
 enum Entry<'a> {
     Series(&'a Series, Look),
     Fill(&'a Fill),
+    Rule(&'a Rule),
 }
 
 impl Plot {

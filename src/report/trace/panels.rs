@@ -71,7 +71,14 @@ pub(super) fn mark_dash(mark: StepMark) -> &'static str {
 
 /// A line through a panel.
 fn rule(ends: [(f64, f64); 2], colour: &'static str, width_px: f64, dash: &'static str) -> Rule {
-    Rule { runs: vec![ends.to_vec()], colour, width_px, dash, attributes: "class=\"level\"".to_owned() }
+    Rule {
+        runs: vec![ends.to_vec()],
+        colour,
+        width_px,
+        dash,
+        attributes: "class=\"level\"".to_owned(),
+        ..Rule::default()
+    }
 }
 
 /// What all panels show: the series up to a time.

@@ -6,7 +6,8 @@ use crate::model::driver::ModelId;
 use crate::{Error, Place, Result};
 
 use super::grid::Grid;
-use super::plan::GridPlan;
+use super::outcome::CellOutcome;
+use super::plan::{GridPart, GridPlan};
 
 /// The verdicts of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +16,9 @@ pub struct GridMap {
     pub models: Vec<ModelId>,
     /// Per model, per cell.
     verdicts: Vec<Vec<Verdicts>>,
-    /// Per model and criterion, the cells whose verdict a perturbation changes; empty where none was swept.
+    /// Per model, per cell: does an ego that never reacts collide? Models differ where each starts at its own distance.
+    conflicts: Vec<Vec<bool>>,
+    /// Per model and criterion, the cells whose outcome a perturbation changes; empty where none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
 
@@ -30,14 +33,22 @@ pub enum Agreement {
     OnlyFirst,
     /// The second fails alone.
     OnlySecond,
+    /// Both pass, and nothing collides even if the ego never reacts.
+    NoConflict,
     /// They differ, but one of them is undecided.
     Undecided,
 }
 
 impl Agreement {
     /// All, in the order of tables.
-    pub const ALL: [Agreement; 5] =
-        [Agreement::BothPass, Agreement::BothFail, Agreement::OnlyFirst, Agreement::OnlySecond, Agreement::Undecided];
+    pub const ALL: [Agreement; 6] = [
+        Agreement::BothPass,
+        Agreement::BothFail,
+        Agreement::OnlyFirst,
+        Agreement::OnlySecond,
+        Agreement::NoConflict,
+        Agreement::Undecided,
+    ];
 
     /// From the two.
     pub fn of(first_fails: bool, second_fails: bool) -> Agreement {
@@ -49,14 +60,27 @@ impl Agreement {
         }
     }
 
-    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`, `undecided`.
+    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`, `no_conflict`, `undecided`.
     pub fn key(self) -> &'static str {
         match self {
             Agreement::BothPass => "both_pass",
             Agreement::BothFail => "both_fail",
             Agreement::OnlyFirst => "only_first",
             Agreement::OnlySecond => "only_second",
+            Agreement::NoConflict => "no_conflict",
             Agreement::Undecided => "undecided",
+        }
+    }
+
+    /// The words of tables and legends.
+    pub fn label(self) -> &'static str {
+        match self {
+            Agreement::BothPass => "both pass",
+            Agreement::BothFail => "both fail",
+            Agreement::OnlyFirst => "only first fails",
+            Agreement::OnlySecond => "only second fails",
+            Agreement::NoConflict => CellOutcome::NoConflict.label(),
+            Agreement::Undecided => CellOutcome::Undecided.label(),
         }
     }
 }
@@ -70,32 +94,31 @@ impl GridMap {
     pub fn sweep(plan: &GridPlan, executor: &Executor) -> Result<(GridMap, SweepSummary)> {
         let cells = plan.grid.cell_count();
         let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
+        let mut conflicts = vec![vec![false; cells]; plan.models.len()];
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         for part in &plan.parts {
-            let lanes = &part.plan;
             // Where the part's models stand among all.
-            let of_part: Vec<Option<usize>> =
-                lanes.models.iter().map(|model| plan.models.iter().position(|m| m == model)).collect();
-            let per_unit = lanes.headways.len() * lanes.models.len();
-            let swept = executor.sweep(lanes, 0..lanes.unit_count(), Wanted::Verdicts, |chunk| {
-                for (units, of_unit) in (chunk.units.start..).zip(chunk.verdicts.chunks(per_unit.max(1))) {
-                    for (at, verdict) in of_unit.iter().enumerate() {
-                        let cell = part.cell(&plan.grid, units, at / lanes.models.len());
-                        if let Some(model) = of_part[at % lanes.models.len()] {
-                            verdicts[model][cell] = *verdict;
-                        }
-                    }
+            let position = |model: &ModelId| plan.models.iter().position(|m| m == model);
+            let of_part: Vec<Option<usize>> = part.plan.models.iter().map(position).collect();
+            let swept = sweep_cells(plan, part, &part.plan, executor, |at, cell, verdict| {
+                if let Some(model) = of_part[at] {
+                    verdicts[model][cell] = verdict;
                 }
-                Ok(())
+            })?;
+            summary.add(&swept);
+            let swept = sweep_cells(plan, part, &part.unreacting, executor, |_, cell, verdict| {
+                for model in of_part.iter().flatten() {
+                    conflicts[*model][cell] = verdict.failed(Criterion::Collision);
+                }
             })?;
             summary.add(&swept);
         }
-        let map = GridMap { models: plan.models.clone(), verdicts, undecided: Vec::new() };
+        let map = GridMap { models: plan.models.clone(), verdicts, conflicts, undecided: Vec::new() };
         map.check_ends(plan)?;
         Ok((map, summary))
     }
 
-    /// Marks the cells whose verdict is another one in a perturbed sweep of the same grid.
+    /// Marks the cells whose outcome is another one in a perturbed sweep of the same grid.
     pub fn mark_undecided(&mut self, perturbed: &GridMap) {
         let cells = self.cell_count();
         self.undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));
@@ -103,7 +126,9 @@ impl GridMap {
             for (criterion, marks) in Criterion::ALL.into_iter().zip(of_model) {
                 for (cell, mark) in marks.iter_mut().enumerate() {
                     let [ours, theirs] = [&*self.verdicts, &*perturbed.verdicts].map(|of| of[model][cell]);
-                    *mark |= ours.failed(criterion) != theirs.failed(criterion);
+                    let conflict_differs = self.conflicts[model][cell] != perturbed.conflicts[model][cell];
+                    *mark |= ours.failed(criterion) != theirs.failed(criterion)
+                        || criterion == Criterion::Collision && conflict_differs;
                 }
             }
         }
@@ -114,14 +139,37 @@ impl GridMap {
         !self.undecided.is_empty()
     }
 
-    /// Does a perturbation change the verdict of a model's cell? `false` where none was swept.
+    /// Does a perturbation change the outcome of a model's cell? `false` where none was swept.
     pub fn is_undecided(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
         self.undecided.get(model).is_some_and(|of_model| of_model[criterion as usize][cell])
     }
 
-    /// Cells whose verdict a perturbation changes.
-    pub fn undecided(&self, model: usize, criterion: Criterion) -> u64 {
-        (0..self.cell_count()).filter(|&cell| self.is_undecided(model, cell, criterion)).count() as u64
+    /// Does an ego that never reacts collide, from where the model starts?
+    pub fn is_conflict(&self, model: usize, cell: usize) -> bool {
+        self.conflicts[model][cell]
+    }
+
+    /// What the map says of a model's cell.
+    pub fn outcome(&self, model: usize, cell: usize, criterion: Criterion) -> CellOutcome {
+        let fails = self.verdicts[model][cell].failed(criterion);
+        // A conflict is a threatening collision: of the other criteria it says nothing.
+        let is_conflict = criterion != Criterion::Collision || self.is_conflict(model, cell);
+        match (self.is_undecided(model, cell, criterion), is_conflict, fails) {
+            (true, ..) => CellOutcome::Undecided,
+            (false, true, false) => CellOutcome::Pass,
+            (false, true, true) => CellOutcome::Fail,
+            (false, false, false) => CellOutcome::NoConflict,
+            (false, false, true) => CellOutcome::FailByReaction,
+        }
+    }
+
+    /// Cells of a model by outcome, in the order of [`CellOutcome::ALL`].
+    pub fn outcomes(&self, model: usize, criterion: Criterion) -> [u64; CellOutcome::ALL.len()] {
+        let mut counts = [0; CellOutcome::ALL.len()];
+        for cell in 0..self.cell_count() {
+            counts[self.outcome(model, cell, criterion) as usize] += 1;
+        }
+        counts
     }
 
     /// Some lane must end before the time cap; under a profile whose runs all go on to it, another vehicle must come
@@ -172,13 +220,36 @@ impl GridMap {
                 other.verdicts[second][cell].failed(criterion),
             );
             let is_undecided = self.is_undecided(first, cell, criterion) || other.is_undecided(second, cell, criterion);
+            let no_conflict =
+                criterion == Criterion::Collision && !self.is_conflict(first, cell) && !other.is_conflict(second, cell);
             match found {
+                Agreement::BothPass if no_conflict => Agreement::NoConflict,
                 Agreement::OnlyFirst | Agreement::OnlySecond if is_undecided => Agreement::Undecided,
                 found => found,
             }
         };
         (0..self.cell_count()).map(agreement).collect()
     }
+}
+
+/// Sweeps the lanes of a part; `take` receives the model's place in the plan, the cell and the verdict.
+fn sweep_cells(
+    plan: &GridPlan,
+    part: &GridPart,
+    lanes: &LanePlan,
+    executor: &Executor,
+    mut take: impl FnMut(usize, usize, Verdicts),
+) -> Result<SweepSummary> {
+    let models = lanes.models.len().max(1);
+    let per_unit = (lanes.headways.len() * models).max(1);
+    executor.sweep(lanes, 0..lanes.unit_count(), Wanted::Verdicts, |chunk| {
+        for (unit, of_unit) in (chunk.units.start..).zip(chunk.verdicts.chunks(per_unit)) {
+            for (at, verdict) in of_unit.iter().enumerate() {
+                take(at % models, part.cell(&plan.grid, unit, at / models), *verdict);
+            }
+        }
+        Ok(())
+    })
 }
 
 /// Is there a lane in which TTC and BTN look at another vehicle?
@@ -189,7 +260,7 @@ fn meets(plan: &LanePlan) -> bool {
 }
 
 /// Counts of the agreements, in the order of [`Agreement::ALL`].
-pub fn count(cells: &[Agreement]) -> [u64; 5] {
+pub fn count(cells: &[Agreement]) -> [u64; Agreement::ALL.len()] {
     Agreement::ALL.map(|kind| cells.iter().filter(|c| **c == kind).count() as u64)
 }
 

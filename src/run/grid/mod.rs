@@ -7,8 +7,10 @@
 mod axis;
 #[allow(clippy::module_inception)]
 mod grid;
+mod held;
 pub mod jrc_case;
 mod map;
+mod outcome;
 mod parameter;
 mod plan;
 pub mod presets;
@@ -19,6 +21,7 @@ pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
 pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use map::{Agreement, GridMap, boundary, count, runs};
+pub use outcome::CellOutcome;
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
 pub use robustness::{Perturbation, SPEED_MPS, without_reaction};

@@ -1,6 +1,8 @@
 //! From a grid to lane plans. Where the gap is an axis it is the plan's headways and a unit is a row of cells, whose
 //! lanes share one case; otherwise a unit is a cell and its gap is part of its case. Models that start at distances of
-//! their own have plans of their own.
+//! their own have plans of their own. Each plan has a second one: the same cases with an ego that never reacts.
+
+use std::sync::Arc;
 
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
@@ -12,7 +14,7 @@ use super::axis::GridAxis;
 use super::grid::Grid;
 use super::jrc_case;
 use super::parameter::{MapParameter, MapQuantity};
-use super::robustness::Perturbation;
+use super::robustness::{Perturbation, without_reaction};
 
 /// Name of the only variant.
 const VARIANT: &str = "cell";
@@ -31,6 +33,8 @@ pub struct GridPlan {
 pub struct GridPart {
     /// The plan: units are an interval, so it can be cut as any other.
     pub plan: LanePlan,
+    /// The same cases with an ego that never reacts: one lane per cell. What collides there is a conflict.
+    pub unreacting: LanePlan,
     layout: Layout,
 }
 
@@ -46,18 +50,22 @@ enum Layout {
 }
 
 /// The cases of a plan, made once: a table by unit.
+#[derive(Default)]
 struct GridCases {
     cases: Vec<LaneCase<f64>>,
     tables: Tables<f64>,
 }
 
-impl CaseSource for GridCases {
+/// Cases that two plans have in common.
+struct SharedCases(Arc<GridCases>);
+
+impl CaseSource for SharedCases {
     fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        self.cases[unit as usize]
+        self.0.cases[unit as usize]
     }
 
     fn tables(&self) -> &Tables<f64> {
-        &self.tables
+        &self.0.tables
     }
 }
 
@@ -93,7 +101,7 @@ impl GridPlan {
         GridPlan::new(self.grid.perturbed(perturbation), &perturbation.profile(profile)?, &self.models)
     }
 
-    /// Number of lanes.
+    /// Number of lanes of driver models.
     pub fn lane_count(&self) -> u64 {
         self.parts.iter().map(|part| part.plan.lane_count()).sum()
     }
@@ -116,7 +124,7 @@ impl GridPart {
             (Layout::Cells, None) => vec![Headway::GapM(0.0)],
         };
         let dt_s = profile.frame.dt_s;
-        let mut source = GridCases { cases: Vec::new(), tables: Tables::default() };
+        let mut source = GridCases::default();
         let mut names = Vec::new();
         for unit in 0..grid.cell_count() / headways.len() {
             let cell = layout.cell(grid, unit, 0);
@@ -141,8 +149,12 @@ impl GridPart {
             first_unit: 0,
             first_lane: 0,
         };
-        let plan = LanePlan::new(profile.clone(), models, headways, vec![block], Box::new(source))?;
-        Ok(GridPart { plan, layout })
+        let source = Arc::new(source);
+        let plan = |profile: Profile, models, headways, block| {
+            LanePlan::new(profile, models, headways, vec![block], Box::new(SharedCases(source.clone())))
+        };
+        let unreacting = plan(without_reaction(profile), vec![ModelId::Reg157], headways.clone(), block.clone())?;
+        Ok(GridPart { plan: plan(profile.clone(), models, headways, block)?, unreacting, layout })
     }
 
     /// The cell of a lane's unit and headway.

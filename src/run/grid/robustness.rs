@@ -126,5 +126,8 @@ pub fn without_reaction(profile: &Profile) -> Profile {
     without.reg157.always_unsafe.clear();
     // No vehicle overlaps the ego so far across the road.
     without.reg157.lateral_gate_m = -100.0;
+    // The delays of a driver that never reacts bound no time step.
+    (without.reg157.reaction_time_s, without.reg157.visible_lateral_movement_s) = (0.0, 0.0);
+    without.reg157.margin_s = 10.0;
     without
 }

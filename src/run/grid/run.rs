@@ -198,9 +198,9 @@ impl Map {
         })
     }
 
-    /// The lanes of all plans.
+    /// The lanes of all plans, those of an ego that never reacts included.
     pub fn lane_plans(&self) -> impl Iterator<Item = &LanePlan> {
-        self.plans().flat_map(|(_, plan)| plan.parts.iter().map(|part| &part.plan))
+        self.plans().flat_map(|(_, plan)| plan.parts.iter().flat_map(|part| [&part.plan, &part.unreacting]))
     }
 
     /// Cells of all grids.
@@ -208,7 +208,7 @@ impl Map {
         self.grids.iter().map(|grid| grid.plan.grid.cell_count() as u64).sum()
     }
 
-    /// Lanes of all plans.
+    /// Lanes of driver models in all plans.
     pub fn lane_count(&self) -> u64 {
         self.plans().map(|(_, plan)| plan.lane_count()).sum()
     }
