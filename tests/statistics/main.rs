@@ -4,6 +4,7 @@
 mod common;
 
 mod density;
+mod drawn_scenarios;
 mod estimator_coverage;
 mod estimators;
 mod estimators_on_lanes;

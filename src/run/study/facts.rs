@@ -8,7 +8,7 @@ use crate::Result;
 use crate::engine::Block;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
-use crate::scenario::parameterization::{ModeShape, ParameterizationOptions, Reduction};
+use crate::scenario::parameterization::{ModeShape, ParameterizationOptions};
 use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.
@@ -69,9 +69,9 @@ pub(super) fn category_facts(
         let of = count(&collection.scenarios, block.category);
         let reduction = planned.reductions.iter().find(|r| r.category == block.category);
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
-        let modes = reduction.map_or(Vec::new(), Reduction::mode_shapes);
         let kept: Vec<&Scenario> =
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
+        let modes = reduction.map_or(Ok(Vec::new()), |reduction| reduction.mode_shapes(&kept))?;
         let parameters = parameter_histograms(block.category, &kept, options)?;
         Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes })
     };
