@@ -21,15 +21,15 @@ fn is_valid(point: array<f32, MAX_PARAMETERS>) -> bool {
             return false;
         }
     }
-    if recipe.path == PATH_REDUCED {
-        let duration = reduced_column(point, recipe.columns.duration);
-        let ego_speed = reduced_column(point, recipe.columns.ego_speed);
-        var gap = 0.0;
-        if recipe.columns.lead_gap != NO_SLOT {
-            gap = reduced_column(point, recipe.columns.lead_gap);
+    for (var k = 0u; k < recipe.bounded; k++) {
+        let bound = recipe.bounds[k];
+        var value = reduced_column(point, bound.column);
+        if bound.is_distance != 0u {
+            value = abs(value);
         }
-        return (duration >= recipe.min_duration) & (duration <= recipe.longest_duration) & (ego_speed >= 0.0)
-            & (gap >= 0.0);
+        if !((value >= bound.lower) & (value <= bound.upper)) {
+            return false;
+        }
     }
     if recipe.decelerates != 0u {
         let initial = quantity(point, TARGET_SPEED);

@@ -2,6 +2,7 @@
 
 const MAX_PARAMETERS: u32 = 14u;
 const QUANTITIES: u32 = 11u;
+const MAX_BOUNDS: u32 = 8u;
 const NO_SLOT: u32 = 0xffffffffu;
 
 const TARGET_SPEED: u32 = 0u;
@@ -38,6 +39,14 @@ struct ReducedColumns {
     duration: u32,
 }
 
+// A column of a reconstruction that makes a draw invalid if it is out of bounds.
+struct ColumnBound {
+    column: u32,
+    is_distance: u32,
+    lower: f32,
+    upper: f32,
+}
+
 struct Recipe {
     path: u32,
     lateral: u32,
@@ -51,6 +60,8 @@ struct Recipe {
     columns: ReducedColumns,
     lower: array<f32, MAX_PARAMETERS>,
     upper: array<f32, MAX_PARAMETERS>,
+    bounded: u32,
+    bounds: array<ColumnBound, MAX_BOUNDS>,
     // s
     min_duration: f32,
     // s

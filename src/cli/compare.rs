@@ -120,7 +120,7 @@ impl Compare {
                 categories,
                 models: models.clone(),
                 headways: headways.clone(),
-                parameterization: config.parameterization.clone(),
+                parameterization: config.of_densities(),
             },
             parameterizations: ids.clone(),
             samples: self.samples,

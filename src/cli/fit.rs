@@ -67,6 +67,11 @@ pub struct Fit {
     /// Do not compare drawn with unseen scenarios
     #[arg(long)]
     no_comparison: bool,
+    /// Leave the recorded series out of the density files
+    ///
+    /// `sample` then cannot compare its rates with those of the recorded scenarios. For a file that is passed on.
+    #[arg(long)]
+    without_scenarios: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
@@ -83,7 +88,7 @@ impl Fit {
         let ids = self.ids()?;
         let typed = self.exposure.driven()?;
         let options = FitOptions {
-            parameterization: config.parameterization.clone(),
+            parameterization: config.of_densities(),
             with_thw: self.with_thw,
             rule: match self.bandwidth_rule {
                 BandwidthInterval::Reduction => BandwidthRule::Reduction,
@@ -124,7 +129,7 @@ impl Fit {
         for (id, file) in ids.iter().zip(files) {
             let result = DensityModel::fit(id.clone(), &collection.scenarios, &facts, &options);
             bar.inc(1);
-            let result = match result {
+            let mut result = match result {
                 Ok(result) => result,
                 Err(error @ Error::Input { .. }) => {
                     push_once(&mut failed, error);
@@ -134,6 +139,9 @@ impl Fit {
             };
             for error in result.left_out.iter().chain(&result.not_compared) {
                 bar.suspend(|| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
+            }
+            if self.without_scenarios {
+                result.model.scenarios.clear();
             }
             complete &= result.left_out.is_empty();
             fitted.push((file, result.model));

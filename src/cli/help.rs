@@ -107,6 +107,7 @@ const FLAGS: [Group; 5] = [
             "compare_reference",
             "bandwidth_rule",
             "no_comparison",
+            "without_scenarios",
             "valid_draws",
             "published",
             "pilot",

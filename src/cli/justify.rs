@@ -106,7 +106,7 @@ impl Justify {
                     categories: vec![id.category],
                     models: vec![model],
                     headways,
-                    parameterization: config.parameterization.clone(),
+                    parameterization: config.of_densities(),
                 },
                 parameterizations: vec![id],
                 samples: config.compare.samples,

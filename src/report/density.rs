@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use super::tables::{aligned, table};
-use crate::stats::density::{DensityModel, Exposure, Rate, Representativeness, SearchEnd, standard_deviation};
+use crate::stats::density::{
+    DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidShare, standard_deviation,
+};
 use crate::support::readable::{count, count_of, significant};
 
 /// Everything of one density but its kernels.
@@ -56,6 +58,9 @@ pub fn text(model: &DensityModel) -> String {
         count(valid.draws),
         valid.seed
     );
+    if !valid.refused.is_empty() {
+        let _ = writeln!(text, "refused    {}", refused(valid));
+    }
     let _ = writeln!(text, "exposure   {}", model.exposure.as_ref().map_or(UNKNOWN.to_owned(), exposure));
     if let Some(representativeness) = &model.representativeness {
         text.push_str(&compared(representativeness));
@@ -93,6 +98,15 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
         "exposure": model.exposure,
         "representativeness": model.representativeness,
     })
+}
+
+/// Which fraction of the draws every bound refuses.
+fn refused(valid: &ValidShare) -> String {
+    let of = |refused: &Refused| {
+        let percent = 100.0 * refused.draws as f64 / valid.draws as f64;
+        format!("{} % of the draws by {} (valid is {})", significant(percent, 2), refused.parameter, refused.bound)
+    };
+    valid.refused.iter().map(of).collect::<Vec<_>>().join("\n           ")
 }
 
 const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";

@@ -16,7 +16,7 @@ use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, Levels, RiskRate, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, StopReason};
+use crate::stats::estimate::{IntervalKind, Ratio, StopReason};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::{Error, Result};
 
@@ -279,6 +279,8 @@ impl EstimateFile {
         let mut header = ["model", "criterion", "THW", "failures", "P", "interval", "±"].map(str::to_owned).to_vec();
         header.extend(has_hours.then(|| "per hour".to_owned()));
         header.extend(has_kilometres.then(|| "per 1000 km".to_owned()));
+        let has_recorded = self.estimates.iter().any(|r| r.recorded.is_some_and(|recorded| recorded.sampled.is_some()));
+        header.extend(has_recorded.then(|| "P/S".to_owned()));
         header.push("verdict".to_owned());
         let mut rows = table(header);
         for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
@@ -299,6 +301,7 @@ impl EstimateFile {
             ];
             fields.extend(has_hours.then(|| rate_text(row.risk.per_hour)));
             fields.extend(has_kilometres.then(|| rate_text(row.risk.per_1000_km)));
+            fields.extend(has_recorded.then(|| ratio_text(row.recorded.and_then(|recorded| recorded.sampled))));
             fields.push(e.trust.verdict().to_string());
             rows.add_row(fields);
         }
@@ -320,6 +323,9 @@ impl EstimateFile {
         }
         if let Some(rule) = self.exposure_rule() {
             let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
+        }
+        if let Some(rule) = self.recorded_rule() {
+            let _ = writeln!(text, "{}", wrap(rule, WIDTH));
         }
         let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
         let rule = format!(
@@ -406,6 +412,13 @@ pub(super) fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
         IntervalKind::RuleOfThree => format!("≤ {}", short(high)),
         _ => format!("{} … {}", short(low), short(high)),
     }
+}
+
+/// `2.16 (1.5…3.1)`.
+pub(super) fn ratio_text(ratio: Option<Ratio>) -> String {
+    let end = |value: Option<f64>| value.map_or("∞".to_owned(), short);
+    let told = |r: Ratio| Some(format!("{} ({}…{}) {}", short(r.ratio?), end(r.low), end(r.high), r.verdict.mark()));
+    ratio.and_then(told).unwrap_or_else(|| "–".to_owned())
 }
 
 pub(super) fn rate_text(rate: Option<RiskRate>) -> String {

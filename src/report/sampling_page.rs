@@ -2,7 +2,7 @@
 
 use super::html::{Page, PageFigure, PageTable, Section};
 use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, interval_text, rate_text, short};
+use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -72,6 +72,7 @@ impl EstimateFile {
             ];
             fields.push(rate_text(row.risk.per_hour));
             fields.push(rate_text(row.risk.per_1000_km));
+            fields.push(ratio_text(row.recorded.and_then(|recorded| recorded.sampled)));
             fields.push(e.trust.verdict().to_string());
             fields
         };
@@ -86,6 +87,7 @@ impl EstimateFile {
             "± in %",
             "per hour",
             "per 1000 km",
+            "P/S",
             "verdict",
         ];
         let overall: Vec<&EstimateRow> = self.estimates.iter().filter(|r| r.is_overall(&self.estimates)).collect();
@@ -147,7 +149,7 @@ impl EstimateFile {
                         count_of(kernels)
                     ),
                 },
-                [self.mean_rule(), self.exposure_rule()]
+                [self.mean_rule(), self.exposure_rule(), self.recorded_rule().map(str::to_owned)]
                     .into_iter()
                     .flatten()
                     .map(|rule| rule + ". ")

@@ -7,7 +7,7 @@ use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, WorstSample};
-use crate::stats::estimate::IntervalKind;
+use crate::stats::estimate::{IntervalKind, Ratio};
 
 impl EstimateFile {
     /// `estimates.csv`.
@@ -47,6 +47,12 @@ impl EstimateFile {
             "risk_per_1000_km_sd",
             "risk_per_1000_km_low",
             "risk_per_1000_km_high",
+            "replayed_ratio",
+            "replayed_ratio_low",
+            "replayed_ratio_high",
+            "sampled_ratio",
+            "sampled_ratio_low",
+            "sampled_ratio_high",
             "verdict",
             "data",
         ];
@@ -83,6 +89,9 @@ impl EstimateFile {
             fields.extend(numbers.map(number));
             fields.extend(rate(row.risk.per_hour).map(number));
             fields.extend(rate(row.risk.per_1000_km).map(number));
+            let of = |r: Option<Ratio>| r.map_or([None; 3], |r| [r.ratio, r.low, r.high]);
+            fields.extend(of(row.recorded.map(|recorded| recorded.replayed)).map(number));
+            fields.extend(of(row.recorded.and_then(|recorded| recorded.sampled)).map(number));
             fields.push(e.trust.verdict().to_string());
             fields.push(self.density.provenance.data.clone());
             rows.push(fields);
@@ -227,6 +236,15 @@ impl EstimateFile {
              imposed, not observed; a density fitted with --with-thw draws them"
                 .to_owned()
         })
+    }
+
+    /// What the ratio to recorded scenarios and the verdict say; `None` where nothing is compared.
+    pub(super) fn recorded_rule(&self) -> Option<&'static str> {
+        self.estimates.iter().any(|row| row.recorded.is_some()).then_some(
+            "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
+             high, < too low, ? undecided. Sound: no warning, and S' (the same scenarios under this parameterization) and \
+             the samples both fail as often as S: the intervals of S'/S and P/S lie within 0.80 to 1.25",
+        )
     }
 
     /// What the intervals hold besides the draws.

@@ -288,7 +288,8 @@ pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], d
         subtitle: Some(data.to_owned()),
         caption:
             "Lines: the mean of the mined scenarios, and the scenario one standard deviation of a coefficient away \
-                  from it. Bars: share of the scaled variance that the first coefficients explain together."
+                  from it; lateral positions are positive on the target's side, and a left-positive decomposition \
+                  shows the side with more scenarios. Bars: share of the scaled variance that the first coefficients explain together."
                 .to_owned(),
         plots: shapes.iter().map(panel).chain([share]).collect(),
         ..Figure::default()

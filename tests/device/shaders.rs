@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use crate::wgsl::{
     Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments,
 };
-use lanesweep::engine::generated::{self, ATTEMPTS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns};
+use lanesweep::engine::generated::{
+    self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
+};
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
 use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv, wanted_code};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts, Wanted};
@@ -75,9 +77,11 @@ fn generator_records() -> Vec<Record> {
             width: u32, instants: u32, coefficients: u32, lateral: u32, speed: u32, lead_speed: u32, ego_speed: u32,
             lead_gap: u32, duration: u32,
         }),
+        record!("ColumnBound", ColumnBound, { column: u32, is_distance: u32, lower: f32, upper: f32 }),
         record!("Recipe", Recipe, {
             path: u32, lateral: u32, dimensions: u32, pair: u32, decelerates: u32, unlimited: u32, judged: u32,
             step_cap: u32, slots: [u32; 11], columns: ReducedColumns, lower: [f32; 14], upper: [f32; 14],
+            bounded: u32, bounds: [ColumnBound; 8],
             min_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
             half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32,
             attention: [AttentionRule<f32>; MODELS],
@@ -146,6 +150,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     }
     for (name, value) in [
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
+        ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),

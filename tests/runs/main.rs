@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod against_recorded;
 mod compare;
 mod faults;
 mod interrupted;

@@ -352,7 +352,7 @@ fn draws_of_a_proposal_tell_their_scenarios_by_the_kernels_that_explain_them() {
 fn bad_input_is_told_with_its_place_and_what_to_do() {
     let (dir, path) = folder();
     let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(dir.path().join("newer.json"), text.replace("\"lanesweep_density\": 1", "\"lanesweep_density\": 2"))
+    std::fs::write(dir.path().join("newer.json"), text.replace("\"lanesweep_density\": 2", "\"lanesweep_density\": 3"))
         .unwrap();
     std::fs::write(dir.path().join("cut.json"), &text[..text.len() / 2]).unwrap();
     std::fs::write(dir.path().join("edited.json"), text.replacen("0.", "1.", 1)).unwrap();

@@ -42,8 +42,12 @@ fn weights_singular_values_and_reconstructions_equal_those_of_numpy() {
     let golden: serde_json::Value = serde_json::from_str(&text).unwrap();
     let (lvd, cut_in) = (rows(&golden["lvd_data"]), rows(&golden["cutin_data"]));
     let cases = golden["cases"].as_array().unwrap();
-    check_case(&cases[1], &fit_svd(&lvd, 1, 50, 5, SeriesScale::PerInstant, "golden LVDs").unwrap(), &lvd);
-    check_case(&cases[2], &fit_svd(&cut_in, 2, 50, 5, SeriesScale::PerInstant, "golden cut-ins").unwrap(), &cut_in);
+    check_case(&cases[1], &fit_svd(&lvd, (1, None), 50, 5, SeriesScale::PerInstant, "golden LVDs").unwrap(), &lvd);
+    check_case(
+        &cases[2],
+        &fit_svd(&cut_in, (2, None), 50, 5, SeriesScale::PerInstant, "golden cut-ins").unwrap(),
+        &cut_in,
+    );
 }
 
 #[test]
@@ -53,7 +57,7 @@ fn the_explained_variance_of_288_real_cut_ins_is_the_published_one() {
     let rows: Vec<Vec<f64>> =
         reader.records().map(|r| r.unwrap().iter().map(|x| x.parse().unwrap()).collect()).collect();
     assert_eq!(rows.len(), 288);
-    let basis = fit_svd(&rows, 2, 50, 5, SeriesScale::PerInstant, "TNO cut-ins").unwrap();
+    let basis = fit_svd(&rows, (2, None), 50, 5, SeriesScale::PerInstant, "TNO cut-ins").unwrap();
     for (ours, published) in basis.explained().iter().zip([39.9, 73.6, 99.3, 99.8, 100.0]) {
         assert!((100.0 * ours - published).abs() < 0.1, "{} instead of {published} %", 100.0 * ours);
     }
@@ -64,7 +68,7 @@ fn all_coefficients_together_give_the_scenario_back() {
     let text = std::fs::read_to_string(common::golden("svd.json")).unwrap();
     let golden: serde_json::Value = serde_json::from_str(&text).unwrap();
     let data = rows(&golden["lvd_data"]);
-    let basis = fit_svd(&data, 1, 50, 5, SeriesScale::PerInstant, "golden LVDs").unwrap();
+    let basis = fit_svd(&data, (1, None), 50, 5, SeriesScale::PerInstant, "golden LVDs").unwrap();
     for z in &data {
         let rebuilt = basis.reconstruct(&basis.coefficients(z, basis.singular_values.len()));
         assert!(z.iter().zip(&rebuilt).all(|(a, b)| (a - b).abs() < 1e-9));
@@ -74,10 +78,10 @@ fn all_coefficients_together_give_the_scenario_back() {
 #[test]
 fn too_few_scenarios_and_a_missing_spread_are_errors_that_say_what_to_do() {
     let few = vec![vec![1.0, 2.0, 3.0]; 4];
-    let error = fit_svd(&few, 1, 2, 5, SeriesScale::PerInstant, "cut-in scenarios").unwrap_err();
+    let error = fit_svd(&few, (1, None), 2, 5, SeriesScale::PerInstant, "cut-in scenarios").unwrap_err();
     assert!(error.to_string().contains("4 scenarios are too few"), "{error}");
     assert!(error.help().unwrap().contains("at least 6"), "{error:?}");
     let same = vec![vec![1.0, 2.0, 3.0]; 9];
-    let error = fit_svd(&same, 1, 2, 5, SeriesScale::PerInstant, "cut-in scenarios").unwrap_err();
+    let error = fit_svd(&same, (1, None), 2, 5, SeriesScale::PerInstant, "cut-in scenarios").unwrap_err();
     assert!(error.to_string().contains("cannot be scaled"), "{error}");
 }

@@ -163,7 +163,7 @@ fn transport_and_representativeness_are_those_of_the_published_program() {
     // Scenarios drawn under the reduction: coefficients with unit vectors u, as the golden has them.
     let svd = golden("svd.json");
     let data = rows(&svd["cutin_data"]);
-    let basis = fit_svd(&data, 2, 50, 5, SeriesScale::PerInstant, "golden cut-ins").unwrap();
+    let basis = fit_svd(&data, (2, None), 50, 5, SeriesScale::PerInstant, "golden cut-ins").unwrap();
     let weighted: Vec<Vec<f64>> =
         data.iter().map(|z| z.iter().zip(&basis.weights).map(|(z, w)| z * w).collect()).collect();
     let generated: Vec<Vec<f64>> = rows(&golden_w["kde_samples_U"])
@@ -502,7 +502,7 @@ fn a_density_file_gives_the_same_density_to_the_last_bit() {
         write_density(&path, &written).unwrap();
         let read = read_density(&path).unwrap();
         assert_eq!(read.kde, written.kde);
-        assert_eq!((read.valid, read.sizes, read.exposure), (written.valid, written.sizes, written.exposure));
+        assert_eq!((&read.valid, read.sizes, read.exposure), (&written.valid, written.sizes, written.exposure));
         assert_eq!(read.provenance, written.provenance);
         assert_eq!(read.space.parameters(), written.space.parameters());
         assert_eq!(read.content_sha256().unwrap(), written.content_sha256().unwrap());
@@ -535,8 +535,8 @@ fn spoiled_density_files_are_told_with_file_and_reason() {
     };
     let first_kernel = good.split("\"kernels\": [[").nth(1).unwrap().split(']').next().unwrap().to_owned();
     for (text, expected) in [
-        (edited("\"lanesweep_density\": 1", "\"lanesweep_density\": 2"), "version 2, but this program reads version 1"),
-        (edited("\"lanesweep_density\": 1,", ""), "`lanesweep_density` is missing"),
+        (edited("\"lanesweep_density\": 2", "\"lanesweep_density\": 3"), "version 3, but this program reads version 2"),
+        (edited("\"lanesweep_density\": 2,", ""), "`lanesweep_density` is missing"),
         (edited("\"scale\"", "\"scales\""), "unknown field `scales`"),
         (edited("\"with_thw\": true,", ""), "missing field `with_thw`"),
         (edited(&first_kernel, "1e999, 1, 1, 1"), "number out of range"),

@@ -5,6 +5,7 @@ mod common;
 
 mod claim_coverage;
 mod density;
+mod drawn_scenarios;
 mod estimator_coverage;
 mod estimators;
 mod estimators_on_lanes;

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
 use crate::run::score::ScoreOptions;
-use crate::scenario::parameterization::ParameterizationOptions;
+use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -48,6 +48,11 @@ impl Settings {
         self.parameterization.validate()?;
         self.score.validate()?;
         self.justify.validate()
+    }
+
+    /// Options of the parameterizations of densities, and of replays that stand beside them.
+    pub fn of_densities(&self) -> ParameterizationOptions {
+        ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
     }
 }
 
@@ -90,6 +95,8 @@ impl Default for RunSettings {
 pub struct FitSettings {
     /// Search interval of the bandwidth.
     pub bandwidth_rule: BandwidthInterval,
+    /// Sign of the lateral series of densities and of what `compare` and `justify` set beside them.
+    pub svd_lateral: SvdLateral,
     /// Seed of P_valid and of the splits for M.
     pub seed: u64,
     /// Number of draws for P_valid; 10^9 tell it to 0.01 % where it is 0.1.
@@ -102,6 +109,7 @@ impl Default for FitSettings {
         let options = crate::stats::density::FitOptions::default();
         FitSettings {
             bandwidth_rule: BandwidthInterval::default(),
+            svd_lateral: options.parameterization.svd_lateral,
             seed: options.seed,
             valid_draws: options.valid_draws,
         }

@@ -30,15 +30,12 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
             return false;
         }
     }
-    if recipe.path() == CasePath::Reduced {
-        let columns = &recipe.columns;
-        let duration = column::<f32>(recipe, basis, point, columns.duration);
-        let ego_speed = column::<f32>(recipe, basis, point, columns.ego_speed);
-        let gap = if columns.lead_gap == NO_SLOT { 0.0 } else { column(recipe, basis, point, columns.lead_gap) };
-        return duration >= recipe.min_duration
-            && duration <= recipe.longest_duration
-            && ego_speed >= 0.0
-            && gap >= 0.0;
+    for bound in &recipe.bounds[..recipe.bounded as usize] {
+        let value = column::<f32>(recipe, basis, point, bound.column);
+        let value = if bound.is_distance != 0 { value.abs() } else { value };
+        if !(value >= bound.lower && value <= bound.upper) {
+            return false;
+        }
     }
     if recipe.decelerates != 0 {
         let (initial, end) = (at(recipe, point, Variable::TargetSpeed), at(recipe, point, Variable::FinalSpeed));

@@ -9,7 +9,7 @@ mod points;
 mod recipe;
 
 pub use points::{ATTEMPTS, DrawnPoint, MAX_PARAMETERS, PointSource, Points};
-pub use recipe::{CasePath, LateralPath, NO_SLOT, Recipe, ReducedColumns};
+pub use recipe::{CasePath, ColumnBound, LateralPath, MAX_BOUNDS, NO_SLOT, Recipe, ReducedColumns};
 
 use crate::model::scalar::Real;
 use crate::scenario::Tables;

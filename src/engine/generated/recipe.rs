@@ -92,6 +92,23 @@ pub struct ReducedColumns {
     pub duration: u32,
 }
 
+/// Bounded columns of a reconstruction at most.
+pub const MAX_BOUNDS: usize = 8;
+
+/// A column of a reconstruction that makes a draw invalid where it is out of bounds.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ColumnBound {
+    /// The column.
+    pub column: u32,
+    /// 1 where its size is bounded.
+    pub is_distance: u32,
+    /// Least valid value.
+    pub lower: f32,
+    /// Largest valid value.
+    pub upper: f32,
+}
+
 /// From a point to a case. Words and binary32 numbers only: host and device hold the same bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,6 +137,10 @@ pub struct Recipe {
     pub lower: [f32; MAX_PARAMETERS],
     /// Largest valid value of each parameter.
     pub upper: [f32; MAX_PARAMETERS],
+    /// Bounded columns; 0 on kinematic paths.
+    pub bounded: u32,
+    /// The bounds of a reconstruction.
+    pub bounds: [ColumnBound; MAX_BOUNDS],
     /// Least valid T that follows from other numbers, s.
     pub min_duration: f32,
     /// Largest valid T that follows from other numbers, s.
@@ -144,7 +165,9 @@ pub struct Recipe {
 
 const _: () = assert!(size_of::<AttentionRule<f32>>() == 16);
 const _: () = assert!(size_of::<ReducedColumns>() == 36);
-const _: () = assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 5 + 4 + 2) + 16 * MODELS);
+const _: () = assert!(size_of::<ColumnBound>() == 16);
+const _: () =
+    assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 1 + 5 + 4 + 2) + 16 * (MAX_BOUNDS + MODELS));
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Recipe {}

@@ -116,7 +116,7 @@ fn failures(confusion: &Confusion<u32>, variant: usize) -> u64 {
 /// [`Error::Internal`] where the density was fitted on others.
 pub fn kernel_scenarios(density: &DensityModel, scenarios: &[Scenario]) -> Result<Vec<usize>> {
     let kept = scenarios.iter().filter(|s| s.category == density.category() && s.kept);
-    let is_kernel = |s: &Scenario| density.space.point(s).is_ok_and(|point| density.space.is_valid(&point));
+    let is_kernel = |s: &Scenario| density.space.point(s).is_ok_and(|point| density.space.check(&point).is_ok());
     let used: Vec<usize> = kept.enumerate().filter(|(_, s)| is_kernel(s)).map(|(at, _)| at).collect();
     if used.len() != density.kde.points().len() {
         let problem = format!("{} kernels, but {} scenarios", density.kde.points().len(), used.len());

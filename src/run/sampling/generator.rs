@@ -2,7 +2,8 @@
 
 use crate::engine::attention_rules;
 use crate::engine::generated::{
-    CasePath, Generator, LateralPath, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe, ReducedColumns,
+    CasePath, ColumnBound, Generator, LateralPath, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe,
+    ReducedColumns,
 };
 use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
 use crate::model::scalar::Real;
@@ -123,7 +124,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         (_, lead) => lead.unwrap_or(sizes.target),
     };
     let (mut lower, mut upper) = ([f32::MIN; MAX_PARAMETERS], [f32::MAX; MAX_PARAMETERS]);
-    for (j, parameter) in space.parameters().iter().enumerate() {
+    for (j, parameter) in space.drawn_parameters().iter().enumerate() {
         if let Some(bound) = parameter.lower {
             lower[j] = at_least(bound, parameter.lower_excluded);
         }
@@ -148,6 +149,8 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         columns: columns(space),
         lower,
         upper,
+        bounded: space.bounded_columns().len() as u32,
+        bounds: bounds(space)?,
         min_duration: at_least(min_duration, false),
         longest_duration: at_most(longest_duration),
         dt: frame.dt_s as f32,
@@ -178,6 +181,24 @@ fn at_least(bound: f64, excluded: bool) -> f32 {
 fn at_most(bound: f64) -> f32 {
     let rounded = bound as f32;
     if f64::from(rounded) <= bound { rounded } else { rounded.next_down() }
+}
+
+/// What a draw's reconstruction must keep.
+fn bounds(space: &ParameterSpace) -> Result<[ColumnBound; MAX_BOUNDS]> {
+    let mut bounds = [ColumnBound::default(); MAX_BOUNDS];
+    if space.bounded_columns().len() > MAX_BOUNDS {
+        return Err(Error::Internal(format!("{} has more than {MAX_BOUNDS} bounded columns", space.id().name())));
+    }
+    for (bound, bounded) in bounds.iter_mut().zip(space.bounded_columns()) {
+        let parameter = &bounded.parameter;
+        *bound = ColumnBound {
+            column: bounded.column as u32,
+            is_distance: u32::from(bounded.is_distance),
+            lower: parameter.lower.map_or(f32::MIN, |lower| at_least(lower, parameter.lower_excluded)),
+            upper: parameter.upper.map_or(f32::MAX, at_most),
+        };
+    }
+    Ok(bounds)
 }
 
 fn columns(space: &ParameterSpace) -> ReducedColumns {

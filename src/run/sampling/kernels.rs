@@ -10,7 +10,7 @@ use crate::stats::estimate::{ClusterRate, Clusters, cluster_rate};
 
 /// Groups that kernels are counted in, at most: kernel k counts in group k mod 512. Fewer kernels are groups of their
 /// own; of more, groups vary as much as kernels do, and a journal stays small.
-const MAX_GROUPS: usize = 512;
+pub(super) const MAX_GROUPS: usize = 512;
 
 /// A sample without a kernel: void.
 pub(super) const NO_KERNEL: u32 = u32::MAX;
@@ -80,11 +80,16 @@ impl KernelCounts {
 
     /// The rate of failed lanes over some cells (headway × model × criterion), each kernel being a cluster.
     pub(super) fn rate(&self, cells: &[usize], level: f64) -> ClusterRate {
-        let groups = self.samples.len();
-        let runs: Vec<u64> = self.samples.iter().map(|n| n * cells.len() as u64).collect();
-        let of_group = |group: usize| cells.iter().map(|cell| self.failures[cell * groups + group]).sum();
-        let failures: Vec<u64> = (0..groups).map(of_group).collect();
+        let (runs, failures) = self.over(cells);
         cluster_rate(Clusters { runs: &runs, failures: &failures }, level)
+    }
+
+    /// Lanes and failed ones over some cells, group by group.
+    pub(super) fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
+        let groups = self.samples.len();
+        let runs = self.samples.iter().map(|n| n * cells.len() as u64).collect();
+        let of_group = |group: usize| cells.iter().map(|cell| self.failures[cell * groups + group]).sum();
+        (runs, (0..groups).map(of_group).collect())
     }
 }
 

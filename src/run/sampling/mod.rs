@@ -3,6 +3,7 @@
 //! [`Sample`] is the way in: it plans a run of any estimator, runs it whole or in shards, resumes and merges it. Densities
 //! and estimators come from [`crate::stats`], lanes run in [`crate::engine`].
 
+mod against_recorded;
 mod compare;
 mod conditional;
 mod crude;
@@ -27,6 +28,7 @@ mod weighted;
 pub(crate) mod weighted_plan;
 mod weighted_tally;
 
+pub use against_recorded::RecordedRatios;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,

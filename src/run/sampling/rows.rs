@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::against_recorded::RecordedRatios;
 use super::risk::Risk;
 use super::tally::SampleTally;
 use crate::engine::LanePlan;
@@ -30,6 +31,8 @@ pub struct EstimateRow {
     pub failing_scenarios: Option<f64>,
     /// Failures per hour and per 1,000 km, where the exposure is known.
     pub risk: Risk,
+    /// Ratios to the rate of the recorded scenarios, where the density holds them.
+    pub recorded: Option<RecordedRatios>,
 }
 
 impl EstimateRow {
@@ -43,7 +46,7 @@ impl EstimateRow {
     ) -> EstimateRow {
         let draws = [estimate.interval.low, estimate.interval.high];
         let risk = Risk::of(&estimate, exposure);
-        EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk }
+        EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk, recorded: None }
     }
 
     /// The same with the uncertainty of the data in it, or a warning that it is not.

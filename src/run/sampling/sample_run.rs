@@ -39,6 +39,10 @@ impl Sample {
     /// # Errors
     /// Of the lanes.
     pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
+        self.against_recorded(self.sampled(executor)?)
+    }
+
+    fn sampled(&self, executor: &Executor) -> Result<SampleResult> {
         match &self.0 {
             SampleKind::Crude(plan, stop) => {
                 let units = plan.plan.unit_count();
@@ -54,7 +58,7 @@ impl Sample {
             }
             SampleKind::Pilot(plan, pilot) => {
                 let found = plan.as_ref().clone().after_pilot(None, |plan| plan.pilots(pilot, executor))?;
-                Sample(SampleKind::Weighted(Box::new(found))).run(executor)
+                Sample(SampleKind::Weighted(Box::new(found))).sampled(executor)
             }
             SampleKind::Sequential(run) => run.run(executor),
         }
@@ -143,6 +147,7 @@ impl Sample {
                 return Err(Error::Internal("a plan file of a run that cannot be split".to_owned()));
             }
         };
+        let result = sample.against_recorded(result)?;
         Ok((sample, result))
     }
 }
@@ -224,18 +229,19 @@ impl SampleRun<'_> {
     /// Takes the estimates of a whole run.
     ///
     /// # Errors
-    /// [`Error::Internal`] before anything was sampled.
+    /// [`Error::Internal`] before anything was sampled; of the lanes of recorded scenarios.
     pub fn take_result(&mut self) -> Result<SampleResult> {
-        match (&mut self.state, &self.sample.0) {
+        let result = match (&mut self.state, &self.sample.0) {
             (State::Weighted(state), SampleKind::Weighted(planned)) => {
                 let tally = state.ledger.counts(0..planned.facts.samples)?;
-                SampleResult::of_weighted(planned, tally, Place::file(&self.run_dir.out))
+                SampleResult::of_weighted(planned, tally, Place::file(&self.run_dir.out))?
             }
             _ => {
                 let nothing = || Error::Internal("nothing was sampled".to_owned());
-                Ok(SampleResult::of_crude(self.crude.take().ok_or_else(nothing)?))
+                SampleResult::of_crude(self.crude.take().ok_or_else(nothing)?)
             }
-        }
+        };
+        self.sample.against_recorded(result)
     }
 
     /// The files that a whole run leaves in its folder.

@@ -9,7 +9,7 @@ use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
-use crate::scenario::parameterization::{ModeShape, ParameterizationOptions, Reduction};
+use crate::scenario::parameterization::{ModeShape, ParameterizationOptions};
 use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.
@@ -73,9 +73,9 @@ pub(super) fn category_facts(
         let of = count(&collection.scenarios, block.category);
         let reduction = planned.reductions.iter().find(|r| r.category == block.category);
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
-        let modes = reduction.map_or(Vec::new(), Reduction::mode_shapes);
         let kept: Vec<&Scenario> =
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
+        let modes = reduction.map_or(Ok(Vec::new()), |reduction| reduction.mode_shapes(&kept))?;
         let parameters = parameter_histograms(block.category, &kept, options)?;
         let is_observed = Headway::is_observed(&planned.cases.outline().headways);
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };

@@ -51,7 +51,8 @@ pub enum SeriesScale {
 pub enum SvdLateral {
     /// Left positive, as published; the reconstruction is mirrored by the recorded side.
     Signed,
-    /// Positive on the side the target comes from or leaves to.
+    /// Positive on the side the target comes from or leaves to; the series' unit is its root mean square distance from
+    /// the lane's centre, which is the spread of as many left as right ones.
     Mirrored,
 }
 
@@ -114,6 +115,12 @@ impl Default for ParameterizationOptions {
 }
 
 impl ParameterizationOptions {
+    /// The defaults of densities: `svd_lateral` is [`SvdLateral::Mirrored`], because kernels around left-positive series
+    /// of left and right scenarios spill into the ego's lane between them.
+    pub fn of_densities() -> ParameterizationOptions {
+        ParameterizationOptions { svd_lateral: SvdLateral::Mirrored, ..ParameterizationOptions::default() }
+    }
+
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
         let bad = |key: &str, value: &dyn std::fmt::Display, help: &str| {

@@ -171,6 +171,17 @@ impl Parameter {
         of_unit.map_or([f64::MIN_POSITIVE, f64::MAX], |&(_, smallest, largest)| [smallest, largest])
     }
 
+    /// The same with bounds that lie within the physical range of its quantity.
+    pub fn within_physics(&self) -> Parameter {
+        let Some(quantity) = self.quantity() else { return self.clone() };
+        let (least, largest) = quantity.limits().physical;
+        Parameter {
+            lower: Some(self.lower.map_or(least, |lower| lower.max(least))),
+            upper: Some(self.upper.map_or(largest, |upper| upper.min(largest))),
+            ..self.clone()
+        }
+    }
+
     /// The bounds in words: `≥ 0`, `> 0`, `0.1 … 600`, `any`.
     pub fn bounds_text(&self) -> String {
         let sign = if self.lower_excluded { ">" } else { "≥" };

@@ -9,7 +9,7 @@ use super::parameter::{MIN_DURATION_S, Variable};
 use super::series::{SeriesCase, TimeGrid, at};
 use super::sizes::{Sizes, vehicle_ahead};
 use super::svd::{SvdBasis, fit_svd};
-use crate::scenario::{Case, Category, Scenario};
+use crate::scenario::{Case, Category, Scenario, Side};
 use crate::{Error, Result};
 
 /// Directions whose mode shapes are shown.
@@ -72,8 +72,10 @@ impl Reduction {
         let rows = scenarios.iter().map(|s| vector(s, options)).collect::<Result<Vec<_>>>()?;
         let needed = Parameterization::max_coefficients(category);
         let name = format!("{} scenarios", category.label());
-        let series = layout(category).0.len();
-        let basis = fit_svd(&rows, series, options.svd_instants, needed, options.series_scale, &name)?;
+        let series = layout(category).0;
+        let lateral = series.contains(&ReducedSeries::Lateral).then_some(options.svd_lateral);
+        let of = (series.len(), lateral);
+        let basis = fit_svd(&rows, of, options.svd_instants, needed, options.series_scale, &name)?;
         Ok(Reduction { category, basis, options: options.clone() })
     }
 
@@ -186,36 +188,63 @@ impl Reduction {
         .on(grid.into(), sizes)
     }
 
-    /// The series of the decomposition with their shapes.
-    pub fn mode_shapes(&self) -> Vec<ModeShape> {
+    /// The series of the decomposition with their shapes over some of its scenarios. Left-positive series are those of
+    /// one side, the one with more scenarios: the mean of both sides drives in the middle, where nobody drove.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a scenario that has no vector.
+    pub fn mode_shapes(&self, scenarios: &[&Scenario]) -> Result<Vec<ModeShape>> {
         let target = match self.category {
             Category::CutIn => "cutter",
             Category::CutOut => "cutting-out vehicle",
             Category::Lvd => "leader",
         };
-        let side = if self.options.svd_lateral == SvdLateral::Signed { ", left positive" } else { "" };
-        let shown = SHOWN.min(self.basis.directions.len()).min(self.basis.singular_values.len());
-        let vector = |along: Option<usize>| {
-            let mut coefficients = vec![0.0; shown];
-            if let Some(j) = along {
-                coefficients[j] = self.basis.singular_values[j] / (self.basis.rows as f64).sqrt();
-            }
-            self.basis.reconstruct(&coefficients)
+        let is_signed =
+            self.options.svd_lateral == SvdLateral::Signed && self.series_column(ReducedSeries::Lateral).is_some();
+        let left = scenarios.iter().filter(|s| s.side == Side::Left).count();
+        let side = if 2 * left >= scenarios.len() { Side::Left } else { Side::Right };
+        let of_side = scenarios.iter().filter(|s| !is_signed || s.side == side);
+        let vectors = of_side.map(|s| self.vector(s)).collect::<Result<Vec<_>>>()?;
+        let shown = SHOWN.min(self.basis.directions.len());
+        let coefficients: Vec<Vec<f64>> = vectors.iter().map(|z| self.basis.coefficients(z, shown)).collect();
+        let mean = means(&vectors);
+        let centre = means(&coefficients);
+        let of_direction = |j: usize| {
+            let squares = coefficients.iter().map(|c| (c[j] - centre[j]) * (c[j] - centre[j])).sum::<f64>();
+            let deviation = (squares / coefficients.len().max(1) as f64).sqrt();
+            let columns = mean.iter().zip(&self.basis.directions[j]).zip(&self.basis.weights);
+            columns.map(|((z, v), w)| z + deviation * v / w).collect::<Vec<f64>>()
         };
-        let (mean, along) = (vector(None), (0..shown).map(|j| vector(Some(j))).collect::<Vec<_>>());
+        let along = (0..shown).map(of_direction).collect::<Vec<_>>();
+        let (mirror, of) = match (is_signed, side) {
+            (false, _) => (1.0, ""),
+            (true, Side::Left) => (1.0, ", on the left"),
+            (true, Side::Right) => (-1.0, ", on the right"),
+        };
         let instants = self.options.svd_instants;
-        let part = |z: &[f64], at: usize| z[at * instants..(at + 1) * instants].to_vec();
         let shape = |(at, series): (usize, &ReducedSeries)| {
+            let sign = if *series == ReducedSeries::Lateral { mirror } else { 1.0 };
+            let part =
+                |z: &[f64]| z[at * instants..(at + 1) * instants].iter().map(|value| sign * value).collect::<Vec<_>>();
             let (quantity, unit) = match series {
-                ReducedSeries::Lateral => (format!("lateral position of the {target}{side}"), "m"),
+                ReducedSeries::Lateral => (format!("lateral position of the {target}{of}"), "m"),
                 ReducedSeries::TargetSpeed => (format!("speed of the {target}"), "m/s"),
                 ReducedSeries::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
             };
-            let along = along.iter().map(|z| part(z, at)).collect();
-            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean, at), along }
+            let along = along.iter().map(|z| part(z)).collect();
+            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean), along }
         };
-        layout(self.category).0.iter().enumerate().map(shape).collect()
+        if vectors.is_empty() {
+            return Ok(Vec::new());
+        }
+        Ok(layout(self.category).0.iter().enumerate().map(shape).collect())
     }
+}
+
+/// The mean of every column; empty without rows.
+fn means(rows: &[Vec<f64>]) -> Vec<f64> {
+    let columns = rows.first().map_or(0, Vec::len);
+    (0..columns).map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / rows.len() as f64).collect()
 }
 
 /// One series of the mean scenario and of those along the first directions, in the units of the recording.
@@ -228,7 +257,7 @@ pub struct ModeShape {
     pub unit: String,
     /// The mean, over equidistant instants of [0, T].
     pub mean: Vec<f64>,
-    /// The mean plus σ_j/√N times direction j, for the first directions: one standard deviation of coefficient j.
+    /// The mean plus one standard deviation of coefficient j along direction j, for the first directions.
     pub along: Vec<Vec<f64>>,
 }
 

@@ -6,7 +6,7 @@
 
 use faer::Mat;
 
-use super::options::SeriesScale;
+use super::options::{SeriesScale, SvdLateral};
 use crate::support::vector_state::clear_upper_halves;
 use crate::{Error, Place, Result};
 
@@ -26,11 +26,11 @@ pub struct SvdBasis {
     pub rows: usize,
 }
 
-/// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `name` says in errors
-/// what the rows are.
+/// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `lateral` is the sign of the
+/// first series, where that is a lateral one. `name` says in errors what the rows are.
 pub fn fit_svd(
     rows: &[Vec<f64>],
-    series: usize,
+    (series, lateral): (usize, Option<SvdLateral>),
     instants: usize,
     needed: usize,
     scale: SeriesScale,
@@ -51,8 +51,13 @@ pub fn fit_svd(
         (rows.iter().map(|r| (r[column] - mean) * (r[column] - mean)).sum::<f64>() / n as f64).sqrt()
     };
     let mut weights = Vec::with_capacity(p);
+    // Positions on one side spread little. Their own spread as unit would give the lateral series ten times the
+    // variance, and its directions would displace those of the speeds: docs/src/methods/parameterizations.md.
+    let distance = |column: usize| (rows.iter().map(|r| r[column] * r[column]).sum::<f64>() / n as f64).sqrt();
     for j in 0..series {
-        let spread = (0..instants).map(|k| deviation(j * instants + k)).sum::<f64>() / instants as f64;
+        let is_mirrored = j == 0 && lateral == Some(SvdLateral::Mirrored);
+        let of = |column: usize| if is_mirrored { distance(column) } else { deviation(column) };
+        let spread = (0..instants).map(|k| of(j * instants + k)).sum::<f64>() / instants as f64;
         let root = match scale {
             SeriesScale::PerInstant => instants as f64,
             SeriesScale::PerSeries => (instants as f64).sqrt(),
@@ -121,7 +126,7 @@ mod tests {
     fn a_fit_leaves_the_registers_as_scalar_code_wants_them() {
         let rows: Vec<Vec<f64>> =
             (0..60).map(|r| (0..41).map(|c| (f64::from(r) * 0.7 + f64::from(c * c)).sin()).collect()).collect();
-        fit_svd(&rows, 1, 40, 4, SeriesScale::PerInstant, "rows").unwrap();
+        fit_svd(&rows, (1, None), 40, 4, SeriesScale::PerInstant, "rows").unwrap();
         match upper_halves_in_use() {
             Some(in_use) => assert!(!in_use),
             None => eprintln!("SKIPPED: this machine does not say which registers are in use"),

@@ -54,7 +54,7 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         FitOptions {
-            parameterization: ParameterizationOptions::default(),
+            parameterization: ParameterizationOptions::of_densities(),
             with_thw: false,
             rule: BandwidthRule::Reduction,
             valid_draws: VALID_SHARE_DRAWS,
@@ -94,6 +94,8 @@ pub struct DensityModel {
     pub representativeness: Option<Representativeness>,
     /// Where it comes from.
     pub provenance: Provenance,
+    /// The scenarios in the order of the kernels; empty where the density does not hold them.
+    pub scenarios: Vec<Scenario>,
 }
 
 /// A density, the scenarios that it excludes, and figures that could not be computed.
@@ -144,7 +146,7 @@ impl DensityModel {
                 Ok(()) => Ok(p),
                 Err(invalid) => Err(Error::input(
                     Place::item(format!("scenario {}", scenario.id)),
-                    format!("outside the valid region of {}: {invalid}", name()),
+                    format!("no point of {}: {invalid}", name()),
                     "it is left out of the density",
                 )),
             });
@@ -183,7 +185,8 @@ impl DensityModel {
             left_out: left_out.len() as u64,
         };
         let exposure = facts.driven.map(|driven| Exposure::new(kept.len() as u64, driven));
-        let model = DensityModel { space, kde, valid, sizes, exposure, representativeness, provenance };
+        let scenarios = used.into_iter().cloned().collect();
+        let model = DensityModel { space, kde, valid, sizes, exposure, representativeness, provenance, scenarios };
         Ok(Fitted { model, left_out, not_compared })
     }
 

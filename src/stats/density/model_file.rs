@@ -18,17 +18,18 @@ use super::model::{DensityModel, Provenance};
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
 use super::valid::ValidShare;
-use crate::scenario::Category;
 use crate::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
+use crate::scenario::problem_of;
+use crate::scenario::{Category, Scenario};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::hex::hex;
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
 /// The version that this program writes and reads.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// Largest file that is read: 10⁶ kernels of ten parameters fit.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -64,6 +65,8 @@ struct File {
     basis: Option<Basis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
+    /// One per kernel, with its recorded series; or none.
+    scenarios: Vec<Scenario>,
 }
 
 /// The part of a decomposition that the coefficients need.
@@ -103,13 +106,14 @@ impl File {
             parameters: space.parameters().to_vec(),
             scale: model.kde.scale().to_vec(),
             bandwidth: *model.kde.bandwidth(),
-            p_valid: model.valid,
+            p_valid: model.valid.clone(),
             exposure: model.exposure,
             representativeness: model.representativeness,
             sizes: model.sizes,
             options: space.options().clone(),
             basis,
             kernels: model.kde.points().to_vec(),
+            scenarios: model.scenarios.clone(),
         };
         file.content_sha256 = file.hash()?;
         Ok(file)
@@ -174,6 +178,16 @@ impl File {
         if let Some((i, invalid)) = outside {
             return wrong("kernels", format!("kernel {} is outside the valid region: {invalid}", i + 1));
         }
+        if !self.scenarios.is_empty() && self.scenarios.len() != kde.points().len() {
+            let problem = format!("{}, expected one per kernel: {}", self.scenarios.len(), kde.points().len());
+            return wrong("scenarios", problem);
+        }
+        for scenario in &self.scenarios {
+            let is_other = (scenario.category != self.category).then(|| format!("is no {}", self.category.label()));
+            if let Some(problem) = is_other.or_else(|| problem_of(scenario)) {
+                return wrong("scenarios", format!("scenario {}: {problem}", scenario.id));
+            }
+        }
         let share = self.p_valid;
         if !(share.estimate > 0.0 && share.estimate <= 1.0) || share.valid > share.draws {
             return wrong(
@@ -200,6 +214,7 @@ impl File {
             exposure: self.exposure,
             representativeness: self.representativeness,
             provenance: self.provenance,
+            scenarios: self.scenarios,
         })
     }
 }

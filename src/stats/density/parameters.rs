@@ -4,19 +4,23 @@
 //! Sizes are no parameters.
 //!
 //! **Sides.** Lateral parameters of kinematic parameterizations are sizes. Under the reduction with
-//! `svd_lateral = signed` the lateral series of a point is left-positive, so a point belongs to a side; lanes judge
-//! |y| alone, so the case keeps the series as it is, and a scenario on the right gives the mirror image of the
-//! case that a study makes of it.
+//! `svd_lateral = mirrored` the lateral series is positive on the target's side. With `signed` it is left-positive, so
+//! a point belongs to a side; lanes judge |y| alone, so the case keeps the series as it is, and a scenario on the right
+//! gives the mirror image of the case that a study makes of it.
 //!
-//! **Validity.** Outside the valid region the density is cut off (f/P_valid). Bounds of single parameters are in
-//! [`Parameter`]; besides, LVD needs v1 < v0 and T = (v0 − v1)/ā in [0.1 s, 600 s], and a reconstruction by SVD
-//! needs T in the same range and no negative ego speed (LVD: first speed of the leader) or gap D. Speeds inside
-//! reconstructed series are no reason to refuse a point: below 0 they are set to 0, as in a study. The filters of
-//! mining (a slower cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
+//! **Bounds.** A point has a case if it keeps the bounds in [`Parameter`]; besides, LVD needs v1 < v0 and
+//! T = (v0 − v1)/ā in [0.1 s, 600 s], and a reconstruction by SVD needs T in the same range and no negative ego speed
+//! (LVD: first speed of the leader) or gap D.
+//!
+//! **Valid region.** Outside of it the density is cut off (f/P_valid). A draw must also be a scenario of its category:
+//! numbers within physics, and a reconstructed target that starts (cut-in) or ends (cut-out) in the lane beside the
+//! ego's and ends or starts in the ego's. Recorded scenarios need not: their kernels stay. Speeds inside reconstructed
+//! series are no reason to refuse a draw: below 0 they are set to 0, as in a study. The filters of mining (a slower
+//! cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
 
 use crate::scenario::parameterization::{
     Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
-    ReducedScenario, Reduction, Sizes, Variable,
+    ReducedScenario, ReducedSeries, Reduction, Sizes, Variable,
 };
 use crate::scenario::{Case, Category, Scenario};
 use crate::support::near_name::nearest;
@@ -33,6 +37,21 @@ pub struct ParameterSpace {
     has_thw: bool,
     /// Bounded values that follow from several parameters: a column of the decomposition, or T of a deceleration.
     derived: Vec<(Option<usize>, Parameter)>,
+    /// The parameters with the bounds of a draw: none is beyond physics.
+    drawn: Vec<Parameter>,
+    /// Bounds of a draw's reconstruction.
+    columns: Vec<BoundedColumn>,
+}
+
+/// A column of a reconstruction that is bounded in draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoundedColumn {
+    /// The column.
+    pub column: usize,
+    /// Its size is bounded, on either side of the lane.
+    pub is_distance: bool,
+    /// Name, unit and bounds.
+    pub parameter: Parameter,
 }
 
 /// Why a point is outside the valid region.
@@ -119,8 +138,10 @@ impl ParameterSpace {
             None if variables.contains(&Variable::MeanDeceleration) => vec![(None, parameter(Variable::Duration))],
             None => Vec::new(),
         };
+        let drawn = parameters.iter().map(Parameter::within_physics).collect();
+        let columns = reduction.as_ref().map_or(Vec::new(), |reduction| bounded_columns(reduction, options));
         let options = options.clone();
-        Ok(ParameterSpace { id, options, reduction, variables, parameters, has_thw: with_thw, derived })
+        Ok(ParameterSpace { id, options, reduction, variables, parameters, has_thw: with_thw, derived, drawn, columns })
     }
 
     /// Category and parameterization.
@@ -184,7 +205,17 @@ impl ParameterSpace {
         ))
     }
 
-    /// A mined scenario as a point. It may lie outside the valid region: see [`ParameterSpace::check`].
+    /// The same with the bounds that a draw must keep.
+    pub fn drawn_parameters(&self) -> &[Parameter] {
+        &self.drawn
+    }
+
+    /// What a draw's reconstruction must keep; empty for kinematic parameterizations.
+    pub fn bounded_columns(&self) -> &[BoundedColumn] {
+        &self.columns
+    }
+
+    /// A mined scenario as a point. It may be out of bounds: see [`ParameterSpace::check`].
     ///
     /// # Errors
     /// [`Error::Input`] for a scenario without what a dimension needs: the vehicle ahead, the observed headway;
@@ -197,12 +228,23 @@ impl ParameterSpace {
         Ok(point)
     }
 
-    /// The point is inside the valid region.
+    /// A draw of the point is inside the valid region.
     pub fn is_valid(&self, point: &[f64]) -> bool {
-        self.check(point).is_ok()
+        self.check_draw(point).is_ok()
     }
 
-    /// Tells which bound a point breaks first.
+    /// Tells which bound of the valid region a draw breaks first.
+    pub fn check_draw(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
+        self.check(point)?;
+        self.drawn.iter().zip(point).try_for_each(|(parameter, value)| in_bounds(parameter, *value))?;
+        let Some(reduction) = &self.reduction else { return Ok(()) };
+        self.columns.iter().try_for_each(|bounded| {
+            let value = reduction.rebuilt_column(self.without_thw(point), bounded.column);
+            in_bounds(&bounded.parameter, if bounded.is_distance { value.abs() } else { value })
+        })
+    }
+
+    /// Tells which bound a point breaks first: one that breaks none has a case.
     pub fn check(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
         if point.len() != self.dimensions() {
             return Err(Invalid {
@@ -247,10 +289,42 @@ impl ParameterSpace {
     /// dimension is not part of it: see [`ParameterSpace::thw_s`].
     ///
     /// # Errors
-    /// [`Error::Usage`] for a point outside the valid region; [`Error::Input`] for a cut-out without the size
-    /// of the vehicle ahead.
+    /// [`Error::Usage`] for a point that [`ParameterSpace::check`] refuses; [`Error::Input`] for a cut-out without the
+    /// size of the vehicle ahead.
     pub fn case(&self, point: &[f64], sizes: &Sizes, dt_s: f64) -> Result<Case> {
         self.check(point)?;
         self.id.decode(self.without_thw(point), sizes, dt_s, &self.options, self.reduction())
     }
+}
+
+/// What makes a reconstruction a scenario of its category. The parameterization's lane change spans one lane, so lane
+/// markings are half of it away from the lane's centre.
+fn bounded_columns(reduction: &Reduction, options: &ParameterizationOptions) -> Vec<BoundedColumn> {
+    let category = reduction.category;
+    let number = |variable: Variable, column: Option<usize>| {
+        let parameter = variable.parameter(category, options).within_physics();
+        Some(BoundedColumn { column: column?, is_distance: false, parameter })
+    };
+    let numbers = [Variable::Duration, Variable::EgoSpeed, Variable::LeadGap];
+    let speeds = [(Variable::TargetSpeed, ReducedSeries::TargetSpeed), (Variable::LeadSpeed, ReducedSeries::LeadSpeed)];
+    let numbers = numbers.into_iter().filter_map(|variable| number(variable, reduction.column(variable)));
+    let speeds = speeds.into_iter().filter_map(|(variable, of)| number(variable, reduction.series_column(of)));
+    let marking_m = options.lane_change_m / 2.0;
+    let place = |name: &str, column: usize, is_inside: bool| {
+        let (lower, upper) = if is_inside { (0.0, marking_m) } else { (marking_m, 3.0 * marking_m) };
+        let parameter = Parameter {
+            name: name.to_owned(),
+            unit: "m".to_owned(),
+            lower: Some(lower),
+            lower_excluded: false,
+            upper: Some(upper),
+        };
+        BoundedColumn { column, is_distance: true, parameter }
+    };
+    let lateral = reduction.series_column(ReducedSeries::Lateral).into_iter().flat_map(|first| {
+        let enters = category == Category::CutIn;
+        let last = first + options.svd_instants - 1;
+        [place("lateral_start_m", first, !enters), place("lateral_end_m", last, enters)]
+    });
+    numbers.chain(speeds).chain(lateral).collect()
 }

@@ -1,12 +1,14 @@
 //! P_valid: the share of a density inside the valid region, by counting draws. The truncated density is
 //! f/P_valid.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::kde::Kde;
 use super::normal::normal_quantile;
-use super::parameters::ParameterSpace;
+use super::parameters::{Invalid, ParameterSpace};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
@@ -16,8 +18,20 @@ pub const VALID_SHARE_PURPOSE: u32 = 0x7661_6c64;
 /// Draws of an estimate that nobody chose another number for: the standard error is at most 0.0016.
 pub const VALID_SHARE_DRAWS: u64 = 100_000;
 
+/// Draws that one bound refuses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refused {
+    /// The parameter, or the value that follows from several, whose bound they break first.
+    pub parameter: String,
+    /// What it must be.
+    pub bound: String,
+    /// How many draws.
+    pub draws: u64,
+}
+
 /// P̂_valid with its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValidShare {
     /// Valid draws over draws.
@@ -30,6 +44,8 @@ pub struct ValidShare {
     pub draws: u64,
     /// Those inside the valid region.
     pub valid: u64,
+    /// The others by the bound that they break first, the most first.
+    pub refused: Vec<Refused>,
     /// Seed of the draws.
     pub seed: u64,
 }
@@ -44,7 +60,17 @@ impl ValidShare {
             return Err(Error::usage(Place::item("draws"), "0 draws count nothing", "give at least 1, like 100000"));
         }
         let stream = Stream { seed, purpose: VALID_SHARE_PURPOSE };
-        let valid = (0..draws).into_par_iter().filter(|i| space.is_valid(&kde.draw(&stream, *i))).count() as u64;
+        let broken = |index: u64| space.check_draw(&kde.draw(&stream, index)).err();
+        let count = |mut counts: BTreeMap<(String, String), u64>, (by, draws): ((String, String), u64)| {
+            *counts.entry(by).or_default() += draws;
+            counts
+        };
+        // A bound that moves with the draw (v1 < v0) is told by its parameter alone.
+        let by =
+            |invalid: Invalid| (invalid.parameter, invalid.bound.split(" = ").next().unwrap_or_default().to_owned());
+        let counts = (0..draws).into_par_iter().filter_map(broken).map(|invalid| (by(invalid), 1));
+        let counts = counts.fold(BTreeMap::new, count).reduce(BTreeMap::new, |a, b| b.into_iter().fold(a, count));
+        let valid = draws - counts.values().sum::<u64>();
         if valid == 0 {
             return Err(Error::input(
                 Place::item("density"),
@@ -53,7 +79,11 @@ impl ValidShare {
             ));
         }
         let [low, high] = wilson(valid, draws);
-        Ok(ValidShare { estimate: valid as f64 / draws as f64, low, high, draws, valid, seed })
+        let refused = counts.into_iter().map(|((parameter, bound), draws)| Refused { parameter, bound, draws });
+        let mut refused: Vec<Refused> = refused.collect();
+        // The sort is stable: equal numbers stay in the order of their names.
+        refused.sort_by_key(|refused| std::cmp::Reverse(refused.draws));
+        Ok(ValidShare { estimate: valid as f64 / draws as f64, low, high, draws, valid, refused, seed })
     }
 }
 

@@ -126,6 +126,13 @@ impl RatioVerdict {
     }
 }
 
+impl Ratio {
+    /// The rates are equal up to the margin.
+    pub fn agrees(&self) -> bool {
+        self.verdict == RatioVerdict::Agrees
+    }
+}
+
 /// How the interval of a ratio was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::support::readable::significant;
+
 /// One thing that is wrong, with the figure that shows it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "warning", rename_all = "snake_case")]
@@ -23,6 +25,21 @@ pub enum Warning {
     },
     /// The interval is that of the draws alone, but the density rests on data.
     DataLeftOut,
+    /// The rate was not compared with that of recorded scenarios: what the parameterization changes is not known.
+    NotCompared,
+    /// The rate differs from that of the recorded scenarios (S) beyond the margin, or too few failures tell whether it does.
+    AgainstRecorded {
+        /// What is compared: `S'/S` (replays under the parameterization) or `P/S` (samples).
+        name: String,
+        /// Its value.
+        ratio: Option<f64>,
+        /// Lower end of its interval.
+        low: Option<f64>,
+        /// Upper end.
+        high: Option<f64>,
+        /// The interval excludes 1.
+        is_decided: bool,
+    },
     /// Effective sample size over the failures below [`Warning::MIN_EFFECTIVE_SIZE`]: the variance itself is
     /// badly known.
     LowEffectiveSize {
@@ -139,6 +156,24 @@ impl fmt::Display for Warning {
                 write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {least} are needed")
             }
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
+            Warning::NotCompared => write!(
+                f,
+                "not compared with recorded scenarios, which the density file does not hold: the error of the \
+                 parameterization is not known"
+            ),
+            Warning::AgainstRecorded { ratio: None, is_decided, .. } => match is_decided {
+                true => write!(f, "no recorded scenario fails, but more of the density than chance explains"),
+                false => write!(f, "no recorded scenario fails: nothing tells what the parameterization changes"),
+            },
+            Warning::AgainstRecorded { name, ratio: Some(ratio), low, high, is_decided } => {
+                let end = |value: &Option<f64>| value.map_or("∞".to_owned(), |v| significant(v, 3));
+                let interval = format!("{name} is {} ({}…{})", significant(*ratio, 3), end(low), end(high));
+                let by = if name.starts_with('P') { "density" } else { "parameterization" };
+                match is_decided {
+                    true => write!(f, "{interval}: the {by} changes the rate of failure of the recorded scenarios"),
+                    false => write!(f, "{interval}: too few failures tell whether the {by} keeps the recorded rate"),
+                }
+            }
             Warning::LowEffectiveSize { effective_size } => {
                 write!(f, "the failures count as no more than {effective_size:.1} equally weighted ones")
             }

@@ -1,0 +1,162 @@
+//! Rates of a density's samples beside those of the scenarios that it was fitted on, as recorded (S) and replayed under
+//! the parameterization (S'). An interval of P holds the draws and what other scenarios would change; what the
+//! parameterization itself changes is only seen here.
+
+use serde::Serialize;
+
+use super::kernels::{KernelCounts, MAX_GROUPS};
+use super::plan::SampleHeadways;
+use super::rows::EstimateRow;
+use super::sample::{Sample, SampleKind};
+use super::sample_result::SampleResult;
+use crate::Result;
+use crate::engine::{CpuBackend, Executor, Headway, Wanted};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::study::{StudyOptions, plan_study};
+use crate::stats::density::DensityModel;
+use crate::stats::estimate::{Clusters, Enough, Ratio, RatioVerdict, Warning, paired_ratio};
+
+/// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RecordedRatios {
+    /// S'/S: the parameterized replays.
+    pub replayed: Ratio,
+    /// P/S: the samples; of crude Monte Carlo, whose draws tell their scenario.
+    pub sampled: Option<Ratio>,
+}
+
+/// Failed lanes per group of scenarios: headway × model × criterion, each with one number per group.
+struct GroupedFailures {
+    scenarios: Vec<u64>,
+    failures: Vec<Vec<u64>>,
+}
+
+impl GroupedFailures {
+    /// Runs and failures over some cells.
+    fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
+        let runs = self.scenarios.iter().map(|n| n * cells.len() as u64).collect();
+        let of_group = |group: usize| cells.iter().map(|cell| self.failures[*cell][group]).sum();
+        (runs, (0..self.scenarios.len()).map(of_group).collect())
+    }
+}
+
+/// The lanes of S and of S' under the density's parameterization; `None` where the density cannot be replayed.
+fn replay(
+    density: &DensityModel,
+    profile: &Profile,
+    models: &[ModelId],
+    headways: &[Headway],
+) -> Result<Option<[GroupedFailures; 2]>> {
+    let id = density.space.id();
+    let options = StudyOptions {
+        categories: vec![id.category],
+        models: models.to_vec(),
+        headways: headways.to_vec(),
+        parameterization: density.space.options().clone(),
+    };
+    let plan = plan_study(&density.scenarios, profile, &options)?.plan;
+    let block = &plan.blocks[0];
+    let Some(variant) = block.variants.iter().position(|name| *name == id.key) else { return Ok(None) };
+    // The same bits as on any device, and few lanes beside those of the samples.
+    let backend = CpuBackend::lane_arithmetic();
+    let executor = Executor::new(&backend);
+    let mut verdicts = Vec::new();
+    executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+        verdicts.extend(chunk.verdicts.iter().copied());
+        Ok(())
+    })?;
+    let (variants, lanes) = (block.variants.len(), headways.len() * models.len());
+    let units = block.units.len() as usize;
+    let groups = units.min(MAX_GROUPS);
+    let grouped = |variant: usize| {
+        let mut counts = GroupedFailures {
+            scenarios: vec![0; groups],
+            failures: vec![vec![0; groups]; lanes * Criterion::ALL.len()],
+        };
+        for unit in 0..units {
+            counts.scenarios[unit % groups] += 1;
+            let of_unit = &verdicts[(unit * variants + variant) * lanes..][..lanes];
+            for (at, verdict) in of_unit.iter().enumerate() {
+                for criterion in Criterion::ALL {
+                    let cell = at * Criterion::ALL.len() + criterion.index();
+                    counts.failures[cell][unit % groups] += u64::from(verdict.failed(criterion));
+                }
+            }
+        }
+        counts
+    };
+    Ok(Some([grouped(0), grouped(variant)]))
+}
+
+impl Sample {
+    /// What S and S' are replayed with; `None` where a condition or the density's own headway leaves nothing to compare.
+    fn replayed_with(&self) -> Option<(&Profile, &[ModelId], Vec<Headway>, f64)> {
+        let (profile, models, headways, level) = match &self.0 {
+            SampleKind::Crude(plan, _) if plan.facts.given.is_empty() => {
+                (&plan.facts.profile, &plan.facts.models, plan.facts.headways.clone()?, plan.facts.level)
+            }
+            SampleKind::Crude(..) => return None,
+            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
+                (&plan.facts.profile, &plan.facts.models, vec![plan.facts.headway?], plan.facts.level)
+            }
+            SampleKind::Sequential(run) => {
+                let SampleHeadways::Each(headways) = &run.options.headways else { return None };
+                (&run.profile, &run.options.models, headways.clone(), run.options.level)
+            }
+        };
+        Some((profile, models.as_slice(), headways, level))
+    }
+
+    /// The result with its rates beside those of the recorded scenarios, and a warning where they differ, where too few
+    /// failures tell, or where the density does not hold its scenarios.
+    ///
+    /// # Errors
+    /// Of the lanes of S and S'.
+    pub(super) fn against_recorded(&self, mut result: SampleResult) -> Result<SampleResult> {
+        let Some((profile, models, headways, level)) = self.replayed_with() else { return Ok(result) };
+        let density = self.density();
+        let counts = match density.scenarios.is_empty() {
+            true => None,
+            false => replay(density, profile, models, &headways)?,
+        };
+        let Some([recorded, replayed]) = counts else {
+            result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));
+            return Ok(result);
+        };
+        let sampled = result.crude.as_ref().and_then(|crude| crude.tally.by_kernel.as_ref());
+        for row in &mut result.rows {
+            let cells = cells_of(row, models, &headways);
+            let (runs, failures) = recorded.over(&cells);
+            let s = Clusters { runs: &runs, failures: &failures };
+            let ratio = |(runs, failures): (Vec<u64>, Vec<u64>)| {
+                paired_ratio(Clusters { runs: &runs, failures: &failures }, s, Enough::default(), level)
+            };
+            let sampled = sampled.map(|counts: &KernelCounts| ratio(counts.over(&cells)));
+            let ratios = RecordedRatios { replayed: ratio(replayed.over(&cells)), sampled };
+            warn(row, &ratios);
+            row.recorded = Some(ratios);
+        }
+        Ok(result)
+    }
+}
+
+/// The cells of a row: one headway, or all.
+fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
+    let model = models.iter().position(|model| *model == row.model).unwrap_or_default();
+    let cell = |headway: usize| (headway * models.len() + model) * Criterion::ALL.len() + row.criterion.index();
+    let is_of = |at: &usize| row.headway == "all" || headways[*at].to_string() == row.headway;
+    (0..headways.len()).filter(is_of).map(cell).collect()
+}
+
+/// S' comes first: where the replay of the same scenarios fails differently, its samples do so too.
+fn warn(row: &mut EstimateRow, ratios: &RecordedRatios) {
+    let named = [("S'/S", Some(ratios.replayed)), ("P/S", ratios.sampled)];
+    let found = named.into_iter().find_map(|(name, ratio)| Some((name, ratio?)).filter(|(_, r)| !r.agrees()));
+    let Some((name, ratio)) = found else { return };
+    let is_decided = ratio.verdict != RatioVerdict::Undecided;
+    let name = name.to_owned();
+    let Ratio { ratio, low, high, .. } = ratio;
+    row.estimate.trust.warn_if(true, Warning::AgainstRecorded { name, ratio, low, high, is_decided });
+}

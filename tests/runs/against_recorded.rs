@@ -1,0 +1,134 @@
+//! Rates of samples beside those of the recorded scenarios: which of them are sound.
+
+use std::sync::OnceLock;
+
+use lanesweep::Place;
+use lanesweep::engine::{CpuBackend, Executor, Headway};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::Shard;
+use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
+use lanesweep::scenario::parameterization::Parameterization;
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::estimate::{Verdict, Warning};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+
+fn scenarios() -> &'static [Scenario] {
+    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
+    MINED.get_or_init(|| {
+        let generator = GeneratorOptions { recordings: 30, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+    })
+}
+
+fn density(key: &str) -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let id = Parameterization::find(Category::CutIn, key).unwrap();
+    DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
+}
+
+fn sample(density: DensityModel, estimator: Estimator, headways: Vec<Headway>) -> Sample {
+    let mut options = SampleOptions::new(estimator, 4000, SampleHeadways::Each(headways));
+    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
+    Sample::plan(density, &Profile::load("paper").unwrap(), &options).unwrap()
+}
+
+fn rows(sample: &Sample) -> Vec<EstimateRow> {
+    let backend = CpuBackend::lane_arithmetic();
+    sample.run(&Executor::new(&backend)).unwrap().rows
+}
+
+fn overall(rows: &[EstimateRow]) -> Vec<&EstimateRow> {
+    rows.iter().filter(|row| row.headway == "all" && row.criterion == Criterion::Collision).collect()
+}
+
+/// The warning about recorded scenarios says something.
+fn is_told(row: &EstimateRow) -> bool {
+    row.estimate.trust.warnings.iter().any(|w| matches!(w, Warning::AgainstRecorded { .. }))
+}
+
+#[test]
+fn rates_that_are_sound_do_not_exclude_each_other() {
+    let mut sound: Vec<(String, EstimateRow)> = Vec::new();
+    for key in ["1", "2", "3", "4", "6", "7"] {
+        let rows = rows(&sample(density(key), Estimator::CRUDE, Headway::paper()));
+        for row in overall(&rows) {
+            let ratios = row.recorded.unwrap();
+            let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
+            assert_eq!(is_told(row), !agrees, "{key}: {row:?}");
+            eprintln!("{key} {:?}: {:?} {}", row.model, row.estimate.interval, row.estimate.trust.verdict());
+            if row.estimate.trust.verdict() == Verdict::Sound {
+                assert!(agrees);
+                sound.push((key.to_owned(), row.clone()));
+            }
+        }
+        if key == "3" {
+            // The cutter is in the lane at once: a driver has no time to see it come.
+            assert!(overall(&rows).iter().all(|row| row.estimate.trust.verdict() != Verdict::Sound));
+        }
+    }
+    assert!(sound.len() >= 2, "nothing is sound: {}", sound.len());
+    for (a, of_a) in &sound {
+        for (b, of_b) in sound.iter().filter(|(_, row)| row.model == of_a.model) {
+            let ([low, high], other) =
+                ([of_a.estimate.interval.low, of_a.estimate.interval.high], of_b.estimate.interval);
+            assert!(low <= other.high && other.low <= high, "{a} and {b}: {of_a:?} {of_b:?}");
+        }
+    }
+}
+
+#[test]
+fn a_rate_that_nothing_is_compared_with_is_not_sound() {
+    let mut without = density("2");
+    without.scenarios.clear();
+    for row in rows(&sample(without, Estimator::CRUDE, Headway::paper())) {
+        assert!(row.recorded.is_none() && row.estimate.trust.verdict() != Verdict::Sound, "{row:?}");
+        assert!(row.estimate.trust.warnings.contains(&Warning::NotCompared));
+    }
+}
+
+#[test]
+fn estimators_that_search_for_failures_stand_beside_the_replayed_scenarios_too() {
+    for row in rows(&sample(density("3"), Estimator::CrossEntropy { defence: 0.1 }, vec![Headway::ThwS(0.6)])) {
+        let ratios = row.recorded.unwrap();
+        assert!(ratios.sampled.is_none() && (ratios.replayed.agrees() || is_told(&row)), "{row:?}");
+    }
+}
+
+#[test]
+fn shards_find_the_same_ratios_as_the_run_in_one_piece() {
+    let sample = sample(density("2"), Estimator::CRUDE, vec![Headway::ThwS(0.6), Headway::ThwS(0.4)]);
+    let dir = tempfile::tempdir().unwrap();
+    let backend = CpuBackend::lane_arithmetic();
+    for index in 0..2 {
+        sample.run_shard(dir.path(), Shard { index, of: 2 }, &Executor::new(&backend)).unwrap();
+    }
+    let (_, merged) = Sample::merge(dir.path()).unwrap();
+    assert_eq!(merged.rows, rows(&sample));
+    assert!(merged.rows.iter().all(|row| row.recorded.is_some()));
+}
+
+#[test]
+fn a_density_file_holds_its_scenarios_and_refuses_others() {
+    let written = density("2");
+    let place = Place::item("density.json");
+    let read = DensityModel::from_json(&written.to_json().unwrap(), &place).unwrap();
+    assert_eq!(read.scenarios, written.scenarios);
+    assert_eq!(read.scenarios.len(), read.kde.points().len());
+    let refused = |change: fn(&mut Vec<Scenario>)| {
+        let mut changed = written.clone();
+        change(&mut changed.scenarios);
+        DensityModel::from_json(&changed.to_json().unwrap(), &place).unwrap_err().to_string()
+    };
+    let few = refused(|scenarios| drop(scenarios.pop()));
+    assert!(few.contains("column `scenarios`") && few.contains("one per kernel"), "{few}");
+    let other = refused(|scenarios| scenarios[0].category = Category::Lvd);
+    assert!(other.contains("is no cut-in") || other.contains("is no Cut-in"), "{other}");
+    let empty = refused(|scenarios| scenarios[0].target.v.clear());
+    assert!(empty.contains("target.v"), "{empty}");
+}

@@ -1,0 +1,171 @@
+//! What densities draw: scenarios of their category, not only points with a case.
+
+use std::sync::OnceLock;
+
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{SampleSource, generator_of};
+use lanesweep::scenario::parameterization::{
+    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
+};
+use lanesweep::scenario::{Category, Scenario, Side};
+use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+
+fn scenarios() -> &'static [Scenario] {
+    static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
+    MINED.get_or_init(|| {
+        let generator = GeneratorOptions { recordings: 8, ..GeneratorOptions::default() };
+        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+    })
+}
+
+fn kept(category: Category) -> Vec<&'static Scenario> {
+    scenarios().iter().filter(|s| s.category == category && s.kept).collect()
+}
+
+fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
+    ParameterizationOptions { svd_lateral, ..ParameterizationOptions::default() }
+}
+
+fn density(id: Parameterization, parameterization: ParameterizationOptions) -> DensityModel {
+    let facts =
+        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let fit = FitOptions { parameterization, representativeness: false, valid_draws: 20_000, ..FitOptions::default() };
+    DensityModel::fit(id, scenarios(), &facts, &fit).unwrap().model
+}
+
+/// The fraction of draws that are refused because of where the target starts or ends.
+fn misplaced(density: &DensityModel) -> f64 {
+    let refused = density.valid.refused.iter().filter(|refused| refused.parameter.starts_with("lateral_"));
+    refused.map(|refused| refused.draws).sum::<u64>() as f64 / density.valid.draws as f64
+}
+
+/// Lateral distance in the lane beside the ego's, and in the ego's.
+fn distances(reduced: &ReducedScenario, category: Category) -> (f64, f64) {
+    let (first, last) = (reduced.y[0].abs(), reduced.y[reduced.y.len() - 1].abs());
+    if category == Category::CutIn { (first, last) } else { (last, first) }
+}
+
+#[test]
+fn every_draw_starts_and_ends_in_the_lanes_of_its_category_and_drives_at_a_speed_within_physics() {
+    let profile = Profile::load("paper").unwrap();
+    for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some()) {
+        for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
+            let density = density(id.clone(), options(svd_lateral));
+            let mixture = density.mixture().unwrap();
+            let source = SampleSource::Random;
+            let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 7).unwrap();
+            for index in 0..2000 {
+                let drawn = generator.draw(index);
+                let point: Vec<f64> =
+                    drawn.values[..density.space.dimensions()].iter().map(|&v| f64::from(v)).collect();
+                let reduced = density.space.reduced(&point).unwrap();
+                let what = format!("{} {svd_lateral:?}, draw {index}", id.name());
+                assert!(!drawn.is_void() && reduced.v[0] <= 100.0 && reduced.v_ego <= 100.0, "{what}");
+                if id.category != Category::Lvd {
+                    let (outside, inside) = distances(&reduced, id.category);
+                    // Lanes are drawn in binary32.
+                    assert!((1.7499..=5.2501).contains(&outside), "{what}: {outside} m outside");
+                    assert!(inside <= 1.7501, "{what}: {inside} m inside");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn densities_of_one_side_lose_few_draws_and_those_of_both_sides_many() {
+    for id in Parameterization::ALL.into_iter().filter(|id| id.coefficients().is_some() && id.category != Category::Lvd)
+    {
+        let [both, one] = [SvdLateral::Signed, SvdLateral::Mirrored].map(|s| density(id.clone(), options(s)));
+        let (both, one) = (misplaced(&both), misplaced(&one));
+        eprintln!("{}: {:.2} % signed, {:.2} % mirrored", id.name(), 100.0 * both, 100.0 * one);
+        assert!(one < 0.02, "{}: {one}", id.name());
+        assert!(both > 2.0 * one && both > 0.02, "{}: {both} and {one}", id.name());
+    }
+    assert_eq!(FitOptions::default().parameterization, options(SvdLateral::Mirrored));
+}
+
+#[test]
+fn refused_draws_are_counted_by_the_bound_that_they_break() {
+    let density = density(Parameterization::find(Category::CutOut, "g").unwrap(), options(SvdLateral::Signed));
+    let valid = &density.valid;
+    assert_eq!(valid.refused.iter().map(|refused| refused.draws).sum::<u64>(), valid.draws - valid.valid);
+    assert!(valid.refused.is_sorted_by(|a, b| a.draws >= b.draws), "{:?}", valid.refused);
+    let end = valid.refused.iter().find(|refused| refused.parameter == "lateral_end_m").unwrap();
+    assert_eq!(end.bound, "1.75 … 5.25");
+}
+
+#[test]
+fn a_recorded_scenario_that_starts_in_the_ego_s_lane_keeps_its_kernel() {
+    let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
+    // The lane change began before the ego's data set.
+    some[0].target.y.iter_mut().for_each(|y| *y = y.min(0.6));
+    let facts = DataFacts { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let id = Parameterization::find(Category::CutIn, "7").unwrap();
+    let fitted = DensityModel::fit(id, &some, &facts, &fit).unwrap();
+    assert_eq!((fitted.left_out.len(), fitted.model.kde.points().len()), (0, some.len()));
+    assert!(!fitted.model.space.is_valid(&fitted.model.kde.points()[0]), "a draw at that place is refused");
+}
+
+/// Root mean square error of the target's speed that `d` coefficients rebuild, m/s, and how much of direction `d` is
+/// lateral.
+fn speed_error(basis: &SvdBasis, rows: &[Vec<f64>], d: usize) -> (f64, f64) {
+    let error = |z: &Vec<f64>| {
+        let rebuilt = basis.reconstruct(&basis.coefficients(z, d));
+        (50..100).map(|k| (rebuilt[k] - z[k]).powi(2)).sum::<f64>() / 50.0
+    };
+    let lateral = basis.directions[d - 1][..50].iter().map(|v| v * v).sum();
+    ((rows.iter().map(error).sum::<f64>() / rows.len() as f64).sqrt(), lateral)
+}
+
+#[test]
+fn the_unit_of_a_mirrored_series_keeps_the_speeds_among_the_first_directions() {
+    for (category, series, d) in [(Category::CutIn, 2, 4), (Category::CutOut, 3, 5)] {
+        let kept = kept(category);
+        let of = |svd_lateral| {
+            let reduction = Reduction::fit(category, &kept, &options(svd_lateral)).unwrap();
+            let rows: Vec<Vec<f64>> = kept.iter().map(|s| reduction.vector(s).unwrap()).collect();
+            (speed_error(&reduction.basis, &rows, d), rows)
+        };
+        let ((signed, of_signed), _) = of(SvdLateral::Signed);
+        let ((mirrored, of_mirrored), rows) = of(SvdLateral::Mirrored);
+        // The same rows with their own spread as unit.
+        let own = fit_svd(&rows, (series, None), 50, 7, SeriesScale::PerInstant, "own spread").unwrap();
+        let (own, of_own) = speed_error(&own, &rows, d);
+        eprintln!(
+            "{category:?}, {d} coefficients: speed off by {signed:.2} m/s signed, {mirrored:.2} mirrored, {own:.2} with its \
+             own spread; direction {d} is {:.0}, {:.0}, {:.0} % lateral",
+            100.0 * of_signed,
+            100.0 * of_mirrored,
+            100.0 * of_own
+        );
+        assert!(mirrored < 1.1 * signed, "{category:?}: {mirrored} m/s, signed {signed} m/s");
+        assert!(own > 1.3 * mirrored, "{category:?}: {own} m/s, mirrored {mirrored} m/s");
+    }
+}
+
+#[test]
+fn modes_are_those_of_one_side() {
+    for (category, side) in [(Category::CutIn, Side::Right), (Category::CutOut, Side::Left)] {
+        let mut some: Vec<Scenario> = kept(category).into_iter().cloned().collect();
+        // Nearly as many on one side as on the other: the mean of both is in the middle.
+        for (at, scenario) in some.iter_mut().enumerate() {
+            scenario.side = if at % 9 < 5 { side } else { [Side::Left, Side::Right][usize::from(side == Side::Left)] };
+        }
+        let some: Vec<&Scenario> = some.iter().collect();
+        for svd_lateral in [SvdLateral::Signed, SvdLateral::Mirrored] {
+            let reduction = Reduction::fit(category, &some, &options(svd_lateral)).unwrap();
+            let shapes = reduction.mode_shapes(&some).unwrap();
+            let lateral = &shapes[0];
+            assert_eq!(lateral.quantity.contains("on the"), svd_lateral == SvdLateral::Signed, "{}", lateral.quantity);
+            for shape in std::iter::once(&lateral.mean).chain(&lateral.along) {
+                let (first, last) = (shape[0], shape[shape.len() - 1]);
+                let (outside, inside) = if category == Category::CutIn { (first, last) } else { (last, first) };
+                assert!(outside > 1.75 && inside.abs() < 1.75, "{category:?} {svd_lateral:?}: {first} … {last} m");
+            }
+        }
+    }
+}
