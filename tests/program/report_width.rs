@@ -87,6 +87,7 @@ fn a_study_answers_on_one_screen() {
         }
         assert!(err.contains("report.html"), "where the page is: {err}");
     }
+    assert_fits(&study(dir.path(), "50", &GENERATED).0, 50);
 }
 
 #[test]
