@@ -96,12 +96,13 @@ impl ForestRow {
         } else if self.lower > self.upper {
             format!("no interval: {lower} is above {upper}")
         } else {
-            format!("[{lower}, {upper}]")
+            format!("[{lower},\u{a0}{upper}]")
         };
         let drawn = self.drawn(scale);
         let nowhere = drawn.estimate.is_none() && !drawn.below;
         let off = if nowhere { " (not on a logarithmic axis)" } else { "" };
-        let outer = self.outer.map_or(String::new(), |(low, high)| format!(", [{}, {}]", number(low), number(high)));
+        let outer =
+            self.outer.map_or(String::new(), |(low, high)| format!(", [{},\u{a0}{}]", number(low), number(high)));
         let few = self.few().map_or(String::new(), |n| format!(", {}", counted(n as usize, "scenario")));
         format!("{} {interval}{outer}{off}{few}", number(estimate))
     }
@@ -273,7 +274,7 @@ mod tests {
         let svg = figure(Logarithmic, 1, rows).figure().svg();
         assert_eq!(svg.matches("fill=\"#ffffff\" stroke=\"#0072b2\"").count(), 1);
         let words = words(&svg);
-        for said in ["1e-4 [7e-5, 1.4e-4], [1e-5, 1e-3], 7 scenarios", "Line: 95 %.", "Hollow"] {
+        for said in ["1e-4 [7e-5, 1.4e-4], [1e-5, 0.001], 7 scenarios", "Line: 95 %.", "Hollow"] {
             assert!(words.contains(said), "{said} in {words}");
         }
     }

@@ -2,7 +2,7 @@
 //! does not tell.
 
 use super::study::StudyReport;
-use super::tables::wrap;
+use super::tables::{fitted, wrap};
 use crate::run::score::Best;
 use crate::support::readable::{count, count_of, counted};
 
@@ -15,6 +15,8 @@ const MAX_ROWS: usize = 12;
 const LIST: usize = 14;
 
 const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "hides", "not told apart", "needs"];
+/// Column of F1, or of the reason why there is none.
+const SCORE: usize = 3;
 /// Columns of numbers.
 const NUMBERS: [usize; 2] = [4, 6];
 
@@ -39,9 +41,10 @@ impl StudyReport {
             String::new(),
             wrap(&format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:"), width),
         ];
-        lines.extend(self.rows());
-        lines
-            .extend(self.comparison.iter().filter_map(|comparison| Some(comparison.text().lines().next()?.to_owned())));
+        lines.extend(self.rows(width));
+        lines.extend(
+            self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
+        );
         let legend = "hides: collisions of S that the best does not have. not told apart: F1 within chance of the \
                       best's. needs: times as many scenarios to tell, if F1 stays.";
         lines.push(wrap(legend, width));
@@ -50,31 +53,34 @@ impl StudyReport {
         lines.join("\n") + "\n"
     }
 
-    fn rows(&self) -> Vec<String> {
+    fn rows(&self, screen: usize) -> Vec<String> {
         let known: Vec<[String; 7]> = self.best.iter().take(MAX_ROWS).map(|best| self.row(best)).collect();
+        let header = HEADER.map(str::to_owned);
+        let is_sentence = |row: &[String; 7], at: usize| at == SCORE && row[SCORE + 1].is_empty();
         let width = |at: usize| {
-            // A sentence in place of an answer runs on over the columns after it.
-            let cells = known.iter().filter(|row| at != 3 || !row[4].is_empty() || row[3].is_empty());
-            cells.map(|row| row[at].chars().count()).chain([HEADER[at].len()]).max().unwrap_or(0)
+            let cells = std::iter::once(&header).chain(&known).filter(|row| !is_sentence(row, at));
+            cells.map(|row| row[at].chars().count()).max().unwrap_or(0)
         };
         let widths: [usize; 7] = std::array::from_fn(width);
         let line = |row: &[String; 7]| {
-            let mut line = String::new();
+            let (mut line, mut end) = (String::new(), 0);
             for (at, cell) in row.iter().enumerate() {
-                let end: usize = widths[..=at].iter().sum::<usize>() + 2 * at;
-                let is_number = NUMBERS.contains(&at);
-                let gap = if at == 0 { 0 } else { end - widths[at] };
-                let start = if is_number { end.saturating_sub(cell.chars().count()) } else { gap };
-                if cell.is_empty() {
-                    continue;
+                end += widths[at] + if at > 0 { 2 } else { 0 };
+                let start = end - if NUMBERS.contains(&at) { cell.chars().count() } else { widths[at] };
+                // A sentence in place of an answer runs on over the empty columns after it.
+                let gap = start.saturating_sub(line.chars().count()).max(if at > 0 { 2 } else { 0 });
+                if !cell.is_empty() {
+                    line += &" ".repeat(gap);
+                    line += cell;
                 }
-                line += &" ".repeat(start.saturating_sub(line.chars().count()));
-                line += cell;
             }
             line
         };
-        let header = HEADER.map(str::to_owned);
         let mut lines: Vec<String> = std::iter::once(&header).chain(&known).map(line).collect();
+        if lines.iter().any(|line| line.chars().count() > screen) {
+            let rows: Vec<Vec<String>> = known.iter().map(|row| row.to_vec()).collect();
+            lines = fitted(&header, &rows, (2, 4), screen).lines().map(str::to_owned).collect();
+        }
         let more = self.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
             lines.push(format!("… and {} more: --tables", count_of(more)));
@@ -90,8 +96,8 @@ impl StudyReport {
             let times = least as f64 / scenarios as f64;
             let text = match scenarios {
                 0 => "S never collides: nothing to compare".to_owned(),
-                1 => format!("too few: S collides in 1 scenario; {least} are needed"),
-                _ => format!("too few: S collides in {} scenarios; {least} are needed", count(scenarios)),
+                1 => format!("too few: 1 colliding scenario, {least} needed"),
+                _ => format!("too few: {} colliding scenarios, {least} needed", count(scenarios)),
             };
             let needs = if scenarios == 0 { "-".to_owned() } else { factor(times) };
             let [category, model] = name;

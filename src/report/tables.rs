@@ -12,6 +12,9 @@ use crate::support::readable;
 /// Columns that every table fits in where no terminal says how wide it is.
 pub(crate) const WIDTH: usize = 120;
 
+/// A blank at which no line is broken.
+const NO_BREAK: char = '\u{a0}';
+
 /// An empty table that breaks its cells rather than the terminal's lines.
 pub(super) fn table(header: Vec<String>) -> Table {
     let mut table = Table::new();
@@ -30,7 +33,7 @@ pub(super) fn aligned(mut table: Table, texts: usize) -> String {
 
 /// A table within so many columns of the terminal, its first `texts` columns to the left. Where it is too wide it becomes
 /// several, each with the first `keys` columns, so that no number and no interval is broken.
-fn fitted(header: &[String], rows: &[Vec<String>], (keys, texts): (usize, usize), width: usize) -> String {
+pub(super) fn fitted(header: &[String], rows: &[Vec<String>], (keys, texts): (usize, usize), width: usize) -> String {
     let lines = |at: usize| {
         let cells = std::iter::once(header).chain(rows.iter().map(Vec::as_slice)).filter_map(move |row| row.get(at));
         cells.flat_map(|cell| cell.lines()).map(|line| line.chars().count())
@@ -48,15 +51,30 @@ fn fitted(header: &[String], rows: &[Vec<String>], (keys, texts): (usize, usize)
         let last = parts.len() - 1;
         parts[last].push(at);
     }
+    // Nothing is broken within brackets, and no table is narrower than its words.
+    let held = |cell: &String| {
+        let mut depth = 0;
+        let hold = |c: char| {
+            depth += i32::from(c == '[') - i32::from(c == ']');
+            if c == ' ' && depth > 0 { NO_BREAK } else { c }
+        };
+        cell.chars().map(hold).collect::<String>()
+    };
+    let longest = |at: usize| {
+        let cells = std::iter::once(header).chain(rows.iter().map(Vec::as_slice)).filter_map(|row| row.get(at));
+        let words = |cell: &String| held(cell).split([' ', '\n']).map(|word| word.chars().count()).max();
+        cells.filter_map(words).max().unwrap_or(0) + 3
+    };
     let text = |columns: &Vec<usize>| {
         let of =
-            |row: &[String]| columns.iter().map(|&at| row.get(at).cloned().unwrap_or_default()).collect::<Vec<_>>();
+            |row: &[String]| columns.iter().map(|&at| row.get(at).map(held).unwrap_or_default()).collect::<Vec<_>>();
         let mut table = table(of(header));
-        table.set_width(width as u16);
+        let least = fixed + columns.iter().skip(keys).map(|at| longest(*at)).sum::<usize>();
+        table.set_width(width.max(least) as u16);
         for row in rows {
             table.add_row(of(row));
         }
-        aligned(table, texts.min(columns.iter().filter(|at| **at < texts).count()))
+        aligned(table, columns.iter().filter(|at| **at < texts).count()).replace(NO_BREAK, " ")
     };
     parts.iter().map(text).collect::<Vec<_>>().join("\n")
 }

@@ -177,7 +177,8 @@ fn stands_in_every_table_of_a_study() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("result");
     let lanes = dir.path().join("lanes.csv");
-    let study = ["-q", "study", "--synth-recordings", "1", "--published", "--out", out.to_str().unwrap(), "--rows"];
+    let study =
+        ["-q", "study", "--synth-recordings", "1", "--tables", "--published", "--out", out.to_str().unwrap(), "--rows"];
     let output = lanesweep(&[&study[..], &[lanes.to_str().unwrap()]].concat());
     assert!(output.status.success(), "{}", said(&output));
     let tables = String::from_utf8(output.stdout).unwrap();

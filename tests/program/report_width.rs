@@ -63,7 +63,7 @@ fn seven_variants_with_intervals_and_large_counts_fit() {
 fn the_tables_of_a_study_take_the_width_of_the_terminal() {
     let dir = tempfile::tempdir().unwrap();
     for (columns, width) in [("80", 80), ("120", 120), ("", 120)] {
-        let (out, _) = study(dir.path(), columns, &[&GENERATED[..], &["--published"]].concat());
+        let (out, _) = study(dir.path(), columns, &[&GENERATED[..], &["--tables", "--published"]].concat());
         assert_fits(&out, width);
         assert!(out.contains("F1 of S' against S") && out.contains("published, %"));
     }
@@ -87,6 +87,7 @@ fn a_study_answers_on_one_screen() {
         }
         assert!(err.contains("report.html"), "where the page is: {err}");
     }
+    assert_fits(&study(dir.path(), "50", &GENERATED).0, 50);
 }
 
 #[test]

@@ -74,7 +74,8 @@ impl Type {
     pub fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
         let mut lines = Vec::new();
         let mut line = String::new();
-        for word in text.split_whitespace() {
+        // A no-break space holds an interval together.
+        for word in text.split(|c: char| c.is_whitespace() && c != '\u{a0}').filter(|word| !word.is_empty()) {
             if !line.is_empty() && self.text_px(&line) + self.char_px(' ') + self.text_px(word) > width_px {
                 lines.push(std::mem::take(&mut line));
             }

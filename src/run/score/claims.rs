@@ -60,10 +60,10 @@ impl ClaimVerdict {
     ];
 
     /// How cells decide about a claim, in words.
-    pub const RULE: &'static str = "A claim holds if it holds in at least half of its cells (driver model and \
-                                    criterion) and no cell contradicts it; it is contradicted if it is in at least \
-                                    half of its cells and holds in none. It has too few failures if more than half \
-                                    of its cells have. Otherwise it is undecided.";
+    pub const RULE: &'static str = "A claim holds if at least half of its cells (driver model and criterion) hold and \
+                                    none contradicts it. It is contradicted if at least half contradict it and none \
+                                    holds. It has too few failing scenarios if more than half of its cells have. \
+                                    Otherwise it is undecided.";
 
     /// In words.
     pub fn text(self) -> &'static str {
