@@ -25,7 +25,7 @@ pub struct Settings {
     pub mining: MiningOptions,
     /// Options of the parameterizations.
     pub parameterization: ParameterizationOptions,
-    /// Scores of a study and their bootstrap.
+    /// Scores of a study and its claims.
     pub score: ScoreOptions,
     /// `lanesweep fit`.
     pub fit: FitSettings,

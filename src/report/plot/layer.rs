@@ -50,7 +50,7 @@ pub struct Value {
     pub interval: Option<(f64, f64)>,
     /// Ends of an interval that covers more, drawn paler and thinner.
     pub outer: Option<(f64, f64)>,
-    /// It rests on few failing scenarios ([`is_few`]): its marker is hollow.
+    /// It rests on few failing scenarios: its marker is hollow.
     pub is_few: bool,
     /// A word beside it.
     pub label: String,
