@@ -107,7 +107,7 @@ fn no_interval(cell: &ScoreCell) -> String {
     match (f1(&cell.counts), cell.f1_interval) {
         (_, Some(_)) => String::new(),
         (None, None) => "undefined".to_owned(),
-        (Some(_), None) => "too few failures of S".to_owned(),
+        (Some(_), None) => "S fails in too few scenarios".to_owned(),
     }
 }
 
@@ -160,7 +160,15 @@ mod tests {
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {
             let counts = Confusion::default();
-            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, undefined_draws: 0 }
+            ScoreCell {
+                variant: 0,
+                model,
+                criterion,
+                counts,
+                failing_scenarios: 0,
+                f1_interval: None,
+                undefined_draws: 0,
+            }
         };
         let models = [ModelId::Rss, ModelId::Fsm];
         let scores = CategoryScores {

@@ -83,7 +83,7 @@ pub fn f1_table(scores: &CategoryScores, published: bool) -> String {
         table.add_row(row);
     }
     format!(
-        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: too few failures\n{}",
+        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: S fails in too few scenarios\n{}",
         scores.category.label(),
         readable::count(scores.scenarios),
         aligned(table, 2)

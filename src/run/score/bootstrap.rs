@@ -23,7 +23,7 @@ pub struct ScoreOptions {
     /// Coverage of the intervals (0.95).
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
-    /// Below so many failures in S a claim is not judged and F1 has no interval (10).
+    /// Where S fails in fewer scenarios, a claim or a ratio is not judged and F1 has no interval (10).
     #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub least_failures: u32,
 }

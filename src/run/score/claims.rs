@@ -1,8 +1,8 @@
 //! The paper's qualitative claims, judged on the user's data.
 //!
 //! A claim holds if the paired bootstrap interval of its statistic excludes 0 with the claimed sign, is
-//! contradicted if it excludes 0 with the other, and undecided otherwise. Cells with few failures in S are
-//! left out; where none remains the data is too few. It is also too few below ten scenarios: a bootstrap over one
+//! contradicted if it excludes 0 with the other, and undecided otherwise. Cells in which S fails in few
+//! scenarios are left out; where none remains the data is too few. It is also too few below ten scenarios: a bootstrap over one
 //! scenario has no width. A claimed equality holds if the interval lies within
 //! ±0.05 and is contradicted if it lies wholly outside; over several cells it is about the mean size of the
 //! difference, so that differences of opposite sign do not cancel.
@@ -52,7 +52,7 @@ pub enum ClaimVerdict {
     Contradicted,
     /// The interval holds 0.
     Undecided,
-    /// Fewer failures in S than needed, or fewer than ten scenarios.
+    /// S fails in fewer scenarios than needed, or there are fewer than ten.
     TooFew,
     /// A variant, a model or a headway that it speaks of was not run.
     NotRun,
@@ -97,7 +97,7 @@ pub struct ClaimResult {
     pub overall: ClaimRow,
     /// Each cell.
     pub rows: Vec<ClaimRow>,
-    /// Cells left out for too few failures.
+    /// Cells left out for too few failing scenarios.
     pub left_out: usize,
 }
 
@@ -234,6 +234,7 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         statistic.variants().iter().all(|v| scores.variant(v).is_some()) && statistic.models().iter().all(has_model);
     let has_all_models = claim.cells.iter().all(|(model, _)| has_model(model));
     let failures = |&(model, criterion): &(ModelId, Criterion)| statistic.failures(scores, model, criterion);
+    let failing = |&(model, criterion): &(ModelId, Criterion)| statistic.failing_scenarios(scores, model, criterion);
     let of_draw = |draw: Option<usize>, (model, criterion): (ModelId, Criterion)| {
         let counts = |at: usize| draw.map_or(scores.cells[at].counts, |d| scores.draws[d][at]);
         statistic.value(scores, &counts, model, criterion)
@@ -251,7 +252,8 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         let value = mean(None);
         let interval = interval(values, confidence).filter(|_| value.is_some());
         let total: u64 = all.iter().map(failures).sum();
-        let verdict = if scores.scenarios < MIN_SCENARIOS || cells.is_empty() || total < u64::from(least) {
+        let failing = all.iter().map(failing).max().unwrap_or(0);
+        let verdict = if scores.scenarios < MIN_SCENARIOS || cells.is_empty() || failing < u64::from(least) {
             ClaimVerdict::TooFew
         } else if f64::from(undefined_draws) > MAX_UNDEFINED * scores.draws.len() as f64 {
             ClaimVerdict::Undecided
@@ -264,7 +266,7 @@ fn judge_claim(claim: Claim, scores: &CategoryScores, least: u32, confidence: f6
         }
         row
     };
-    let usable: Vec<_> = claim.cells.iter().copied().filter(|c| failures(c) >= u64::from(least)).collect();
+    let usable: Vec<_> = claim.cells.iter().copied().filter(|c| failing(c) >= u64::from(least)).collect();
     let overall = row(None, &claim.cells, &usable);
     let rows = claim.cells.iter().map(|&cell| row(Some(cell), &[cell], &[cell])).collect();
     ClaimResult { left_out: claim.cells.len() - usable.len(), claim, overall, rows }
@@ -305,7 +307,18 @@ mod tests {
                         "d" => d,
                         _ => Confusion { tp, tn: 1000 - tp, ..Confusion::default() },
                     };
-                    cells.push(ScoreCell { variant, model, criterion, counts, f1_interval: None, undefined_draws: 0 });
+                    // One failing lane per scenario.
+                    let failing_scenarios = counts.tp + counts.fn_;
+                    let (f1_interval, undefined_draws) = (None, 0);
+                    cells.push(ScoreCell {
+                        variant,
+                        model,
+                        criterion,
+                        counts,
+                        failing_scenarios,
+                        f1_interval,
+                        undefined_draws,
+                    });
                 }
             }
         }

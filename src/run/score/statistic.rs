@@ -80,6 +80,20 @@ impl Statistic {
         }
     }
 
+    /// Scenarios with such a failure, at least: those of the model and criterion that fails in most.
+    pub fn failing_scenarios(&self, scores: &CategoryScores, model: ModelId, criterion: Criterion) -> u64 {
+        let of = |model: ModelId, criterion: Criterion| {
+            scores.index(0, model, criterion).map_or(0, |at| scores.cells[at].failing_scenarios)
+        };
+        match *self {
+            Statistic::FailsMoreOften(often, seldom) => {
+                often.iter().chain(seldom).map(|m| of(*m, criterion)).max().unwrap_or(0)
+            }
+            Statistic::FailsMoreThan(other) => of(model, criterion).max(of(model, other)),
+            _ => of(model, criterion),
+        }
+    }
+
     /// The models that it compares beyond the cell's own.
     pub fn models(&self) -> Vec<ModelId> {
         match *self {

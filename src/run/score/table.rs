@@ -46,13 +46,13 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
 /// The interval of F1 from the counts of each scenario. F1 = 2J/(1 + J) rises with J = TP/(TP + FP + FN), the share of
 /// agreement among all failures, so the interval of J over scenarios as clusters gives that of F1.
 ///
-/// `None` below [`ScoreOptions::least_failures`] failures of S.
+/// `None` where S fails in fewer than [`ScoreOptions::least_failures`] scenarios.
 pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
 ) -> Option<BootstrapInterval> {
-    let failures_of_s: u64 = scenarios.clone().map(|c| u64::from(c.tp) + u64::from(c.fn_)).sum();
-    if failures_of_s < u64::from(options.least_failures.max(1)) {
+    let failing = scenarios.clone().filter(|c| c.tp > 0 || c.fn_ > 0).count();
+    if failing < options.least_failures.max(1) as usize {
         return None;
     }
     let any = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
@@ -74,7 +74,9 @@ pub struct ScoreCell {
     pub criterion: Criterion,
     /// Counts over (scenario, THW) pairs.
     pub counts: Confusion,
-    /// Interval of F1 over scenarios; `None` below [`ScoreOptions::least_failures`] failures of S.
+    /// Scenarios in which S fails from some headway.
+    pub failing_scenarios: u64,
+    /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::least_failures`] of them.
     pub f1_interval: Option<BootstrapInterval>,
     /// Bootstrap draws in which F1 is 0/0: claims about it leave them out. Its interval needs no draws.
     pub undefined_draws: u32,
@@ -166,6 +168,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
                     model: plan.models[at / criteria % plan.models.len()],
                     criterion: Criterion::ALL[at % criteria],
                     counts: totals[at],
+                    failing_scenarios: failing(units, at),
                     undefined_draws: undefined as u32,
                     f1_interval: f1_interval(units.iter().map(|unit| &unit.cells[at]), options),
                 }
@@ -183,6 +186,12 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
         });
     }
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
+}
+
+/// Scenarios in which S fails in this cell.
+fn failing(units: &[UnitCounts], cell: usize) -> u64 {
+    let fails = |unit: &&UnitCounts| unit.cells[cell].tp > 0 || unit.cells[cell].fn_ > 0;
+    units.iter().filter(fails).count() as u64
 }
 
 #[cfg(test)]
