@@ -125,11 +125,7 @@ impl Compare {
             parameterizations: ids.clone(),
             samples: self.samples,
             seed: self.seed,
-            enough: Enough {
-                failures: config.score.least_failures.into(),
-                margin: config.compare.margin,
-                ..Enough::default()
-            },
+            enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
         };
         let enough = options.enough;
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;

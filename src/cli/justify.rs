@@ -58,6 +58,12 @@ pub struct Justify {
     /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
     #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
     thw: String,
+    /// Who answers for the dossier [default: a line to fill in]
+    #[arg(long, value_name = "NAME")]
+    author: Option<String>,
+    /// Date of the dossier [default: a line to fill in]
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date)]
+    date: Option<String>,
     /// Folder for report.html, dossier.json and hidden.csv
     #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier")]
     out: PathBuf,
@@ -111,11 +117,7 @@ impl Justify {
                 parameterizations: vec![id],
                 samples: config.compare.samples,
                 seed: config.compare.seed,
-                enough: Enough {
-                    failures: config.score.least_failures.into(),
-                    margin: config.compare.margin,
-                    ..Enough::default()
-                },
+                enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
             },
             criterion,
             score: config.score.clone(),
@@ -127,7 +129,8 @@ impl Justify {
         for error in &dossier.left_out {
             tracing::warn!("{error}; {}", error.help().unwrap_or_default());
         }
-        let conformance = check_shipped_tables()?;
+        let mut conformance = check_shipped_tables(dossier.parameterization.category, &profile)?;
+        conformance.retain(|tally| tally.model.is_none_or(|of| of == model));
         let report = DossierReport {
             dossier: &dossier,
             rules: &options.rules,
@@ -138,6 +141,8 @@ impl Justify {
             scenarios_sha256: facts.scenarios_sha256.clone(),
             profile: &profile,
             conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
+            author: self.author.clone(),
+            date: self.date.clone(),
             command: command(),
             host: opened.host(dossier.summary.rechecked_lanes, started),
         };
@@ -164,6 +169,13 @@ fn parameterization(key: &str) -> Result<Parameterization> {
         let help = format!("use one of {}", keys.collect::<Vec<_>>().join(", "));
         Error::usage(Place::item("--parameterization"), format!("there is no parameterization `{key}`"), help)
     })
+}
+
+/// A day, as ISO 8601 writes it.
+fn date(text: &str) -> std::result::Result<String, String> {
+    let parts: Vec<Option<u32>> = text.split('-').map(|part| part.parse().ok()).collect();
+    let is_day = matches!(parts[..], [Some(_), Some(1..=12), Some(1..=31)]) && text.len() == 10;
+    if is_day { Ok(text.to_owned()) } else { Err("write a day such as 2026-11-24".to_owned()) }
 }
 
 fn named(tally: &crate::interop::conformance::Tally) -> String {

@@ -16,7 +16,7 @@ use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_f
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Partial, Wanted, forecast};
+use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::model::profile::Profile;
 use crate::report::lanes::Digits;
@@ -199,6 +199,7 @@ impl Study {
         let mut config = configured.settings.clone();
         config.score.seed = self.seed.unwrap_or(config.score.seed);
         let (profile, options, source) = self.asked(configured)?;
+        let has_paper_headways = options.headways == Headway::paper();
         // What is generated is said with the answer.
         if !matches!(source, Source::Generated(_)) {
             tracing::info!("{}", source.describe(false));
@@ -214,8 +215,8 @@ impl Study {
             .score(config.score)
             .data(data)
             .scenario_file_sha256(self.scenarios.as_deref().map(input_file::sha256).transpose()?)
-            // What the synthetic recordings are calibrated to always stands beside what they give.
-            .published(self.published || collection.synthetic)
+            // What the synthetic recordings are calibrated to stands beside what they give, where the headways are the same.
+            .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         for left_out in study.left_out() {

@@ -15,7 +15,8 @@ pub(super) struct CloseRow<'a> {
     pub close: &'a CloseFollowing,
 }
 
-/// The sentence that says what was counted, then a row per category and criterion; empty without counts. `of_whom` says
+/// The sentence that says what was counted, then a row per category and criterion where there is such a headway; empty
+/// without counts. `of_whom` says
 /// whose failures these are.
 pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Headway]) -> String {
     let Some(first) = rows.first() else { return String::new() };
@@ -39,7 +40,9 @@ pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Head
     let percent = value(100.0 * close as f64 / all.max(1) as f64);
     let thw_s = CLOSE_HEADWAY_S;
     let whence = match headways.iter().filter(|h| matches!(h, Headway::ThwS(s) if *s < thw_s)).count() {
-        _ if Headway::is_observed(headways) => format!("{close} of {all} recorded headways are below it"),
+        _ if Headway::is_observed(headways) => {
+            format!("{} of {} recorded headways are below it", count(close), count(all))
+        }
         imposed if imposed > 0 => format!(
             "{imposed} of the {} imposed headways are below it ({percent} % of the simulations), whatever was recorded",
             headways.len()
@@ -47,5 +50,6 @@ pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Head
         _ => format!("{percent} % of the simulations start below it"),
     };
     let sentence = format!("Failures of {of_whom} from headways below {thw_s} s, of all its failures: {whence}.");
-    format!("{}\n{}", wrap(&sentence, WIDTH), aligned(cells, 2))
+    let cells = if close > 0 { aligned(cells, 2) } else { String::new() };
+    format!("{}\n{cells}", wrap(&sentence, WIDTH))
 }

@@ -188,7 +188,8 @@ impl CompareFile {
             Some(CloseRow { category: comparison.category, models: &self.models, close })
         });
         let headways: Vec<Headway> = self.headways.iter().filter_map(|text| Headway::parse(text)).collect();
-        text.push_str(&close_following(&close.collect::<Vec<_>>(), "S", &headways));
+        let close = close_following(&close.collect::<Vec<_>>(), "S", &headways);
+        text.extend((!close.is_empty()).then(|| format!("\n{close}")));
         for reason in &self.left_out {
             let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));
         }
@@ -251,12 +252,12 @@ impl CompareFile {
 
     /// How to read a cell.
     fn rule(&self) -> String {
-        let Enough { failures, clusters, margin } = self.enough;
+        let Enough { clusters, margin } = self.enough;
         let text = format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
-             beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {failures} failed \
-             lanes or fewer than {clusters} failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn. \
+             beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {clusters} \
+             failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn. \
              S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, {}. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
              says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \

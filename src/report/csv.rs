@@ -107,7 +107,7 @@ fn no_interval(cell: &ScoreCell) -> String {
     match (f1(&cell.counts), cell.f1_interval) {
         (_, Some(_)) => String::new(),
         (None, None) => "undefined".to_owned(),
-        (Some(_), None) => "too few failures of S".to_owned(),
+        (Some(_), None) => "S fails in too few scenarios".to_owned(),
     }
 }
 

@@ -8,7 +8,7 @@ use super::sampling::HostRecord;
 use super::tables::{aligned, table};
 use super::trace::{TraceFigure, TraceSeries};
 use crate::model::profile::Profile;
-use crate::run::justify::{Conclusion, Dossier, Finding, Need, Rules, Scored, Share};
+use crate::run::justify::{Conclusion, Dossier, Finding, REGULATION, Rules, Scored, Share};
 use crate::run::sampling::RateRecord;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
@@ -35,8 +35,12 @@ pub struct DossierReport<'a> {
     pub scenarios_sha256: String,
     /// Profile.
     pub profile: &'a Profile,
-    /// Conformance tables that ship with the program: what, rows, passes.
+    /// Conformance tables of this category and profile that ship with the program: what, rows, passes.
     pub conformance: Vec<(String, u64, bool)>,
+    /// Who answers for it, where that is given.
+    pub author: Option<String>,
+    /// Its date as given: the program writes none of its own, so that the same inputs give the same bytes.
+    pub date: Option<String>,
     /// Command that makes it again.
     pub command: String,
     /// What belongs to the machine.
@@ -44,46 +48,6 @@ pub struct DossierReport<'a> {
 }
 
 impl DossierReport<'_> {
-    /// The conclusion in one sentence.
-    pub fn answer(&self) -> String {
-        let Dossier { parameterization, model, criterion, conclusion, scenarios, lanes, .. } = self.dossier;
-        format!(
-            "{} is {} for {} and {} on this data ({} scenarios, {} simulations of S)",
-            parameterization.name(),
-            conclusion.text().to_uppercase(),
-            model.name(),
-            criterion.label(),
-            count(*scenarios),
-            count(*lanes)
-        )
-    }
-
-    /// How much more data would decide, over all undecided rules.
-    pub(super) fn need(&self) -> Option<String> {
-        if self.dossier.conclusion != Conclusion::Undecided {
-            return None;
-        }
-        if self.dossier.scored.counts.tp + self.dossier.scored.counts.fn_ == 0 {
-            return Some(
-                "S never fails, so the data does not tell how many scenarios would decide: use more, or more severe ones."
-                    .to_owned(),
-            );
-        }
-        let times = self.dossier.findings.iter().filter_map(|finding| finding.need).map(|Need { times }| times);
-        let times = times.fold(None, |most: Option<f64>, times| Some(most.map_or(times, |most| most.max(times))))?;
-        let more = (times * self.dossier.scenarios as f64).ceil();
-        Some(if times < 1000.0 {
-            format!(
-                "At least about {} scenarios ({} times as many) would decide, if the rates stay as they are: an interval narrows with \
-                 the square root of their number.",
-                count(more as u64),
-                value(times)
-            )
-        } else {
-            "The value lies on the limit: no realistic amount of data decides.".to_owned()
-        })
-    }
-
     pub(super) fn findings(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let header = ["quantity", "rule", "conclusion", "value", "interval", "more data"];
         let row = |finding: &Finding| {
@@ -165,7 +129,7 @@ impl DossierReport<'_> {
                 value(rate.rate),
                 format!("[{} {}]", value(rate.low), value(rate.high)),
                 ratio.ratio.map_or("–".to_owned(), value),
-                interval(ratio.low.zip(ratio.high)),
+                interval(ratio.interval()),
                 ratio.verdict.text().to_owned(),
             ]
         };
@@ -206,14 +170,16 @@ impl DossierReport<'_> {
             aligned(table, texts)
         };
         let need = self.need().map_or(String::new(), |need| format!("{need}\n"));
+        let sentences = [self.answer(), self.recall(), self.close_following()];
+        let sentences: Vec<String> = sentences.into_iter().filter(|sentence| !sentence.is_empty()).collect();
         let hidden = match self.dossier.hidden.len() {
             0 => String::new(),
             n => format!("\nHidden failures, the most severe of {}\n{}", count(n as u64), rows(self.hidden(5), 1)),
         };
         format!(
-            "{}\n{}{need}\n{}{hidden}\nThe alternatives\n{}",
+            "{}\n{}\n{need}\n{}{hidden}\nThe alternatives\n{}",
             self.data,
-            format_args!("{}\n", self.answer()),
+            sentences.join("\n"),
             rows(self.findings(), 3),
             rows(self.alternatives(), 2)
         )
@@ -302,14 +268,20 @@ impl DossierReport<'_> {
             "category": dossier.parameterization.category.key(),
             "model": dossier.model.name(),
             "criterion": dossier.criterion.key(),
+            "author": self.author,
+            "date": self.date,
             "conclusion": dossier.conclusion,
+            "sentence": self.answer(),
             "rules": self.rules,
             "margin": self.margin,
             "confidence": self.confidence,
             "findings": dossier.findings,
             "scenarios": dossier.scenarios,
             "simulations": dossier.lanes,
+            "headways": dossier.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "close_following": dossier.close_following,
             "scores": scored(&dossier.scored),
+            "regulation": dossier.regulation.as_ref().map(|of| json!({"profile": REGULATION, "scores": scored(of)})),
             "groups": groups.collect::<Vec<_>>(),
             "compared": dossier.compared,
             "coverage": coverage,
@@ -344,7 +316,12 @@ pub(super) fn share(share: &Share) -> String {
 }
 
 fn interval(interval: Option<(f64, f64)>) -> String {
-    interval.map_or("–".to_owned(), |(low, high)| format!("[{} {}]", value(low), value(high)))
+    match interval {
+        None => "–".to_owned(),
+        // A ratio to S, which never fails.
+        Some((low, f64::INFINITY)) => format!("above {}", value(low)),
+        Some((low, high)) => format!("[{} {}]", value(low), value(high)),
+    }
 }
 
 pub(super) fn program() -> String {

@@ -16,9 +16,9 @@ impl DossierReport<'_> {
             warnings.push("SYNTHETIC DATA: nothing on this page is a statement about real traffic.".to_owned());
         }
         let page = Page {
-            title: format!("Is {} appropriate?", self.dossier.parameterization.name()),
+            title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             program: program(),
-            lead: format!("{}. {}", self.answer(), self.data),
+            lead: format!("{}. {} {}", self.answer(), self.recall(), self.data),
             warnings,
             sections: vec![
                 self.conclusion_section(),
@@ -41,7 +41,9 @@ impl DossierReport<'_> {
                     ..Section::new("alternatives", "The alternatives")
                 },
                 self.credibility_section(),
+                Section { facts: self.limits(), ..Section::new("limits", "Limits of use") },
                 self.reproduction_section()?,
+                Section { facts: self.signature(), ..Section::new("signature", "Signature") },
             ],
         };
         page.html()
@@ -51,7 +53,7 @@ impl DossierReport<'_> {
         let share = |limit: f64| format!("{limit}: the whole interval at or above it passes, the whole below it fails");
         let (margin, lower) = (self.margin, value(1.0 / self.margin));
         Section {
-            intro: self.need().unwrap_or_default(),
+            intro: [self.need().unwrap_or_default(), self.close_following()].join(" ").trim().to_owned(),
             tables: vec![page_table("What each rule finds; the worst decides", 3, self.findings())],
             facts: vec![
                 ("recall, limit".to_owned(), share(self.rules.min_recall)),
@@ -62,7 +64,7 @@ impl DossierReport<'_> {
                 ),
                 (
                     "least data".to_owned(),
-                    "as many failing scenarios as score.least_failures; with fewer, recall and precision are undecided"
+                    "as many failing scenarios as score.least_failures; with fewer, recall and precision are undecided and have no interval"
                         .to_owned(),
                 ),
                 ("coverage, limit".to_owned(), format!("{} of the kept scenarios", self.rules.min_coverage)),
@@ -160,18 +162,20 @@ impl DossierReport<'_> {
             vec![what.clone(), if *passes { "passes" } else { "FAILS" }.to_owned(), count(*rows)]
         });
         let table = (owned(&["table", "in this build", "rows"]), rows.collect());
+        let tables = if self.conformance.is_empty() { Vec::new() } else { vec![page_table("Conformance", 2, table)] };
         let recheck = format!(
             "{} lanes were computed again on the CPU with every step, and were equal to the bit",
             count(self.host.rechecked_lanes)
         );
         Section {
-            intro: "Tables of the JRC's public simulator that ship with the program, under jrc-2021, computed in this run. \
-                    `lanesweep verify conformance` takes more tables."
-                .to_owned(),
-            tables: vec![page_table("Conformance", 2, table)],
+            intro: self.conformance_words(),
+            tables,
             facts: vec![
                 ("exactness".to_owned(), recheck),
-                ("not covered".to_owned(), "perception faults, vehicle dynamics beyond a deceleration with a jerk limit".to_owned()),
+                (
+                    "not covered".to_owned(),
+                    "perception faults, vehicle dynamics beyond a deceleration with a jerk limit".to_owned(),
+                ),
             ],
             ..Section::new("credibility", "Credibility of the simulation")
         }

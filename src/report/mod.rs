@@ -12,6 +12,7 @@ pub mod csv;
 pub mod density;
 pub mod dossier;
 mod dossier_page;
+mod dossier_sentences;
 pub mod failure_map;
 pub mod forest;
 pub mod html;

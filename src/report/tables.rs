@@ -124,8 +124,8 @@ pub fn f1_table(scores: &CategoryScores, published: bool, width: usize) -> Strin
     let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
     header.extend(scores.variants.iter().skip(1).cloned());
     let heading = format!(
-        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: too few \
-         failures",
+        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: S fails \
+         in too few scenarios",
         scores.category.label(),
         readable::count(scores.scenarios)
     );

@@ -70,7 +70,12 @@ pub fn thresholds(profile: &Profile, units: u64) -> LanePlan {
 
 /// A study of two synthetic recordings.
 pub fn small_study() -> LanePlan {
+    small_study_of(StudyOptions::default())
+}
+
+/// The same with other options.
+pub fn small_study_of(options: StudyOptions) -> LanePlan {
     let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
     let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
-    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan
+    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &options).unwrap().plan
 }

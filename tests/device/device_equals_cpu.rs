@@ -3,13 +3,14 @@
 //! verify` asks the same of any other.
 
 use crate::common::device::software_device;
-use crate::common::lane_sets::{forms, random, small_study, thresholds};
+use crate::common::lane_sets::{forms, random, small_study, small_study_of, thresholds};
 use lanesweep::engine::gpu::{Checks, GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{Comparison, compare, self_check};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Headway, LanePlan, Wanted, same_words};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
+use lanesweep::run::study::StudyOptions;
 use lanesweep::scenario::Category;
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
@@ -35,6 +36,15 @@ fn every_word_of_a_small_study_equals_the_cpus() {
     let plan = small_study();
     let comparison = compare("study", &plan, &gpu, |_| ()).unwrap();
     assert_equal("study", &comparison);
+    assert_eq!(comparison.lanes(), plan.lane_count());
+}
+
+#[test]
+fn lanes_that_start_from_their_recorded_gaps_are_equal() {
+    let Some(gpu) = open(GpuOptions::default()) else { return };
+    let plan = small_study_of(StudyOptions { headways: vec![Headway::Observed], ..StudyOptions::default() });
+    let comparison = compare("observed", &plan, &gpu, |_| ()).unwrap();
+    assert_equal("observed", &comparison);
     assert_eq!(comparison.lanes(), plan.lane_count());
 }
 

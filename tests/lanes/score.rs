@@ -46,24 +46,18 @@ fn a_study_that_never_fails_has_no_score() {
 }
 
 #[test]
-fn f1_of_few_failures_has_no_interval_and_its_failing_scenarios_are_counted() {
-    let plan = plan(&[(Category::Lvd, 4, LVD)]);
-    let fails = |least: usize| {
-        table(&plan, &|lane| {
-            let key = plan.key(lane).unwrap();
-            Verdicts(u8::from(key.unit == 2 && key.headway >= least))
-        })
+fn f1_of_few_failing_scenarios_has_no_interval() {
+    let cell = |units: usize, failing: u64| {
+        let plan = plan(&[(Category::Lvd, units, LVD)]);
+        let table = table(&plan, &|lane| Verdicts(u8::from(plan.key(lane).unwrap().unit < failing)));
+        let scores = &table.categories[0];
+        scores.cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()].clone()
     };
-    let table = fails(1);
-    let scores = &table.categories[0];
-    let cell = &scores.cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()];
-    assert_eq!(cell.failing_scenarios, 1);
-    // Nine failures: no interval. Ten: one scenario never makes [1, 1].
-    assert_eq!((f1(&cell.counts), cell.counts.tp, cell.f1_interval), (Some(1.0), 9, None));
-    let interval =
-        fails(0).categories[0].cells[scores.index(1, ModelId::Fsm, Criterion::Collision).unwrap()].f1_interval;
-    let interval = interval.unwrap();
-    assert!(interval.high == 1.0 && interval.low < 0.5, "{interval:?}");
+    // Nine scenarios that fail from ten headways: no interval. Ten never make [1, 1].
+    let (nine, ten) = (cell(20, 9), cell(20, 10));
+    assert_eq!((f1(&nine.counts), nine.counts.tp, nine.failing_scenarios, nine.f1_interval), (Some(1.0), 90, 9, None));
+    let interval = ten.f1_interval.unwrap();
+    assert!(ten.failing_scenarios == 10 && interval.high == 1.0 && interval.low < 0.9, "{interval:?}");
 }
 
 #[test]
@@ -77,7 +71,7 @@ fn the_interval_covers_the_value_and_shrinks_with_the_number_of_scenarios() {
         assert!(interval.low < value && value < interval.high, "{value} {interval:?}");
         interval.high - interval.low
     };
-    let (few, many) = (width(10), width(90));
+    let (few, many) = (width(14), width(90));
     assert!(many < 0.6 * few, "{few} to {many}");
 }
 

@@ -333,7 +333,7 @@ fn intervals_of_f1_hold() {
                 let of = |seed: u64| {
                     let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
                     let units: Vec<Confusion<u32>> = (0..n).map(|_| confusion(&mut random, failing, wrong)).collect();
-                    // None below ten failures of S.
+                    // None where S fails in fewer than ten scenarios.
                     let ours = f1_interval(units.iter(), &ScoreOptions::default())?;
                     let score = |drawn: &[usize]| f1(&total(&drawn.iter().map(|at| units[*at]).collect::<Vec<_>>()));
                     let value = f1(&total(&units)).expect("failures");

@@ -4,23 +4,29 @@
 //! Here lives what is computed: which failures are hidden, scores with their intervals, groups, risk ratios, coverage and
 //! the conclusion by rules. Lanes and densities come from [`crate::run::compare`]; the page is made by [`crate::report`].
 
+mod replay;
 mod rules;
 mod scores;
 
+use replay::Replay;
 pub use rules::{Conclusion, Finding, Need, Rules};
 pub use scores::{Group, Scored, Share};
 
-use crate::engine::{Executor, LaneKey, LaneRunner, Outcome, Partial, SweepSummary, Trace, Verdicts, Wanted};
+use crate::engine::{Executor, Headway, LaneKey, LaneRunner, Outcome, SweepSummary, Trace};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::compare::{Compare, CompareOptions};
+use crate::run::close_following::{CloseFollowing, close_units};
+use crate::run::compare::CompareOptions;
 use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{DataFacts, DensityModel, FitOptions};
+use crate::stats::density::{DataFacts, Fitted};
 use crate::{Error, Place, Result};
+
+/// Profile whose recall stands beside that of the chosen one.
+pub const REGULATION: &str = "un-r157";
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -79,8 +85,14 @@ pub struct Dossier {
     pub scenarios: u64,
     /// Lanes of S.
     pub lanes: u64,
+    /// Headways of the simulations.
+    pub headways: Vec<Headway>,
     /// Scores of the parameterization.
     pub scored: Scored,
+    /// The same under [`REGULATION`]; `None` where that is the profile.
+    pub regulation: Option<Scored>,
+    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
+    pub close_following: Option<CloseFollowing>,
     /// By headway, speed and severity.
     pub groups: Vec<Group>,
     /// Hidden failures, the most severe first.
@@ -131,28 +143,24 @@ pub fn justify(
         .first()
         .copied()
         .ok_or_else(|| Error::usage(Place::option("model"), "it is missing", "name one driver model"))?;
-    let compare = Compare::plan(scenarios, facts, profile.clone(), options.compare.clone())?;
-    let plan = compare.lane_plan();
+    let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+    let replay = Replay::run(scenarios, facts, profile, options, executor, &mut summary)?;
+    let (plan, variant) = (replay.plan(), replay.variant(&id)?);
     let block = &plan.blocks[0];
-    let Some(variant) = block.variants.iter().position(|name| *name == id.key) else {
-        let problem = format!("the data has no {}", id.name());
-        let help = "its decomposition needs more scenarios: use more recordings, or another parameterization";
-        return Err(Error::input(Place::item(&facts.data), problem, help));
-    };
-    // Every verdict is kept: which failures are hidden is a question of single lanes.
-    let (mut verdicts, mut parts): (Vec<Verdicts>, _) = (Vec::new(), Vec::new());
-    let mut summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-        verdicts.extend(chunk.verdicts.iter().copied());
-        parts.push(Partial::from_chunk(plan, &chunk)?);
-        Ok(())
-    })?;
-    let counts = parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?;
-    let failed = |unit: usize, variant: usize, headway: usize| {
-        let at = (unit * block.variants.len() + variant) * plan.headways.len() + headway;
-        verdicts[at].failed(options.criterion)
-    };
-    let labels = scores::Labels { units: block.units.len() as usize, headways: plan.headways.len(), failed: &failed };
+    let failed =
+        |unit: usize, variant: usize, headway: usize| replay.verdicts(unit, variant, headway).failed(options.criterion);
+    let labels = replay.labels(&failed);
     let scored = labels.score(variant, &options.score);
+    let regulation = match profile.name == REGULATION {
+        true => None,
+        false => {
+            let replay = Replay::run(scenarios, facts, &Profile::load(REGULATION)?, options, executor, &mut summary)?;
+            let failed = |unit: usize, variant: usize, headway: usize| {
+                replay.verdicts(unit, variant, headway).failed(options.criterion)
+            };
+            Some(replay.labels(&failed).score(replay.variant(&id)?, &options.score))
+        }
+    };
     let runner = LaneRunner::<f32>::new(plan);
     let key = |unit: usize, variant, headway| LaneKey { block: 0, unit: unit as u64, variant, headway, model: 0 };
     let severity = |unit, headway| severity(&runner.run(&key(unit, 0, headway)).widen(), options.criterion);
@@ -181,31 +189,26 @@ pub fn justify(
     };
     hidden.sort_by(worse);
     let example = hidden.first().map(|h| [runner.trace(&LaneKey { variant: 0, ..h.lane }), runner.trace(&h.lane)]);
-    let mut left_out = Vec::new();
-    let mut compared = None;
-    let mut no_density;
-    match compare.sample(&counts, executor, |_| ()) {
-        Ok(result) => {
-            summary.add(&result.summary);
-            left_out.extend(result.left_out);
-            let of = result.categories.into_iter().flat_map(|category| category.parameterizations).next();
-            compared = of.and_then(|of| {
-                Some((of.density_sha256, of.cells.into_iter().find(|c| c.criterion == options.criterion)?))
-            });
-            no_density = result.failed.into_iter().next();
+    let (mut compared, mut density_sha256, mut coverage) = (None, None, None);
+    let (mut no_density, mut left_out) = (None, Vec::new());
+    match replay.compare.fit(&id, true) {
+        Ok(fitted) => {
+            coverage = Some(Coverage::of(&fitted));
+            left_out = fitted.left_out;
+            match replay.compare.sample_density(&fitted.model, &replay.counts, executor, &mut summary, |_| ()) {
+                Ok(of) => {
+                    density_sha256 = Some(of.density_sha256);
+                    compared = of.cells.into_iter().find(|cell| cell.criterion == options.criterion);
+                }
+                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => no_density = Some(error),
+                Err(error) => return Err(error),
+            }
         }
         Err(error @ (Error::Input { .. } | Error::Usage { .. })) => no_density = Some(error),
         Err(error) => return Err(error),
     }
-    let (density_sha256, compared) = compared.map_or((None, None), |(sha256, cell)| (Some(sha256), Some(cell)));
-    let coverage = match coverage(&id, scenarios, facts, options) {
-        Ok(coverage) => Some(coverage),
-        Err(error @ (Error::Input { .. } | Error::Usage { .. })) => {
-            no_density.get_or_insert(error);
-            None
-        }
-        Err(error) => return Err(error),
-    };
+    let close_units = close_units(scenarios.iter().filter(|s| s.kept && s.category == id.category));
+    let close_following = CloseFollowing::of_recorded(plan, &replay.counts, 0, &close_units)?;
     let alternatives = Parameterization::of(id.category).filter_map(|other| {
         let variant = block.variants.iter().position(|name| *name == other.key)?;
         let scored = labels.score(variant, &options.score);
@@ -222,7 +225,10 @@ pub fn justify(
         scenarios: block.units.len(),
         lanes: block.units.len() * plan.headways.len() as u64,
         conclusion: Conclusion::of(&findings),
+        headways: plan.headways.clone(),
         scored,
+        regulation,
+        close_following,
         groups,
         hidden,
         example,
@@ -249,21 +255,16 @@ fn severity(outcome: &Outcome<f64>, criterion: Criterion) -> f64 {
     }
 }
 
-fn coverage(
-    id: &Parameterization,
-    scenarios: &[Scenario],
-    facts: &DataFacts,
-    options: &JustifyOptions,
-) -> Result<Coverage> {
-    let of_category = || scenarios.iter().filter(|scenario| scenario.category == id.category);
-    let fit = FitOptions { parameterization: options.compare.study.parameterization.clone(), ..FitOptions::default() };
-    let fitted = DensityModel::fit(id.clone(), scenarios, facts, &fit)?;
-    let kept = of_category().filter(|scenario| scenario.kept).count() as u64;
-    Ok(Coverage {
-        found: of_category().count() as u64,
-        kept,
-        points: kept - fitted.left_out.len() as u64,
-        valid_share: fitted.model.valid.estimate,
-        representativeness: fitted.model.representativeness.map(|r| (r.metric, r.train_test)),
-    })
+impl Coverage {
+    /// Of a density and the scenarios that it was fitted on.
+    fn of(fitted: &Fitted) -> Coverage {
+        let Fitted { model, left_out, .. } = fitted;
+        Coverage {
+            found: model.provenance.found,
+            kept: model.provenance.kept,
+            points: model.provenance.kept - left_out.len() as u64,
+            valid_share: model.valid.estimate,
+            representativeness: model.representativeness.map(|r| (r.metric, r.train_test)),
+        }
+    }
 }

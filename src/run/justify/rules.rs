@@ -57,7 +57,7 @@ pub struct Finding {
     pub quantity: &'static str,
     /// Its value.
     pub value: Option<f64>,
-    /// Its interval.
+    /// Its interval; the upper end is ∞ (null in JSON) for a ratio to S where S never fails.
     pub interval: Option<(f64, f64)>,
     /// The rule in words.
     pub rule: String,
@@ -140,7 +140,7 @@ impl Rules {
         let risk = Finding {
             quantity: "risk ratio P/S",
             value: ratio.and_then(|r| r.ratio),
-            interval: ratio.and_then(|r| r.low.zip(r.high)),
+            interval: ratio.and_then(|r| r.interval()),
             rule: format!("interval within {:.2} to {margin}", 1.0 / margin),
             conclusion: match ratio.map(|r| r.verdict) {
                 Some(RatioVerdict::Agrees) => Conclusion::Appropriate,

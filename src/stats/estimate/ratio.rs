@@ -96,7 +96,7 @@ pub enum RatioVerdict {
     TooHigh,
     /// The interval lies below 1, and reaches beyond the margin.
     TooLow,
-    /// The interval holds 1 and reaches beyond the margin, or there are too few failures.
+    /// The interval holds 1 and reaches beyond the margin, or too few clusters fail.
     Undecided,
 }
 
@@ -139,15 +139,13 @@ impl Ratio {
 pub enum RatioMethod {
     /// Student's t on the logarithm, differences cluster by cluster.
     Paired,
-    /// One rate's interval over the other's: too few failures for the logarithm.
+    /// One rate's interval over the other's: too few failing clusters for the logarithm.
     Separate,
 }
 
-/// What a verdict needs: failures on each side for the paired interval, and a margin for agreement.
+/// What a verdict needs: failing clusters on each side for the paired interval, and a margin for agreement.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Enough {
-    /// Failed runs.
-    pub failures: u64,
     /// Clusters with a failed run.
     pub clusters: u64,
     /// Ratio up to which rates count as equal, above 1.
@@ -158,7 +156,7 @@ impl Default for Enough {
     fn default() -> Self {
         // 0.8 … 1.25: the limits that two drugs must keep to be called equivalent (European Medicines Agency,
         // CPMP/EWP/QWP/1401/98).
-        Enough { failures: 10, clusters: 5, margin: 1.25 }
+        Enough { clusters: 10, margin: 1.25 }
     }
 }
 
@@ -177,21 +175,29 @@ pub struct Ratio {
     pub verdict: RatioVerdict,
 }
 
+impl Ratio {
+    /// Both ends; the upper one is ∞ where the denominator never fails and the numerator does.
+    pub fn interval(&self) -> Option<(f64, f64)> {
+        let open = self.low.filter(|low| self.ratio.is_none() && *low > 0.0);
+        self.low.zip(self.high).or(open.map(|low| (low, f64::INFINITY)))
+    }
+}
+
 /// The ratio of two rates over the same clusters, in the same order.
 ///
-/// With enough failures on both sides the interval is R·exp(∓t·σ) with
+/// With enough failing clusters on both sides the interval is R·exp(∓t·σ) with
 /// σ² = N/(N − 1)·Σ(z_i/P − y_i/S)², z and y being the clusters' influences on numerator and denominator: the delta
 /// method on the logarithm, which takes the covariance of the two with it. What varies within clusters (draws of a
 /// Monte Carlo sample) is in σ² as well. t has one degree of freedom less than the side with fewer failing clusters
 /// has of them. A numerator that equals the denominator cluster by cluster has the interval [1, 1]. Rates agree where
 /// the interval lies within the margin; an interval that holds 1 and is wider decides nothing.
 ///
-/// With too few failures the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]: 1 outside still decides,
+/// With too few the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]: 1 outside still decides,
 /// 1 inside is undecided, not agreement.
 pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, level: f64) -> Ratio {
     let finite = |v: f64| v.is_finite().then_some(v);
     let (p, s) = (numerator.rate(), denominator.rate());
-    let side = |c: Clusters| c.failed() >= enough.failures.max(1) && c.failing() >= enough.clusters.max(2);
+    let side = |c: Clusters| c.failing() >= enough.clusters.max(2);
     if !(side(numerator) && side(denominator)) {
         let (above, below) = (cluster_rate(numerator, level).interval, cluster_rate(denominator, level).interval);
         let (low, high) = (above.low / below.high, above.high / below.low);
