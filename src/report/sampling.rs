@@ -301,7 +301,9 @@ impl EstimateFile {
             ];
             fields.extend(has_hours.then(|| rate_text(row.risk.per_hour)));
             fields.extend(has_kilometres.then(|| rate_text(row.risk.per_1000_km)));
-            fields.extend(has_recorded.then(|| ratio_text(row.recorded.and_then(|recorded| recorded.sampled))));
+            let ratio = row.recorded.and_then(|recorded| recorded.sampled);
+            let ratio = ratio.and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
+            fields.extend(has_recorded.then(|| ratio.unwrap_or_else(|| "–".to_owned())));
             fields.push(e.trust.verdict().to_string());
             rows.add_row(fields);
         }

@@ -14,7 +14,7 @@ use lanesweep::run::sampling::{
     SampleHeadways, SamplePlanOptions, SampleSource, generator_of, generator_of_points, plan_points, plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::Parameterization;
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
@@ -30,9 +30,13 @@ fn scenarios() -> &'static [Scenario] {
 }
 
 fn density(id: Parameterization, with_thw: bool) -> DensityModel {
+    density_with(id, FitOptions { with_thw, ..FitOptions::default() })
+}
+
+fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
     let facts =
         DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..options };
     DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
 }
 
@@ -178,6 +182,27 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
         }
     }
     eprintln!("{compared} sampled lanes: 0 differ");
+}
+
+#[test]
+fn a_device_refuses_the_draws_that_the_host_refuses() {
+    let Some(backend) = common::device::software_backend() else { return };
+    let profile = Profile::load("paper").unwrap();
+    for (category, key) in [(Category::CutIn, "7"), (Category::CutOut, "e"), (Category::CutOut, "g")] {
+        // Left and right in one decomposition: many draws are in the wrong lane.
+        let parameterization = ParameterizationOptions::default();
+        let options = FitOptions { parameterization, ..FitOptions::default() };
+        let density = density_with(Parameterization::find(category, key).unwrap(), options);
+        for (source, n) in [(SampleSource::Random, 400), (SampleSource::Sobol, 400)] {
+            let mixture = density.mixture().unwrap();
+            let generator = generator_of(&density.space, &mixture, &density.sizes, &profile, source, 2026).unwrap();
+            let refused = (0..n).filter(|index| generator.draw(*index).tries > 1).count();
+            assert!(refused > 5, "{key} {source:?}: {refused} refused");
+            let plan = plan_samples(&density, &mixture, &profile, &self::options(n, source)).unwrap();
+            let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+            assert!(ours == outcomes(&plan, &*backend, &[0, n]), "{key} {source:?}");
+        }
+    }
 }
 
 #[test]

@@ -9,7 +9,6 @@ use super::plan::SampleHeadways;
 use super::rows::EstimateRow;
 use super::sample::{Sample, SampleKind};
 use super::sample_result::SampleResult;
-use crate::Result;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -17,6 +16,7 @@ use crate::model::profile::Profile;
 use crate::run::study::{StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{Clusters, Enough, Ratio, RatioVerdict, Warning, paired_ratio};
+use crate::{Error, Result};
 
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -56,8 +56,13 @@ fn replay(
         headways: headways.to_vec(),
         parameterization: density.space.options().clone(),
     };
-    let plan = plan_study(&density.scenarios, profile, &options)?.plan;
-    let block = &plan.blocks[0];
+    let plan = match plan_study(&density.scenarios, profile, &options) {
+        Ok(planned) => planned.plan,
+        // The samples are there: what cannot stand beside them does not take them away.
+        Err(Error::Input { .. } | Error::Usage { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    let Some(block) = plan.blocks.first() else { return Ok(None) };
     let Some(variant) = block.variants.iter().position(|name| *name == id.key) else { return Ok(None) };
     // The same bits as on any device, and few lanes beside those of the samples.
     let backend = CpuBackend::lane_arithmetic();

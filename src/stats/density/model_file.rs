@@ -184,7 +184,8 @@ impl File {
         }
         for scenario in &self.scenarios {
             let is_other = (scenario.category != self.category).then(|| format!("is no {}", self.category.label()));
-            if let Some(problem) = is_other.or_else(|| problem_of(scenario)) {
+            let is_left_out = (!scenario.kept).then(|| "did not pass the filters".to_owned());
+            if let Some(problem) = is_other.or(is_left_out).or_else(|| problem_of(scenario)) {
                 return wrong("scenarios", format!("scenario {}: {problem}", scenario.id));
             }
         }

@@ -158,8 +158,8 @@ impl fmt::Display for Warning {
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
             Warning::NotCompared => write!(
                 f,
-                "not compared with recorded scenarios, which the density file does not hold: the error of the \
-                 parameterization is not known"
+                "not compared with recorded scenarios (the density file does not hold them, or they cannot be \
+                 replayed): the error of the parameterization is not known"
             ),
             Warning::AgainstRecorded { ratio: None, is_decided, .. } => match is_decided {
                 true => write!(f, "no recorded scenario fails, but more of the density than chance explains"),
