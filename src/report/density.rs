@@ -95,7 +95,7 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
     })
 }
 
-const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";
+const UNKNOWN: &str = "unknown: the hours and kilometres driven for these scenarios were not given";
 
 fn exposure(exposure: &Exposure) -> String {
     let mut parts = vec![format!("{} events", count(exposure.events))];
