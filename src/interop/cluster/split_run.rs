@@ -8,11 +8,11 @@ const VERBS: [&str; 2] = ["study", "sample"];
 /// Options that the scripts give the run, each with what to write instead.
 const TAKEN: [(&str, &str); 8] = [
     ("shard", "leave it out: option `array` says into how many shards the run is split"),
-    ("out", "give option `out` before the `--`: the folder belongs to all tasks"),
+    ("out", "give option `out = DIR` before the `--`: the folder belongs to all tasks"),
     ("plan", "leave it out: submit.sh makes the plan and each task runs from it"),
     ("plan_only", "leave it out: submit.sh makes the plan"),
     ("stop_after", "leave it out: Slurm tells each task in time (option `time`, option `signal_before`)"),
-    ("threads", "give option `cpus` before the `--`: each task uses the processors that Slurm gives it"),
+    ("threads", "give option `cpus = N` before the `--`: each task uses the processors that Slurm gives it"),
     ("backend", "give option `gpus = 1` or option `gpus = none` before the `--`"),
     ("device", "leave it out: each task uses the GPU that Slurm gives it (option `gpus = 1`)"),
 ];
