@@ -97,7 +97,7 @@ impl Check {
         }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
-            write(path, trace::csv(&named.collect::<Vec<_>>()).as_bytes())?;
+            write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
         }
         self.format.print(|| sheet.text(), || sheet.json())?;
         Ok(match judgements[0].verdict() {

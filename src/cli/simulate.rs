@@ -90,7 +90,7 @@ impl Simulate {
             }
             write_atomically(path, figure(&lanes, self.plot_end).svg().as_bytes())?;
         }
-        self.format.print(|| trace::csv(&named), || document(&lanes, &named))?;
+        self.format.print(|| trace::table(&named).csv(), || document(&lanes, &named))?;
         if verbosity != Verbosity::Quiet {
             lanes.traced.iter().for_each(|lane| console::say(&summary(lane, lanes.traced.len() > 1)));
         }
@@ -212,7 +212,7 @@ fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
         "data": lanes.origin,
         "synthetic": lanes.synthetic,
         "lanes": outcomes.collect::<Vec<_>>(),
-        "steps": trace::records(named)?,
+        "steps": trace::table(named).records(),
     }))
 }
 

@@ -105,7 +105,7 @@ impl Slurm {
             told += &format!("{}: {what}\n", path.display());
         }
         results.publish(texts.submit.as_bytes())?;
-        let submit = shell_quoted("--scripts", &format!("{}/submit.sh", array.scripts))?;
+        let submit = shell_quoted(Place::option("scripts"), &format!("{}/submit.sh", array.scripts))?;
         console::print(&format!("{told}\nSubmit with:\n  bash {submit}\n"))?;
         Ok(Exit::Ok)
     }

@@ -1,9 +1,10 @@
 //! The tables as CSV: numbers in full precision, an empty field where a value is undefined.
 
+use super::records::{Table, whole, words};
 use crate::model::criterion::Criterion;
 use crate::run::score::{ClaimResult, ClaimVerdict, ScoreCell, ScoreInterval, ScoreTable, f1, precision, recall};
 use crate::scenario::parameterization::Parameterization;
-use crate::support::table::cell_text;
+use crate::support::table::{Cell, cell_text};
 use crate::{Error, Result};
 
 pub(crate) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
@@ -15,18 +16,10 @@ pub(crate) fn text(rows: Vec<Vec<String>>) -> Result<Vec<u8>> {
     writer.into_inner().map_err(|e| broken(&e))
 }
 
-fn number(value: Option<f64>) -> String {
-    value.map_or(String::new(), |v| v.to_string())
-}
-
-fn row(fields: &[&str]) -> Vec<String> {
-    fields.iter().map(|f| (*f).to_owned()).collect()
-}
-
 /// Failures of S and S': one row per category, variant, model and criterion. `data` says what was swept.
-pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
-    let mut rows =
-        vec![row(&["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"])];
+pub fn failures(scores: &ScoreTable, data: &str) -> Result<Table> {
+    let columns = ["category", "variant", "model", "criterion", "failures", "simulations", "capped", "data"];
+    let mut table = Table::new(&columns);
     for category in &scores.categories {
         for (at, cell) in category.cells.iter().enumerate() {
             let failures = if cell.variant == 0 { cell.counts.tp } else { cell.counts.tp + cell.counts.fp };
@@ -35,24 +28,24 @@ pub fn failures(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
                 let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
                 Error::Internal(format!("no count of lanes at the time cap for {what}"))
             })?;
-            rows.push(vec![
-                category.category.key().to_owned(),
-                category.variants[cell.variant].clone(),
-                cell.model.name().to_owned(),
-                cell.criterion.key().to_owned(),
-                failures.to_string(),
-                category.simulations.to_string(),
-                capped.to_string(),
-                data.to_owned(),
+            table.push(vec![
+                words(category.category.key()),
+                words(category.variants[cell.variant].as_str()),
+                words(cell.model.name()),
+                words(cell.criterion.key()),
+                whole(failures),
+                whole(category.simulations),
+                whole(*capped),
+                words(data),
             ]);
         }
     }
-    text(rows)
+    Ok(table)
 }
 
 /// Scores: one row per category, parameterization, model and criterion.
-pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
-    let mut rows = vec![row(&[
+pub fn f1_scores(scores: &ScoreTable, data: &str) -> Table {
+    let mut table = Table::new(&[
         "category",
         "parameterization",
         "parameters",
@@ -70,50 +63,50 @@ pub fn f1_scores(scores: &ScoreTable, data: &str) -> Result<Vec<u8>> {
         "f1_no_interval",
         "failing_scenarios",
         "data",
-    ])];
+    ]);
     for category in &scores.categories {
         for cell in category.cells.iter().filter(|c| c.variant > 0) {
             let name = &category.variants[cell.variant];
-            let parameters = Parameterization::find(category.category, name)
-                .map_or(String::new(), |p| p.parameter_count().to_string());
+            let parameters =
+                Parameterization::find(category.category, name).map_or(Cell::Null, |p| whole(p.parameter_count()));
             let c = &cell.counts;
-            let end = |pick: fn(ScoreInterval) -> f64| number(cell.f1_interval.map(pick));
-            rows.push(vec![
-                category.category.key().to_owned(),
-                name.clone(),
+            let end = |pick: fn(ScoreInterval) -> f64| Cell::number(cell.f1_interval.map(pick));
+            table.push(vec![
+                words(category.category.key()),
+                words(name.as_str()),
                 parameters,
-                cell.model.name().to_owned(),
-                cell.criterion.key().to_owned(),
-                c.tp.to_string(),
-                c.fn_.to_string(),
-                c.fp.to_string(),
-                c.tn.to_string(),
-                number(recall(c)),
-                number(precision(c)),
-                number(f1(c)),
+                words(cell.model.name()),
+                words(cell.criterion.key()),
+                whole(c.tp),
+                whole(c.fn_),
+                whole(c.fp),
+                whole(c.tn),
+                Cell::number(recall(c)),
+                Cell::number(precision(c)),
+                Cell::number(f1(c)),
                 end(|i| i.low),
                 end(|i| i.high),
-                no_interval(cell),
-                cell.failing_scenarios.to_string(),
-                data.to_owned(),
+                words(no_interval(cell)),
+                whole(cell.failing_scenarios),
+                words(data),
             ]);
         }
     }
-    text(rows)
+    table
 }
 
 /// Why F1 has no interval; empty where it has one.
-fn no_interval(cell: &ScoreCell) -> String {
+fn no_interval(cell: &ScoreCell) -> &'static str {
     match (f1(&cell.counts), cell.f1_interval) {
-        (_, Some(_)) => String::new(),
-        (None, None) => "undefined".to_owned(),
-        (Some(_), None) => "S fails in too few scenarios".to_owned(),
+        (_, Some(_)) => "",
+        (None, None) => "undefined",
+        (Some(_), None) => "S fails in too few scenarios",
     }
 }
 
 /// Claims: per claim one row over all cells (`model` and `criterion` empty), then one per cell.
-pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
-    let mut rows = vec![row(&[
+pub fn claims(results: &[ClaimResult], data: &str) -> Table {
+    let mut table = Table::new(&[
         "claim",
         "category",
         "statement",
@@ -125,13 +118,13 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
         "high",
         "verdict",
         "data",
-    ])];
+    ]);
     for result in results {
         let claim = [result.claim.id, result.claim.category.key(), result.claim.statement];
         let mut add = |cell: [&str; 2], failing: u64, numbers: [Option<f64>; 3], verdict: ClaimVerdict| {
-            let words = claim.into_iter().chain(cell).map(str::to_owned).chain([failing.to_string()]);
-            let numbers = numbers.into_iter().map(number);
-            rows.push(words.chain(numbers).chain([verdict.text().to_owned(), data.to_owned()]).collect());
+            let texts = claim.into_iter().chain(cell).map(words).chain([whole(failing)]);
+            let numbers = numbers.into_iter().map(Cell::number);
+            table.push(texts.chain(numbers).chain([words(verdict.text()), words(data)]).collect());
         };
         add(["", ""], result.failing_scenarios, [result.mean, None, None], result.verdict);
         for cell in &result.rows {
@@ -139,7 +132,7 @@ pub fn claims(results: &[ClaimResult], data: &str) -> Result<Vec<u8>> {
             add([cell.cell.0.name(), cell.cell.1.key()], cell.failing_scenarios, numbers, cell.verdict);
         }
     }
-    text(rows)
+    table
 }
 
 #[cfg(test)]
@@ -171,9 +164,9 @@ mod tests {
 
     #[test]
     fn no_model_gets_the_capped_lanes_of_another_one() {
-        let text = String::from_utf8(failures(&scores(vec![3, 8]), "synthetic").unwrap()).unwrap();
+        let text = failures(&scores(vec![3, 8]), "synthetic").unwrap().csv();
         assert!(text.contains("lvd,S,RSS,collision,0,10,3,") && text.contains("lvd,S,FSM,btn,0,10,8,"), "{text}");
-        let error = failures(&scores(vec![3]), "synthetic").unwrap_err();
+        let Err(error) = failures(&scores(vec![3]), "synthetic") else { panic!("a table") };
         assert!(error.to_string().contains("FSM of S"), "{error}");
     }
 }

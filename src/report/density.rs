@@ -109,7 +109,7 @@ fn refused(valid: &ValidShare) -> String {
     valid.refused.iter().map(of).collect::<Vec<_>>().join("\n           ")
 }
 
-const UNKNOWN: &str = "unknown: give --hours and --km, what was driven for these scenarios";
+const UNKNOWN: &str = "unknown: the hours and kilometres driven for these scenarios were not given";
 
 fn exposure(exposure: &Exposure) -> String {
     let mut parts = vec![format!("{} events", count(exposure.events))];

@@ -1,61 +1,77 @@
-//! The tables of a run as JSON: what `--format json` prints. The same rows and columns as the CSV files.
+//! The tables of a run: as CSV, and as JSON for `--format json`. Each field has a type of its own; none is guessed from text.
+
+use std::fmt::Write;
 
 use serde_json::{Map, Value};
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
-use crate::support::table::text_of_cell;
+use crate::support::table::{Cell, csv_field};
 use crate::{Error, Result};
 
-/// Columns whose fields are texts even where they look like numbers (a parameterization's key is `1`). Every other
-/// column holds numbers.
-const TEXTS: &[&str] = &[
-    "category",
-    "claim",
-    "criterion",
-    "data",
-    "lane",
-    "mark",
-    "model",
-    "parameterization",
-    "statement",
-    "variant",
-    "verdict",
-];
-
-/// A table as a list of objects, one per row, in the table's order. An empty field is null; a number that JSON does
-/// not have (infinite) is null as well. The column `data` is left out: a document says once what it is about.
-///
-/// # Errors
-/// [`Error::Internal`] where the bytes are not a table with a header.
-pub(super) fn records(csv: &[u8]) -> Result<Value> {
-    let broken = |e: csv::Error| Error::Internal(format!("a table cannot be read again: {e}"));
-    let mut reader = csv::Reader::from_reader(csv);
-    let names: Vec<String> = reader.headers().map_err(broken)?.iter().map(str::to_owned).collect();
-    let mut rows = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(broken)?;
-        let fields = names.iter().zip(&row).filter(|(name, _)| *name != "data");
-        rows.push(Value::Object(
-            fields.map(|(name, field)| (name.clone(), value(name, text_of_cell(field)))).collect::<Map<_, _>>(),
-        ));
-    }
-    Ok(Value::Array(rows))
+/// A table with a header.
+pub struct Table {
+    columns: Vec<String>,
+    rows: Vec<Vec<Cell<'static>>>,
 }
 
-fn value(name: &str, field: &str) -> Value {
-    if field.is_empty() {
-        return Value::Null;
+impl Table {
+    /// A table without rows.
+    pub fn new(columns: &[&str]) -> Table {
+        Table { columns: columns.iter().map(|name| (*name).to_owned()).collect(), rows: Vec::new() }
     }
-    if TEXTS.contains(&name) {
-        return Value::from(field);
+
+    /// Adds a row: a field per column.
+    pub fn push(&mut self, row: Vec<Cell<'static>>) {
+        debug_assert_eq!(row.len(), self.columns.len());
+        self.rows.push(row);
     }
-    match (field.parse::<u64>(), field.parse::<f64>()) {
-        (Ok(whole), _) => Value::from(whole),
-        // Null where it is not finite.
-        (_, Ok(number)) => Value::from(number),
-        _ => Value::from(field),
+
+    /// The table as CSV: numbers in full precision, nothing for null.
+    pub fn csv(&self) -> String {
+        let mut text = self.columns.join(",") + "\n";
+        for row in &self.rows {
+            for (at, cell) in row.iter().enumerate() {
+                text.push_str(if at > 0 { "," } else { "" });
+                // Writing to a string does not fail.
+                let _ = match cell {
+                    Cell::Text(words) => write!(text, "{}", csv_field(words)),
+                    Cell::Whole(number) => write!(text, "{number}"),
+                    Cell::Number(number) => write!(text, "{number}"),
+                    _ => Ok(()),
+                };
+            }
+            text.push('\n');
+        }
+        text
     }
+
+    /// The rows as a list of objects. A number that JSON does not have (infinite) is null. The column `data` is left
+    /// out: a document says once what it is about.
+    pub fn records(&self) -> Value {
+        let value = |cell: &Cell| match cell {
+            Cell::Text(words) => Value::from(words.as_ref()),
+            Cell::Whole(number) => Value::from(*number),
+            Cell::Number(number) => Value::from(*number),
+            _ => Value::Null,
+        };
+        let record = |row: &Vec<Cell>| {
+            let fields = self.columns.iter().zip(row).filter(|(name, _)| *name != "data");
+            Value::Object(fields.map(|(name, cell)| (name.clone(), value(cell))).collect::<Map<_, _>>())
+        };
+        Value::Array(self.rows.iter().map(record).collect())
+    }
+}
+
+/// A text; an empty one is null.
+pub fn words(text: impl Into<String>) -> Cell<'static> {
+    let text: String = text.into();
+    if text.is_empty() { Cell::Null } else { Cell::text(text) }
+}
+
+/// A count.
+pub fn whole(count: impl TryInto<i64>) -> Cell<'static> {
+    count.try_into().map_or(Cell::Null, Cell::Whole)
 }
 
 /// How a lane ended. Times in seconds, null for what did not happen and for what is infinite.
@@ -94,17 +110,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_numbers_and_keys_are_texts() {
-        let csv = b"parameterization,f1,fn,headway,mark,data\n1,0.5,3,1.2s,,synthetic\ni,,0,all,contact,synthetic\n";
-        let rows = records(csv).unwrap();
+    fn a_field_has_its_type_whatever_it_looks_like() {
+        let mut table = Table::new(&["parameterization", "f1", "fn", "headway", "data"]);
+        table.push(vec![words("1"), Cell::Number(1.0), whole(3_u64), words("1.2"), words("synthetic")]);
+        table.push(vec![words("-i"), Cell::number(None), whole(0_u64), words(""), words("synthetic")]);
+        table.push(vec![words("a,b"), Cell::Number(f64::INFINITY), whole(u64::MAX), words("inf"), words("")]);
+        // `is_f64`: 1 as a number is 1.0 in every row, 3 as a count is 3.
+        let rows = table.records();
+        assert!(rows[0]["f1"].is_f64() && rows[0]["fn"].is_i64() && rows[0]["parameterization"].is_string());
         assert_eq!(
             rows,
             serde_json::json!([
-                {"parameterization": "1", "f1": 0.5, "fn": 3, "headway": "1.2s", "mark": null},
-                {"parameterization": "i", "f1": null, "fn": 0, "headway": "all", "mark": "contact"},
+                {"parameterization": "1", "f1": 1.0, "fn": 3, "headway": "1.2"},
+                {"parameterization": "-i", "f1": null, "fn": 0, "headway": null},
+                {"parameterization": "a,b", "f1": null, "fn": null, "headway": "inf"},
             ])
         );
-        assert_eq!(records(b"ttc_s\ninf\n").unwrap(), serde_json::json!([{"ttc_s": null}]));
-        assert_eq!(records(b"f1\n").unwrap(), serde_json::json!([]));
+        let csv = "parameterization,f1,fn,headway,data\n1,1,3,1.2,synthetic\n'-i,,0,,synthetic\n\"a,b\",inf,,inf,\n";
+        assert_eq!(table.csv(), csv);
+        assert_eq!(Table::new(&["f1"]).records(), serde_json::json!([]));
     }
 }

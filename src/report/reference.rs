@@ -1,10 +1,11 @@
 //! The lane arithmetic against the f64 reference, lane by lane: which verdicts differ, and how near to the
 //! threshold each lies.
 
+use super::records::{Table, whole, words};
 use crate::engine::{Chunk, LanePlan, Outcome};
 use crate::model::criterion::Criterion;
 use crate::support::readable::{count, count_of};
-use crate::support::table::csv_field;
+use crate::support::table::Cell;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,14 +66,14 @@ impl ReferenceComparison {
         text
     }
 
-    /// All differences as CSV.
-    pub fn csv(&self) -> String {
-        let mut text = "lane,criterion,failed_in_f32,distance_to_threshold\n".to_owned();
+    /// All differences, one per row.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new(&["lane", "criterion", "failed_in_f32", "distance_to_threshold"]);
         for d in &self.differences {
-            let failed = u8::from(d.failed_in_f32);
-            text += &format!("{},{},{failed},{}\n", csv_field(&d.lane), d.criterion.key(), d.distance);
+            let failed = whole(u8::from(d.failed_in_f32));
+            table.push(vec![words(d.lane.as_str()), words(d.criterion.key()), failed, Cell::Number(d.distance)]);
         }
-        text
+        table
     }
 }
 

@@ -240,8 +240,8 @@ impl EstimateFile {
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         Ok(Section {
-            intro: "The same density, flags and seed give the same numbers, on any machine, whole or in shards. \
-                    estimate.json holds all of it; `lanesweep simulate --from` reruns a lane."
+            intro: "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
+                    estimate.json holds all of it; `simulate` reruns a lane from it."
                 .to_owned(),
             facts,
             host,

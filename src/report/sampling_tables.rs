@@ -233,7 +233,7 @@ impl EstimateFile {
         let is_known = self.estimates.iter().any(|row| row.risk.per_hour.is_some() || row.risk.per_1000_km.is_some());
         (is_known && !self.plan_headways.is_empty()).then(|| {
             "Per hour and per 1000 km: scenarios occur as often as observed, but begin at these headways, which are \
-             imposed, not observed; a density fitted with --with-thw draws them"
+             imposed, not observed; a density fitted with the headway as a parameter draws them"
                 .to_owned()
         })
     }

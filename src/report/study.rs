@@ -3,7 +3,7 @@
 use super::close_following::{CloseRow, close_following};
 use super::plot::Figure;
 use super::radar::{RadarChart, RadarSeries};
-use super::records::{document, records};
+use super::records::document;
 use super::reference::ReferenceComparison;
 use super::run_record::RunRecord;
 use super::study_figures::{
@@ -95,9 +95,9 @@ impl StudyReport {
     /// [`crate::Error::Io`].
     pub fn write(&mut self, mut results: Results) -> Result<()> {
         let data = if self.run.synthetic { "synthetic" } else { "recorded" };
-        results.add("failures.csv", &csv::failures(&self.scores, data)?)?;
-        results.add("f1.csv", &csv::f1_scores(&self.scores, data)?)?;
-        results.add("claims.csv", &csv::claims(&self.claims, data)?)?;
+        results.add("failures.csv", csv::failures(&self.scores, data)?.csv().as_bytes())?;
+        results.add("f1.csv", csv::f1_scores(&self.scores, data).csv().as_bytes())?;
+        results.add("claims.csv", csv::claims(&self.claims, data).csv().as_bytes())?;
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", &self.headways(data)?)?;
         for (at, category) in self.scores.categories.iter().enumerate() {
@@ -108,7 +108,7 @@ impl StudyReport {
             }
         }
         if let Some(comparison) = &self.comparison {
-            results.add("reference.csv", comparison.csv().as_bytes())?;
+            results.add("reference.csv", comparison.table().csv().as_bytes())?;
         }
         results.add("report.html", self.html()?.as_bytes())?;
         self.run.files = results.names();
@@ -183,9 +183,9 @@ impl StudyReport {
             "plan_sha256": self.run.plan_sha256,
             "lanes": self.run.lanes,
             "left_out": self.run.left_out,
-            "failures": records(&csv::failures(&self.scores, "")?)?,
-            "f1": records(&csv::f1_scores(&self.scores, "")?)?,
-            "claims": records(&csv::claims(&self.claims, "")?)?,
+            "failures": csv::failures(&self.scores, "")?.records(),
+            "f1": csv::f1_scores(&self.scores, "").records(),
+            "claims": csv::claims(&self.claims, "").records(),
         });
         value["best"] = self.best.iter().map(best).collect();
         let close = self.scores.categories.iter().zip(&self.pictures).map(|(scores, pictures)| {
@@ -199,7 +199,7 @@ impl StudyReport {
             value["published"] = published(&self.scores);
         }
         if let Some(comparison) = &self.comparison {
-            value["reference"] = records(comparison.csv().as_bytes())?;
+            value["reference"] = comparison.table().records();
         }
         document(&value)
     }

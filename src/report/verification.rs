@@ -43,7 +43,7 @@ pub fn comparison(comparison: &Comparison) -> String {
         let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));
     }
     if !comparison.worst.is_empty() {
-        text += "  run one again, word by word: lanesweep verify --lane KEY with the same flags\n";
+        text += "  run one again, word by word: `verify` with its key and the same options\n";
     }
     text
 }

@@ -15,6 +15,7 @@ mod parameter_table;
 pub mod parameterization;
 mod schema;
 mod table_reader;
+mod tracks_table;
 
 pub use crate::model::case::{Ahead, Case, Category, Participant};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};

@@ -9,7 +9,7 @@ use super::check::name;
 use super::columns::{Chosen, HELP, Leaf, choose, leaves, names};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
-use super::{Scenario, parameter_table};
+use super::{Scenario, parameter_table, tracks_table};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::Implausible;
 use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, resolve};
@@ -19,7 +19,8 @@ use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, reso
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] naming file, row, scenario and column.
 pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
-    let table = TableReader::open(path, format)?;
+    let table = TableReader::open(path, format).map_err(|error| tracks_table::of_unreadable(path, error))?;
+    tracks_table::refuse(table.columns(), table.header())?;
     let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s" }]);
     let names = names(&leaves);
     let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();

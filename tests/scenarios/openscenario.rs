@@ -202,6 +202,49 @@ fn every_vertex_of_a_case_of_flags_is_that_of_its_series() {
     }
 }
 
+/// A lane goes on where the vehicle that cuts out drives through the one ahead; another simulator reports a collision.
+#[test]
+fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let case = |lateral: &'static str, ahead_gap: &'static str| {
+        let case =
+            ["--category", "cut-out", "--models", "FSM", "--ego-speed", "20", "--gap", "40", "--ahead-speed", "0"];
+        [&case[..], &["--lateral-speed", lateral, "--ahead-gap", ahead_gap]].concat()
+    };
+    // By hand: 1.9 m across at 0.8 m/s take 2.375 s; at 20 m/s the bumpers meet after 30 m in 1.5 s. After 100 m in 5 s
+    // the vehicles are apart.
+    for (flags, first_s) in [(case("0.8", "30"), Some(1.5)), (case("0.8", "100"), None)] {
+        good(dir.path(), &[&["export", "xosc", "--out", "x"], &flags[..]].concat());
+        let text = only_scenario(&dir.path().join("x"));
+        let (vehicles, all) = played(&text);
+        let (other, ahead) = (&vehicles["Other"], &vehicles["Ahead"]);
+        let overlap = other.path.iter().zip(&ahead.path).find(|(a, b)| {
+            (a.1 - b.1).abs() < (other.length_m + ahead.length_m) / 2.0
+                && (a.2 - b.2).abs() < (other.width_m + ahead.width_m) / 2.0
+        });
+        let time_s = overlap.map(|(at, _)| at.0);
+        let of_property =
+            all.iter().find(|e| e.attributes.get("name").is_some_and(|n| n == "lanesweep.others_overlap_s"));
+        assert_eq!(of_property.map(|e| e.number("value")), time_s);
+        assert_eq!(time_s.is_some(), first_s.is_some());
+        let description = &all.iter().find(|e| e.path.ends_with("/FileHeader")).unwrap().attributes["description"];
+        match (time_s, first_s) {
+            (Some(time_s), Some(first_s)) => {
+                assert!((time_s - first_s).abs() <= 0.041, "{time_s}");
+                let says =
+                    format!("; Other drives through Ahead from {time_s} s on: a player that checks all vehicles");
+                assert!(description.contains(&says), "{description}");
+            }
+            _ => assert!(!description.contains("drives through"), "{description}"),
+        }
+        // The file is read again as before.
+        let file = std::fs::read_dir(dir.path().join("x")).unwrap().map(|e| e.unwrap().path());
+        let file = file.into_iter().find(|path| path.extension().is_some_and(|e| e == "xosc")).unwrap();
+        let checked = lanesweep(dir.path(), &["check", file.to_str().unwrap()]);
+        assert!(matches!(checked.status.code(), Some(0 | 1 | 8 | 9)), "{}", String::from_utf8_lossy(&checked.stderr));
+    }
+}
+
 #[test]
 fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     let dir = tempfile::tempdir().unwrap();

@@ -24,6 +24,42 @@ fn of(name: &str, content: &str) -> lanesweep::Result<Vec<Scenario>> {
     read_scenarios(&file(dir.path(), name, content))
 }
 
+/// Headers of the formats, each as its writer has it.
+#[test]
+fn a_table_of_tracks_is_recognised_where_scenarios_are_expected() {
+    let highd = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,frontSightDistance,laneId\n\
+                 1,1,10,8,4,2,30,0,0,0,100,2\n";
+    let exid = "recordingId,trackId,frame,trackLifetime,xCenter,yCenter,heading,width,length\n0,0,0,0,1,2,3,4,5\n";
+    let sumo =
+        "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed\n0.00;a;1;2;90;car;30\n";
+    let mitra = "Vehicle_ID,Vehicle_type,Time [s],x [m],y [m],Speed [km/h]\n1,car,0,1,2,90\n";
+    let ngsim = "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,v_Vel\n1,1,9,0,1,2,30\n";
+    for (text, columns) in [
+        (highd, ["`id`", "`frame`", "`x`", "`y`"]),
+        (exid, ["`trackId`", "`frame`", "`xCenter`", "`yCenter`"]),
+        (sumo, ["`vehicle_id`", "`timestep_time`", "`vehicle_x`", "`vehicle_y`"]),
+        (mitra, ["`Vehicle_ID`", "`Time [s]`", "`x [m]`", "`y [m]`"]),
+        (ngsim, ["`Vehicle_ID`", "`Frame_ID`", "`Local_X`", "`Local_Y`"]),
+    ] {
+        let error = of("01_tracks.csv", text).unwrap_err();
+        let said = error.to_string();
+        assert!(said.contains("this is a table of tracks, not of scenarios"), "{said}");
+        assert!(columns.iter().all(|column| said.contains(column)) && said.contains("01_tracks.csv"), "{said}");
+        let help = error.help().unwrap();
+        assert!(help.contains("`mine`") && help.contains("folder of the recording"), "{help}");
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = file(dir.path(), "01_tracks.csv", highd);
+    let (code, text) = said(dir.path(), &["study", "--scenarios", path.to_str().unwrap()]);
+    assert!(code == 3 && text.contains("this is a table of tracks"), "{code}: {text}");
+    // Places beside the series of a scenario make no recording of it.
+    let lines = INSTANTS.lines().zip(["x,y", "1,2", "1,2", "1,2", "1,2", "1,2"]);
+    let with_places: String = lines.map(|(line, places)| format!("{line},{places}\n")).collect();
+    if let Err(error) = of("s.csv", &with_places) {
+        assert!(!error.to_string().contains("tracks"), "{error}");
+    }
+}
+
 const INSTANTS: &str = "\u{feff}id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
 target_width_m,target_speed_kmh,target_lateral_m,weather
 a,cut-in,10.00,108,4.5,1.8,left,4.2,1.9,72,3.5,rain

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bad_geometry;
 mod bad_recordings;
 mod generator_calibration;
 mod generator_physics;

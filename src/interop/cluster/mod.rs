@@ -5,6 +5,7 @@
 
 mod shell;
 mod slurm;
+mod slurm_text;
 mod split_run;
 
 pub use shell::{directive_quoted, log_pattern, quoted_word, shell_quoted};

@@ -5,16 +5,16 @@ use crate::{Error, Place, Result};
 /// Verbs whose lanes can be split over tasks.
 const VERBS: [&str; 2] = ["study", "sample"];
 
-/// Flags that the scripts give the run, each with what to write instead.
+/// Options that the scripts give the run, each with what to write instead.
 const TAKEN: [(&str, &str); 8] = [
-    ("--shard", "leave it out: --array says into how many shards the run is split"),
-    ("--out", "give --out DIR before the `--`: the folder belongs to all tasks"),
-    ("--plan", "leave it out: submit.sh makes the plan and each task runs from it"),
-    ("--plan-only", "leave it out: submit.sh makes the plan"),
-    ("--stop-after", "leave it out: Slurm tells each task in time (--time, --signal-before)"),
-    ("--threads", "give --cpus N before the `--`: each task uses the processors that Slurm gives it"),
-    ("--backend", "give --gpus 1 or --gpus none before the `--`"),
-    ("--device", "leave it out: each task uses the GPU that Slurm gives it (--gpus 1)"),
+    ("shard", "leave it out: option `array` says into how many shards the run is split"),
+    ("out", "give option `out = DIR` before the `--`: the folder belongs to all tasks"),
+    ("plan", "leave it out: submit.sh makes the plan and each task runs from it"),
+    ("plan_only", "leave it out: submit.sh makes the plan"),
+    ("stop_after", "leave it out: Slurm tells each task in time (option `time`, option `signal_before`)"),
+    ("threads", "give option `cpus = N` before the `--`: each task uses the processors that Slurm gives it"),
+    ("backend", "give option `gpus = 1` or option `gpus = none` before the `--`"),
+    ("device", "leave it out: each task uses the GPU that Slurm gives it (option `gpus = 1`)"),
 ];
 
 /// A run that can be split: `study` or `sample` with its own arguments.
@@ -30,8 +30,7 @@ impl SplitRun {
     /// # Errors
     /// [`Error::Usage`] where the verb is missing or cannot be split, or where a flag is the scripts' own.
     pub fn new(words: &[String]) -> Result<SplitRun> {
-        let verbs =
-            "study and sample are the verbs that can be split; example: -- sample cut-in-2.json --samples 1000000";
+        let verbs = "study and sample are the verbs that can be split; example: -- sample cut-in-2.json";
         let Some((verb, arguments)) = words.split_first() else {
             return Err(Error::usage(Place::item("the run"), "there is none", verbs));
         };
@@ -39,13 +38,11 @@ impl SplitRun {
             return Err(Error::usage(Place::item("the run"), format!("`{verb}` cannot be split over tasks"), verbs));
         }
         for argument in arguments {
-            let name = argument.split_once('=').map_or(argument.as_str(), |(name, _)| name);
-            if let Some((flag, help)) = TAKEN.iter().find(|(flag, _)| *flag == name) {
-                return Err(Error::usage(
-                    Place::item("the run"),
-                    format!("{flag} cannot be given after the `--`"),
-                    *help,
-                ));
+            let Some(flag) = argument.strip_prefix("--") else { continue };
+            let name = flag.split_once('=').map_or(flag, |(name, _)| name).replace('-', "_");
+            if let Some((option, help)) = TAKEN.iter().find(|(option, _)| *option == name) {
+                let problem = format!("option `{option}` cannot be given after the `--`");
+                return Err(Error::usage(Place::item("the run"), problem, *help));
             }
         }
         Ok(SplitRun { verb: verb.clone(), arguments: arguments.to_vec() })
@@ -81,9 +78,11 @@ mod tests {
 
     #[test]
     fn what_the_scripts_give_is_refused_in_both_spellings() {
-        for (flag, _) in TAKEN {
-            for words in [format!("study {flag} x"), format!("sample a.json {flag}=x")] {
-                assert!(run(&words).unwrap_err().to_string().contains(&format!("{flag} cannot be given")), "{words}");
+        for (option, _) in TAKEN {
+            let flag = option.replace('_', "-");
+            for words in [format!("study --{flag} x"), format!("sample a.json --{flag}=x")] {
+                let problem = run(&words).unwrap_err().to_string();
+                assert!(problem.contains(&format!("option `{option}` cannot be given")), "{words}: {problem}");
             }
         }
         run("study --lanes x.csv --seed 3").unwrap();

@@ -74,6 +74,15 @@ impl Concrete {
         self.vehicles.iter().filter_map(|vehicle| vehicle.path.last()).map(|v| v.time_s).fold(0.0, f64::max)
     }
 
+    /// When the boxes of two vehicles that are not the ego's first overlap, s. In a cut-out the vehicle that cuts out may
+    /// drive through the one ahead of it.
+    pub fn others_overlap_s(&self) -> Option<f64> {
+        let [_, other, ahead] = &self.vehicles[..] else { return None };
+        let (length_m, width_m) = ((other.length_m + ahead.length_m) / 2.0, (other.width_m + ahead.width_m) / 2.0);
+        let overlap = |(a, b): &(&Vertex, &Vertex)| (a.x_m - b.x_m).abs() < length_m && (a.y_m - b.y_m).abs() < width_m;
+        other.path.iter().zip(&ahead.path).find(overlap).map(|(at, _)| at.time_s)
+    }
+
     /// A position across the road as the world has it: left is positive.
     pub fn world_y_m(&self, y_m: f64) -> f64 {
         // No negative zero.

@@ -94,7 +94,7 @@ impl DistributionSamples {
         names.check_renames(&file.names())?;
         let Distributions::Stochastic(Stochastic { runs, seed, parameters: of_file }) = &file.distributions else {
             let problem = format!("{} lists values, and has no probabilities", file.path.display());
-            let help = "map them: lanesweep map CATEGORY --distribution FILE";
+            let help = "map them by `map`, with option `distribution`";
             return Err(Error::usage(Place::option("distribution"), problem, help));
         };
         let mut parameters: Vec<SampledParameter> = Vec::new();

@@ -12,6 +12,9 @@ use crate::Result;
 /// Name of the parameter that an ego of the user's own starts with.
 const EGO_SPEED: &str = "ego_speed_mps";
 
+/// Property of a file in which two vehicles overlap that are not the ego's: the time, s.
+const OTHERS_OVERLAP: &str = "lanesweep.others_overlap_s";
+
 /// Height of every vehicle, m: no lane knows it.
 const HEIGHT_M: f64 = 1.5;
 
@@ -49,7 +52,15 @@ pub fn scenario_file(scenario: &Concrete, road: &str) -> Result<Vec<u8>> {
 
 fn header(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
     let synthetic = if scenario.is_synthetic { "SYNTHETIC DATA: " } else { "" };
-    let description = format!("{synthetic}{} {}", scenario.category.label(), scenario.key);
+    let overlap_s = scenario.others_overlap_s();
+    let overlap = overlap_s.map_or(String::new(), |time_s| {
+        format!(
+            "; Other drives through Ahead from {} s on: a player that checks all vehicles reports a collision of these two, \
+             which is none of Ego's",
+            number(time_s)
+        )
+    });
+    let description = format!("{synthetic}{} {}{overlap}", scenario.category.label(), scenario.key);
     xml.open(
         "FileHeader",
         vec![
@@ -63,6 +74,9 @@ fn header(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
     xml.open("Properties", vec![])?;
     for (name, value) in &scenario.properties {
         xml.empty("Property", vec![text("name", name), text("value", value)])?;
+    }
+    if let Some(time_s) = overlap_s {
+        xml.empty("Property", vec![text("name", OTHERS_OVERLAP), text("value", &number(time_s))])?;
     }
     xml.close()?;
     xml.close()

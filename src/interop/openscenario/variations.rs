@@ -26,7 +26,7 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
     names.check_renames(&file.names())?;
     let Distributions::Deterministic(list) = &file.distributions else {
         let problem = format!("{} holds random parameters", file.path.display());
-        let help = "draw from them: lanesweep sample --distribution FILE --category NAME";
+        let help = "draw from them by `sample`, with option `distribution` and option `category`";
         return Err(Error::usage(Place::option("distribution"), problem, help));
     };
     let mut all = Variations { axes: Vec::new(), set_axes: Vec::new(), set_rows: vec![Vec::new()] };

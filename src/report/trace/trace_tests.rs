@@ -1,7 +1,7 @@
 //! What must hold for every figure and table of a case, the strangest ones too.
 
 use super::super::plot::words;
-use super::{TraceFigure, TraceSeries, csv};
+use super::{TraceFigure, TraceSeries, table};
 use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, StepMark, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -222,7 +222,7 @@ fn the_table_has_every_number_of_the_figure() {
     let out = case(Category::CutOut, 30.0, vehicle(28.0, leaving));
     let traces = ModelId::ALL.map(|model| trace("paper", &out, 25.0, model));
     let named: Vec<(String, &Trace)> = traces.iter().map(|t| (format!("a,b/S/1s/{}", t.model.name()), t)).collect();
-    let text = csv(&named);
+    let text = table(&named).csv();
     let mut reader = ::csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().unwrap().clone();
     let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
@@ -258,6 +258,6 @@ fn the_table_has_every_number_of_the_figure() {
         let min_ttc = judged(&|other| other.ttc_s);
         assert!((min_ttc - trace.outcome.min_ttc).abs() < 1e-12 || min_ttc == trace.outcome.min_ttc);
     }
-    let single = csv(&named[..1]);
+    let single = table(&named[..1]).csv();
     assert!(single.starts_with("t_s,x_ego_m,v_ego_mps,a_ego_mps2,unsafe,demand_mps2,other_x_m,"), "no name for one");
 }

@@ -24,7 +24,7 @@ use crate::{Error, Place, Result};
 pub(crate) const KIND: &str = "sampling plan";
 /// Largest plan that is read: a density, mostly.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
-const AGAIN: &str = "make it with `lanesweep sample … --plan-only --out DIR` of this version";
+const AGAIN: &str = "make it by `sample` of this version, with option `plan_only`";
 
 /// A run of crude Monte Carlo.
 #[derive(Debug, Clone, Serialize, Deserialize)]

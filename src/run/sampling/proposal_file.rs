@@ -11,7 +11,7 @@ use crate::{Error, Place, Result};
 
 const VERSION: u64 = 1;
 
-const AGAIN: &str = "write it again with `lanesweep sample --estimator ce` or `is`";
+const AGAIN: &str = "write it again by `sample`, with option `estimator = ce` or option `estimator = is`";
 
 /// The mixture of a proposal over the parameters of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -25,8 +25,8 @@ pub(crate) const PILOT_FILE: &str = "pilot.json";
 pub(crate) const KIND: &str = "weighted sampling plan";
 /// Largest plan that is read: a density and a mixture.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
-const AGAIN: &str = "make it with `lanesweep sample … --estimator is --proposal FILE --plan-only --out DIR` of this \
-                     version";
+const AGAIN: &str =
+    "make it by `sample` of this version, with option `estimator = is`, option `proposal` and option `plan_only`";
 
 /// Importance sampling of one given proposal, or of one per driver model that a pilot found; a fixed number of samples.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -285,7 +285,7 @@ fn check_variants(plan: &LanePlan, place: &Place) -> Result<()> {
     Ok(())
 }
 
-const AGAIN: &str = "make it with `lanesweep study … --plan-only --out DIR` of this version";
+const AGAIN: &str = "make it by `study` of this version, with option `plan_only`";
 
 #[cfg(test)]
 mod tests {

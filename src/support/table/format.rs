@@ -44,7 +44,7 @@ impl TableFormat {
             Some(TableFormat::Parquet) => Err(Error::usage(
                 place(),
                 "this program was built without Parquet",
-                "use another format, or build it with the feature `parquet` (`cargo build --release`)",
+                "use another format, or build it with the feature `parquet`",
             )),
             Some(format) => Ok(*format),
             None => {

@@ -8,6 +8,7 @@
 mod columns;
 mod format;
 mod frame;
+mod geometry;
 mod inventory;
 mod meta;
 mod neighbours;

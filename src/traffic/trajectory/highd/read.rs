@@ -4,11 +4,12 @@ use std::path::Path;
 
 use super::columns::{CsvColumn, CsvTable, FileChecksum};
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
+use super::geometry;
 use super::inventory::{HighdFiles, folder_of, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// A recording with the facts about its files for the run record.
 #[derive(Debug)]
@@ -61,6 +62,7 @@ pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loade
         tracks,
         synthetic: recording_meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
+    notes.extend(geometry::check(&recording, &Place::file(&files.tracks), implausible)?);
     let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
     Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
 }

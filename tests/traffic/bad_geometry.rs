@@ -1,0 +1,110 @@
+//! Recordings whose numbers are plausible one by one, but not beside one another: a mirrored axis, another reference point.
+
+use crate::common::small::{self, Texts, cruising};
+
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::trajectory::Recording;
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles, Loaded};
+use lanesweep::{Error, Result};
+
+/// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
+fn traffic() -> Recording {
+    let mut recording = small::recording();
+    let lanes = [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2)];
+    let tracks = (1..=10).map(|id| {
+        let (carriageway, lane) = lanes[id as usize % lanes.len()];
+        let mut track = cruising(id, carriageway, lane, 1, 60, &recording);
+        for (k, (d_m, v_d_mps)) in track.d_m.iter_mut().zip(&mut track.v_d_mps).enumerate() {
+            let phase = k as f64 / 25.0 * 2.0;
+            (*d_m, *v_d_mps) = (*d_m + 0.1 * phase.sin(), 0.2 * phase.cos());
+        }
+        track
+    });
+    recording.tracks = tracks.collect();
+    highd::quantize(&mut recording, highd::Precision::Hundredths).unwrap();
+    recording
+}
+
+fn read(texts: &Texts, implausible: Implausible) -> Result<Loaded> {
+    let dir = tempfile::tempdir().unwrap();
+    let files = HighdFiles::named(dir.path(), "01");
+    std::fs::write(&files.tracks, &texts.tracks).unwrap();
+    std::fs::write(&files.tracks_meta, &texts.tracks_meta).unwrap();
+    std::fs::write(&files.recording_meta, &texts.recording_meta).unwrap();
+    highd::read_judged(&files, implausible)
+}
+
+/// The recording with a column of `tracks` made anew from its value and the height of the box.
+fn changed(texts: &Texts, column: &str, change: impl Fn(f64, f64) -> f64) -> Texts {
+    let names: Vec<&str> = texts.tracks.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| names.iter().position(|other| *other == name).unwrap();
+    let (column, height) = (at(column), at("height"));
+    let row = |line: &str| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let value = |at: usize| fields[at].parse::<f64>().unwrap();
+        fields[column] = format!("{:.2}", change(value(column), value(height)));
+        fields.join(",")
+    };
+    let (header, rows) = texts.tracks.split_once('\n').unwrap();
+    let rows: Vec<String> = rows.lines().map(row).collect();
+    Texts { tracks: format!("{header}\n{}\n", rows.join("\n")), ..texts.clone() }
+}
+
+#[test]
+fn good_geometry_says_nothing() {
+    let texts = Texts::of(&traffic());
+    assert_eq!(read(&texts, Implausible::Refused).unwrap().notes, [""; 0]);
+}
+
+#[test]
+fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame() {
+    let texts = Texts::of(&traffic());
+    let cases: [(&str, Texts, &[&str]); 7] = [
+        ("upside down", changed(&texts, "y", |y, _| -y), &["column y", "10 of 10", "vehicle 1 at frame 25", "with -y"]),
+        ("upside down, corner", changed(&texts, "y", |y, height| -y - height), &["10 of 10", "with -y"]),
+        (
+            "from the other side",
+            changed(&texts, "y", |y, height| 8.0 + 31.25 - y - height),
+            &["10 of 10", "vehicle 1 at frame 25", "from the other side of the road"],
+        ),
+        (
+            "centre",
+            changed(&texts, "y", |y, height| y + height / 2.0),
+            &["cross lane lines", "the centre of the box", "frame 1"],
+        ),
+        (
+            "lower edge",
+            changed(&texts, "y", |y, height| y + height),
+            &["cross lane lines", "the lower edge of the box"],
+        ),
+        ("lateral speed", changed(&texts, "yVelocity", |v, _| -v), &["yVelocity", "mirrored", "at frame"]),
+        ("a lane beside", changed(&texts, "y", |y, _| y + 3.6), &["10 of 10", "outside the lane that `laneId`"]),
+    ];
+    for (what, texts, says) in cases {
+        let error: Error = read(&texts, Implausible::Refused).expect_err(what);
+        let text = error.to_string().replace('`', "");
+        for words in says {
+            assert!(text.contains(&words.replace('`', "")), "{what}: `{words}` is not in: {text}");
+        }
+        assert!(text.contains("01_tracks.csv"), "{what}: {text}");
+        let help = error.help().unwrap();
+        assert!(help.contains("y points down") && help.contains("option `accept_implausible`"), "{what}: {help}");
+        let notes = read(&texts, Implausible::Accepted).unwrap().notes;
+        assert!(!notes.is_empty(), "{what}: accepted without a word");
+    }
+}
+
+/// One vehicle out of place is told, and the recording is used.
+#[test]
+fn a_single_vehicle_outside_its_lane_and_boxes_that_overlap_are_warnings() {
+    let mut recording = traffic();
+    // Vehicles 1 and 6 drive in one lane.
+    let ahead_m = recording.tracks[0].s_m.clone();
+    recording.tracks[5].s_m = ahead_m.iter().map(|s_m| s_m + 3.0).collect();
+    recording.tracks[5].v_s_mps = recording.tracks[0].v_s_mps.clone();
+    recording.tracks[1].d_m.iter_mut().for_each(|d_m| *d_m -= 5.0);
+    let notes = read(&Texts::of(&recording), Implausible::Refused).unwrap().notes;
+    let has = |words: &[&str]| notes.iter().any(|note| words.iter().all(|word| note.contains(word)));
+    assert!(has(&["1 of 10 vehicles", "vehicle 2 at frame 25", "laneId"]), "{notes:?}");
+    assert!(has(&["1 pair(s) of vehicles overlap", "vehicles 1 and 6 at frame 25"]), "{notes:?}");
+}
