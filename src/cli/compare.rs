@@ -59,11 +59,11 @@ pub struct Compare {
     parameterizations: lists::ParameterizationsFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
+    /// Time headways; observed: the recorded gaps
     ///
-    /// observed: S and S' start from the recorded gap of each scenario; a density draws the headway as one more
-    /// parameter.
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
+    /// paper is 2.0, 1.8, … 0.2; r157 the minimum following distance of UN R157, 5.2.3.3. observed: S and S' start from
+    /// the recorded gap of each scenario; a density draws the headway as one more parameter.
+    #[arg(long, value_name = "s,s,…|observed", default_value = "paper")]
     thw: String,
     #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
     samples: u64,

@@ -120,7 +120,7 @@ const FLAGS: [Group; 5] = [
     (
         "Output",
         &["out", "rows", "map", "worst", "plot", "sheet", "series", "format", "changed", "scripts"],
-        &["plot_end", "keep_plan"],
+        &["plot_end", "keep_plan", "author", "date"],
     ),
     (
         "Run",

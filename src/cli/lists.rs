@@ -188,7 +188,7 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
         value.map(Headway::ThwS).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
-            let help = format!("give seconds above 0, separated by commas, `r157`, or {words}");
+            let help = format!("give seconds above 0 with commas, `r157`, {words}");
             Error::usage(Place::item("--thw"), problem, help)
         })
     };
@@ -210,7 +210,7 @@ pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
     match text.trim() {
         "paper" => Ok(Headway::paper()),
         text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
-        list => headways(list, "`paper`, or `observed`"),
+        list => headways(list, "`paper` or `observed`"),
     }
 }
 

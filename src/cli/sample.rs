@@ -170,7 +170,7 @@ impl Sample {
         match self.thw.as_deref().map(str::trim) {
             None => Ok(None),
             Some("paper") => Ok(Some(Headway::paper())),
-            Some(list) => lists::headways(list, "`paper`").map(Some),
+            Some(list) => lists::headways(list, "or `paper`").map(Some),
         }
     }
 
@@ -200,7 +200,7 @@ impl Sample {
             Some("sampled" | "observed") => Ok(SampleHeadways::Sampled),
             None if density.space.has_thw() => Ok(SampleHeadways::Sampled),
             None | Some("paper") => Ok(SampleHeadways::Each(Headway::paper())),
-            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper`, or `observed`")?)),
+            Some(list) => Ok(SampleHeadways::Each(lists::headways(list, "`paper` or `observed`")?)),
         }
     }
 }

@@ -246,7 +246,7 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
         (&["--categories", "lane-change"], 2, "use cut-in, cut-out, lvd"),
         (&["--samples", "0"], 2, "0 samples give no estimate"),
         (&["--models", "Nobody"], 2, "there is no driver model `Nobody`"),
-        (&["--thw", "sampled"], 2, "separated by commas, `r157`, or `paper`"),
+        (&["--thw", "sampled"], 2, "with commas, `r157`, `paper` or `observed`"),
         (&["--scenarios", text(&none)], 3, "no scenario to simulate"),
         (&["--scenarios", text(&input), "--out", text(dir.path())], 2, "would be overwritten"),
     ];

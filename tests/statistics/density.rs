@@ -363,7 +363,7 @@ fn the_point_of_a_scenario_gives_the_case_that_the_study_makes_of_it() {
                 let what = format!("{} under {}", scenario.id, id.key);
                 let point = space.point(scenario).unwrap();
                 space.check(&point).unwrap_or_else(|invalid| panic!("{what}: {invalid}"));
-                assert_eq!(space.thw_s(&point), scenario.thw0);
+                assert_eq!(space.thw_s(&point), scenario.start_headway_s(), "{what}");
                 let ours = space.case(&point, &Sizes::of(scenario), 0.04).unwrap();
                 let theirs = id.case(scenario, 0.04, &options, space.reduction()).unwrap();
                 let from_right = svd_lateral == SvdLateral::Signed && scenario.side == Side::Right;
