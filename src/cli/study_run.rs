@@ -143,7 +143,10 @@ pub(super) fn finish_study(
     let mut report = StudyReport { scores, claims, best, pictures, run, published: facts.published, comparison };
     report.write(results)?;
     let width = console::width();
-    format.print(|| if tables { report.text(width) } else { report.answer(width) }, || report.json())?;
+    let claims = if report.claims.is_empty() { "" } else { ", claims" };
+    let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.\n");
+    let answer = || report.answer(width) + &rest;
+    format.print(|| if tables { report.text(width) } else { answer() }, || report.json())?;
     tracing::info!("{} files written; start with {}", report.run.files.len() + 1, out.join("report.html").display());
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
 }

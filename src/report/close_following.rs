@@ -1,6 +1,6 @@
 //! Which failures come from headways below 0.5 s, as a table that study, comparison and sampling share.
 
-use super::tables::{WIDTH, aligned, table, wrap};
+use super::tables::{aligned, table, wrap};
 use crate::engine::{CLOSE_HEADWAY_S, Headway};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -18,7 +18,7 @@ pub(super) struct CloseRow<'a> {
 /// The sentence that says what was counted, then a row per category and criterion where there is such a headway; empty
 /// without counts. `of_whom` says
 /// whose failures these are.
-pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Headway]) -> String {
+pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Headway], width: usize) -> String {
     let Some(first) = rows.first() else { return String::new() };
     let mut header = ["scenario", "criterion"].map(str::to_owned).to_vec();
     header.extend(first.models.iter().map(|model| model.name().to_owned()));
@@ -51,5 +51,5 @@ pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Head
     };
     let sentence = format!("Failures of {of_whom} from headways below {thw_s} s, of all its failures: {whence}.");
     let cells = if close > 0 { aligned(cells, 2) } else { String::new() };
-    format!("{}\n{cells}", wrap(&sentence, WIDTH))
+    format!("{}\n{cells}", wrap(&sentence, width))
 }

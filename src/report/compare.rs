@@ -188,7 +188,7 @@ impl CompareFile {
             Some(CloseRow { category: comparison.category, models: &self.models, close })
         });
         let headways: Vec<Headway> = self.headways.iter().filter_map(|text| Headway::parse(text)).collect();
-        let close = close_following(&close.collect::<Vec<_>>(), "S", &headways);
+        let close = close_following(&close.collect::<Vec<_>>(), "S", &headways, WIDTH);
         text.extend((!close.is_empty()).then(|| format!("\n{close}")));
         for reason in &self.left_out {
             let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));

@@ -361,7 +361,7 @@ impl EstimateFile {
             return String::new();
         };
         let row = CloseRow { category, models: &self.models, close: &draws.close_following };
-        close_following(&[row], "the density", &self.plan_headways)
+        close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
     /// What the weights of importance samples say.

@@ -67,7 +67,7 @@ impl StudyReport {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
         parts.push(tables::failures(&self.scores, self.published, width));
-        parts.push(self.close_following());
+        parts.push(self.close_following(width));
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
         parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(ReferenceComparison::text));
@@ -78,7 +78,7 @@ impl StudyReport {
     }
 
     /// Which failures of S come from close following.
-    pub(super) fn close_following(&self) -> String {
+    pub(super) fn close_following(&self, width: usize) -> String {
         let rows = self.scores.categories.iter().zip(&self.pictures).filter_map(|(scores, pictures)| {
             Some(CloseRow {
                 category: scores.category,
@@ -86,7 +86,7 @@ impl StudyReport {
                 close: pictures.close_following.as_ref()?,
             })
         });
-        close_following(&rows.collect::<Vec<_>>(), "S", &self.scores.headways)
+        close_following(&rows.collect::<Vec<_>>(), "S", &self.scores.headways, width)
     }
 
     /// Puts CSV tables, figures, what is in `results` already and `run.json` into their folder.

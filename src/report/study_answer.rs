@@ -48,8 +48,6 @@ impl StudyReport {
         let legend = "hides: collisions of S that the best does not have. not told apart: F1 within chance of the \
                       best's. needs: times as many scenarios to tell, if F1 stays.";
         lines.push(wrap(legend, width));
-        let claims = if self.claims.is_empty() { "" } else { ", claims" };
-        lines.push(wrap(&format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt."), width));
         lines.join("\n") + "\n"
     }
 

@@ -133,7 +133,8 @@ fn the_density_whose_coverage_is_told_is_the_one_that_was_sampled() {
     let found = dossier(&data, (Category::Lvd, "i"), ModelId::Reg157, Criterion::Ttc);
     let facts = DataFacts { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let id = Parameterization::find(Category::Lvd, "i").unwrap();
-    let fitted = DensityModel::fit(id, &data.scenarios, &facts, &FitOptions::default()).unwrap().model;
+    let options = FitOptions { parameterization: StudyOptions::default().parameterization, ..FitOptions::default() };
+    let fitted = DensityModel::fit(id, &data.scenarios, &facts, &options).unwrap().model;
     assert!(found.coverage.as_ref().unwrap().representativeness.is_some());
     assert_eq!(found.density_sha256, Some(fitted.content_sha256().unwrap()));
 }

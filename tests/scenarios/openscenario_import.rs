@@ -241,11 +241,14 @@ fn what_is_not_understood_is_named_with_line_and_element() {
     says(&[&sample[..], &RENAME, &["--set", "gap_m=1"]].concat(), "say the same twice");
     says(&[&sample[..], &RENAME, &["--thw", "1"]].concat(), "the initial distance is a parameter already");
     says(&[&sample[..], &RENAME, &["--estimator", "is"]].concat(), "crude Monte Carlo");
-    says(&["map", "cut-in", "--distribution", "f.xosc"], "lanesweep sample --distribution");
+    says(&["map", "cut-in", "--distribution", "f.xosc"], "draw from them by `sample`, with --distribution");
     let cut_out = ["sample", "--distribution", "f.xosc", "--category", "cut-out", "--out", "o"];
     says(&[&cut_out[..], &RENAME].concat(), "give it a distribution, or a value by --set ahead_gap_m=50");
     let grid = example("cut-in-deterministic.xosc");
-    says(&["sample", "--distribution", grid.to_str().unwrap(), "--category", "cut-in"], "lanesweep map CATEGORY");
+    says(
+        &["sample", "--distribution", grid.to_str().unwrap(), "--category", "cut-in"],
+        "map them by `map`, with --distribution",
+    );
 }
 
 #[test]
