@@ -15,7 +15,7 @@ use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
-use crate::scenario::Scenario;
+use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder, write_atomically};
 use crate::{Error, Place, Result};
 
@@ -79,8 +79,11 @@ impl Check {
     pub fn run(&self, _verbosity: Verbosity) -> Result<Exit> {
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
-        let profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
+        let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let asked = self.asked(&profiles[0])?;
+        // The EU's clause is one of cut-ins.
+        let is_of_case = |p: &Profile| asked.subject.category() == Category::CutIn || !p.name.starts_with("eu-");
+        profiles.retain(|profile| !self.profiles.is_empty() || is_of_case(profile));
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         let check = Checked { subject: asked.subject, profiles, models };
         let judgements = check.run()?;

@@ -157,7 +157,15 @@ impl Profile {
             ));
         }
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
-        Profile::parse(&text, &Place::file(path))
+        let mut profile = Profile::parse(&text, &Place::file(path))?;
+        // Other numbers must not pass for those of the profile that was copied.
+        let built_in = BUILT_IN.iter().find(|(name, _)| *name == profile.name);
+        if let Some((name, text)) = built_in
+            && Profile::parse(text, &Place::item(format!("built-in profile {name}")))? != profile
+        {
+            profile.name.push_str(" (changed)");
+        }
+        Ok(profile)
     }
 
     fn parse(text: &str, place: &Place) -> Result<Profile> {
@@ -263,6 +271,18 @@ mod tests {
         for name in Profile::names() {
             assert_eq!(Profile::load(name).unwrap().name, name);
         }
+    }
+
+    #[test]
+    fn a_changed_copy_of_a_profile_does_not_bear_its_name() {
+        let (dir, text) = (tempfile::tempdir().unwrap(), Profile::files().nth(3).unwrap());
+        let load = |text: &str| {
+            std::fs::write(dir.path().join("edit.toml"), text).unwrap();
+            Profile::load(dir.path().join("edit.toml").to_str().unwrap()).unwrap().name
+        };
+        assert_eq!(load(text), "un-r157");
+        assert_eq!(load(&text.replace("delay_s = 0.75", "delay_s = 0.1")), "un-r157 (changed)");
+        assert_eq!(load(&text.replace("\"un-r157\"", "\"mine\"").replace("delay_s = 0.75", "delay_s = 0.1")), "mine");
     }
 
     #[test]

@@ -46,17 +46,27 @@ impl CaseSheet<'_> {
         let avoided_by = first.verdicts.avoided_by();
         let collide: Vec<ModelId> = REFERENCE_DRIVERS.into_iter().filter(|m| !avoided_by.contains(m)).collect();
         let drivers = match (answer, &avoided_by[..], &collide[..]) {
-            (Answer::NoConflict, ..) => "nothing collides even if the ego never reacts".to_owned(),
+            (Answer::NoConflict, _, []) => "nothing collides even if the ego never reacts".to_owned(),
+            (Answer::NoConflict, _, all) => format!(
+                "an ego that never reacts does not collide; {} {} and collide{}",
+                names(all),
+                if all.len() > 1 { "react" } else { "reacts" },
+                if all.len() > 1 { "" } else { "s" }
+            ),
             (_, [], all) => format!("{} collide", names(all)),
             (_, all, []) => format!("{} avoid the collision", names(all)),
             (_, one, other) => format!("{} avoids the collision, {} collides", names(one), names(other)),
         };
         let changes = |flips: &[&str]| flips.join(", ");
-        let of_drivers = REFERENCE_DRIVERS.into_iter().filter(|_| answer != Answer::NoConflict).filter_map(|model| {
+        let is_named = |_: &ModelId| answer != Answer::NoConflict || !collide.is_empty();
+        let of_drivers = REFERENCE_DRIVERS.into_iter().filter(is_named).filter_map(|model| {
             let flips = first.flips_of(model);
             (!flips.is_empty()).then(|| format!("the verdict of {} changes with {}", model.name(), changes(flips)))
         });
-        let of_drivers: Vec<String> = of_drivers.collect();
+        let mut of_drivers: Vec<String> = of_drivers.collect();
+        if !first.annex_flips.is_empty() {
+            of_drivers.push(format!("the case leaves Annex 3 with {}", changes(&first.annex_flips)));
+        }
         if let (Verdict::OutsideAnnex, Some(reason)) = (first.verdict(), &first.outside_annex) {
             return format!("{}: {reason}. Its drivers give no answer here ({drivers})", first.verdict().label());
         }

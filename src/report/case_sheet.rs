@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 use super::case_sentences::VARIED;
 use super::html::{Page, PageFigure, PageTable, Section};
 use super::records;
-use super::tables::{aligned, table};
+use super::tables::{WIDTH, aligned, table, wrap};
 use super::trace::{TraceFigure, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Answer, Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
+use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
 use crate::{Error, Result};
@@ -122,9 +122,11 @@ impl CaseSheet<'_> {
         };
         let mut rows: Vec<Vec<String>> = self.first().readings.iter().map(row).collect();
         // Of another clause, the conditions that differ.
+        let mut clauses = vec![&self.first().clause];
         for judgement in &self.judgements[1..] {
-            for row in judgement.conditions().map(row) {
-                push_new(&mut rows, row);
+            if !clauses.contains(&&judgement.clause) {
+                judgement.conditions().map(row).for_each(|row| push_new(&mut rows, row));
+                clauses.push(&judgement.clause);
             }
         }
         (header.map(str::to_owned).to_vec(), rows)
@@ -163,13 +165,14 @@ impl CaseSheet<'_> {
         let sentences = self.demand().into_iter().chain(self.silent());
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}\n{}\n{}{}\n{DRIVERS}\n{}\nClauses under {}\n{}\nWhere the \
-             answer changes, and each driver's collision, under {}: at least one change lies between the case and this value, \
-             and the answer may change again beyond it\n{}",
+            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\nWhere the \
+             answer changes, and each driver's collision, under {}.\nAt least one change lies between the case and this value; \
+             the answer may change again beyond it\n{}",
             self.case(),
             self.answer(),
             demand.concat(),
             numbers.concat(),
+            wrap(DRIVERS, WIDTH),
             rows(self.drivers(), 3),
             self.first().profile,
             rows(self.clauses(), 3),
@@ -205,7 +208,7 @@ impl CaseSheet<'_> {
                 json!({
                     "parameter": boundary.parameter.key, "value": boundary.value, "searched": boundary.range,
                     "answer_changes_at": ends(&boundary.answer),
-                    "answer_becomes": {"below": boundary.becomes[0].map(Answer::label), "above": boundary.becomes[1].map(Answer::label)},
+                    "answer_becomes": {"below": boundary.becomes[0].map(Verdict::label), "above": boundary.becomes[1].map(Verdict::label)},
                     "collision_changes_at": models,
                 })
             });

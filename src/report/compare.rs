@@ -327,10 +327,10 @@ fn summary(category: &CategoryComparison) -> String {
     let header = [
         "cells of each verdict".to_owned(),
         "parameters".to_owned(),
-        "mean F1 of labels".to_owned(),
+        "mean F1 of its defined cells".to_owned(),
         format!("S'{marks}"),
         format!("density{marks}"),
-        "ratios of the density".to_owned(),
+        "ratios of its decided cells".to_owned(),
     ];
     let mut rows = table(header.to_vec());
     for of in &category.parameterizations {

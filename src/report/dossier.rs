@@ -49,12 +49,12 @@ pub struct DossierReport<'a> {
 
 impl DossierReport<'_> {
     pub(super) fn findings(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["quantity", "rule", "conclusion", "value", "interval", "more data"];
+        let header = ["quantity", "rule", "result", "value", "interval", "more data"];
         let row = |finding: &Finding| {
             vec![
                 finding.quantity.to_owned(),
                 finding.rule.clone(),
-                finding.conclusion.text().to_owned(),
+                finding.conclusion.of_rule().to_owned(),
                 finding.value.map_or("–".to_owned(), value),
                 interval(finding.interval),
                 finding.need.map_or(String::new(), |need| format!("{} times", value(need.times))),
@@ -70,7 +70,7 @@ impl DossierReport<'_> {
             let mark = if *id == self.dossier.parameterization { " ←" } else { "" };
             vec![
                 format!("{}{mark}", id.name()),
-                conclusion.text().to_owned(),
+                conclusion.of_rule().to_owned(),
                 id.parameter_count().to_string(),
                 count(scored.counts.fn_),
                 count(scored.counts.fp),

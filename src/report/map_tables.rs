@@ -73,7 +73,9 @@ impl MapReport {
     /// What the columns count.
     fn words_of_outcomes(&self, outcomes: &[CellOutcome]) -> String {
         let sentence = |outcome: &CellOutcome| match outcome {
-            CellOutcome::NoConflict => "No conflict: no collision even if the ego never reacts.\n",
+            CellOutcome::NoConflict => {
+                "No conflict: no collision, neither with this driver nor if the ego never reacts.\n"
+            }
             CellOutcome::FailByReaction => {
                 "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.\n"
             }
@@ -84,7 +86,9 @@ impl MapReport {
             CellOutcome::Pass | CellOutcome::Fail => "",
         };
         let of_all = match self.criterion {
-            Criterion::Collision => "Share: cells that fail, of all cells, those without a conflict included.\n",
+            Criterion::Collision => {
+                "Share: cells with a collision (fail and fail by reaction), of all cells, those without a conflict included.\n"
+            }
             Criterion::Ttc | Criterion::Btn => "",
         };
         outcomes.iter().map(sentence).chain([of_all]).collect()

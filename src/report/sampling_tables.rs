@@ -243,7 +243,8 @@ impl EstimateFile {
         self.estimates.iter().any(|row| row.recorded.is_some()).then_some(
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
              high, < too low, ? undecided (intervals: estimates.csv). Sound: no warning, and S' (the same scenarios under this parameterization) and \
-             the samples both fail as often as S: the intervals of S'/S and P/S lie within 0.80 to 1.25",
+             the samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \
+             P's interval does not hold that difference",
         )
     }
 

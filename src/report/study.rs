@@ -11,7 +11,7 @@ use super::study_figures::{
 };
 use super::{csv, tables};
 use crate::Result;
-use crate::engine::CLOSE_HEADWAY_S;
+use crate::engine::{CLOSE_HEADWAY_S, Headway};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
@@ -75,6 +75,15 @@ impl StudyReport {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
         parts.join("\n")
+    }
+
+    /// What the scenarios start from, in a few words.
+    pub(super) fn headways_in_words(&self) -> String {
+        match self.scores.headways.len() {
+            _ if Headway::is_observed(&self.scores.headways) => "recorded headways".to_owned(),
+            1 => "1 imposed headway".to_owned(),
+            n => format!("{n} imposed headways"),
+        }
     }
 
     /// Which failures of S come from close following.

@@ -30,7 +30,7 @@ impl StudyReport {
         let size = format!(
             "{}; {}, {}: {} lanes",
             kinds.collect::<Vec<_>>().join(", "),
-            counted(self.scores.headways.len(), "headway"),
+            self.headways_in_words(),
             counted(models, "driver"),
             count(self.run.lanes)
         );
@@ -45,7 +45,7 @@ impl StudyReport {
         lines.extend(
             self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
         );
-        let legend = "hides: collisions of S that the best does not have. not told apart: F1 within chance of the \
+        let legend = "hides: simulations in which S collides and the best does not. not told apart: F1 within chance of the \
                       best's. needs: times as many scenarios to tell, if F1 stays.";
         lines.push(wrap(legend, width));
         lines.join("\n") + "\n"

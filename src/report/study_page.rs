@@ -44,11 +44,11 @@ impl StudyReport {
             title: "Parameterized against recorded scenarios".to_owned(),
             program: run.program.clone(),
             lead: format!(
-                "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {} headways, against {} \
+                "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
                  driver models, judged by collision, TTC and BTN under profile {}.",
                 sentence(&run.data),
                 count(run.lanes),
-                self.scores.categories.first().map_or(0, |c| c.simulations / c.scenarios.max(1)),
+                self.headways_in_words(),
                 self.scores.categories.first().map_or(0, |c| c.models.len()),
                 run.profile.name
             ),
@@ -101,7 +101,8 @@ impl StudyReport {
         let rows = tables::failure_rows(&self.scores, self.published);
         Section {
             intro: [
-                "How often each driver model fails each criterion when the scenarios are replayed as recorded (S).",
+                "How often each driver model fails each criterion when the recorded motions of the others are replayed \
+                 (S); the ego starts from the study's headways.",
             ]
             .into_iter()
             .map(str::to_owned)

@@ -1,6 +1,6 @@
 //! Tables for the terminal, as plain text.
 
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
@@ -23,8 +23,22 @@ pub(super) fn table(header: Vec<String>) -> Table {
     table
 }
 
-/// Numbers to the right, the first `texts` columns to the left.
+/// Numbers to the right, the first `texts` columns to the left. No word and no number is broken: the table is rather wider
+/// than [`WIDTH`].
 pub(super) fn aligned(mut table: Table, texts: usize) -> String {
+    let mut longest: Vec<usize> = Vec::new();
+    for row in table.header().into_iter().chain(table.row_iter()) {
+        for (at, cell) in row.cell_iter().enumerate() {
+            longest.resize(longest.len().max(at + 1), 0);
+            let words = cell.content();
+            let words = words.split_whitespace().map(|word| word.chars().count());
+            longest[at] = longest[at].max(words.max().unwrap_or(0));
+        }
+    }
+    for (column, longest) in table.column_iter_mut().zip(longest) {
+        // With a space on either side.
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(longest as u16 + 2)));
+    }
     for (at, column) in table.column_iter_mut().enumerate() {
         column.set_cell_alignment(if at < texts { CellAlignment::Left } else { CellAlignment::Right });
     }

@@ -450,3 +450,29 @@ fn a_case_that_annex_3_does_not_describe_has_its_own_answer_and_status() {
     assert_eq!(cut_out("2.01").0, 10);
     assert_ne!(cut_out("2.0").0, 10);
 }
+
+/// The annex's own headway of 2 s: a centimetre more is no case of the annex, and the sheet says so beside "robust".
+#[test]
+fn the_edge_of_annex_3_is_said_where_a_small_change_crosses_it() {
+    let case = "check --category cut-out --ego-speed 70km/h --gap 38.8889 --lateral-speed 1.0 --ahead-gap 60 --profiles un-r157";
+    let (code, out, _) = check(&case.split(' ').collect::<Vec<_>>());
+    assert_eq!(code, 0, "{out}");
+    let answer = out.lines().nth(1).unwrap();
+    assert!(answer.contains("the case leaves Annex 3 with gap + 1 cm"), "{answer}");
+    // So does the table of distances.
+    assert!(out.contains("outside Annex 3"), "{out}");
+}
+
+/// An ego that never reacts misses the cutter; CCHDM brakes, stays beside it, and is hit.
+#[test]
+fn no_conflict_names_the_driver_that_collides_because_it_reacts() {
+    let case =
+        "check --category cut-in --ego-speed 130km/h --speed 60km/h --gap 93 --lateral-speed 0.3 --profiles un-r157";
+    let (code, out, _) = check(&case.split(' ').collect::<Vec<_>>());
+    assert_eq!(code, 9, "{out}");
+    let answer = out.lines().nth(1).unwrap();
+    assert!(
+        answer.starts_with("no conflict: an ego that never reacts does not collide; CCHDM reacts and collides"),
+        "{answer}"
+    );
+}

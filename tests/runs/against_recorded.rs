@@ -132,3 +132,34 @@ fn a_density_file_holds_its_scenarios_and_refuses_others() {
     let empty = refused(|scenarios| scenarios[0].target.v.clear());
     assert!(empty.contains("target.v"), "{empty}");
 }
+
+/// A density that draws its headway is compared with S from its recorded gaps; under a condition nothing is compared.
+#[test]
+fn no_rate_is_sound_that_is_compared_with_nothing() {
+    let with_headway = |key: &str| {
+        let facts =
+            DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        let options =
+            FitOptions { representativeness: false, valid_draws: 1000, with_thw: true, ..FitOptions::default() };
+        DensityModel::fit(Parameterization::find(Category::CutIn, key).unwrap(), scenarios(), &facts, &options)
+            .unwrap()
+            .model
+    };
+    let mut options = SampleOptions::new(Estimator::CRUDE, 4000, SampleHeadways::Sampled);
+    options.models = vec![ModelId::Cchdm, ModelId::Fsm];
+    let profile = Profile::load("paper").unwrap();
+    let drawn = rows(&Sample::plan(with_headway("2"), &profile, &options).unwrap());
+    for row in &drawn {
+        let ratios = row.recorded.expect("S starts from its recorded gaps");
+        let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
+        assert!(agrees || row.estimate.trust.verdict() != Verdict::Sound, "{row:?}");
+    }
+    let mut options = SampleOptions::new(Estimator::CRUDE, 4000, SampleHeadways::Each(Headway::paper()));
+    options.given = vec![("v_ego_mps".to_owned(), 30.0)];
+    let given = rows(&Sample::plan(density("2"), &profile, &options).unwrap());
+    assert!(!given.is_empty());
+    for row in &given {
+        assert!(row.recorded.is_none() && row.estimate.trust.warnings.contains(&Warning::NotCompared), "{row:?}");
+        assert_ne!(row.estimate.trust.verdict(), Verdict::Sound);
+    }
+}

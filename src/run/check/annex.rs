@@ -2,10 +2,10 @@
 //! the annex, and readings of ours that decide a case. All follow from the profile, so a profile without the annex's rules
 //! has none.
 
-use super::subject::{Lane, Subject};
+use super::subject::Lane;
 use crate::model::driver::{BelowTrigger, CutInBraking};
 use crate::model::profile::Profile;
-use crate::run::grid::{MapQuantity, SPEED_MPS};
+use crate::run::grid::{MapQuantity, Point, SPEED_MPS};
 use crate::scenario::Category;
 use crate::support::readable::value;
 
@@ -28,11 +28,11 @@ pub(super) fn danger(profile: &Profile, category: Category) -> String {
     }
 }
 
-/// Why Annex 3 does not describe a case.
-pub(super) fn outside(profile: &Profile, subject: &Subject) -> Option<String> {
-    let (cchdm, point) = (&profile.cchdm, subject.point());
+/// Why Annex 3 does not describe a case. Only the initial speeds of a deceleration and the headway of a cut-out are looked at.
+pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> Option<String> {
+    let cchdm = &profile.cchdm;
     let ego_mps = point.get(MapQuantity::EgoSpeed)?;
-    match subject.category() {
+    match category {
         Category::Lvd if cchdm.lead_deceleration_trigger_mps2 > 0.0 => {
             let lead_mps = point.get(MapQuantity::OtherSpeed)?;
             (ego_mps > lead_mps + SPEED_MPS).then(|| {

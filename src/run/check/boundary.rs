@@ -3,7 +3,7 @@
 //! between the case and that value; a change between two values of the scan and back is missed.
 
 use super::subject::Subject;
-use super::{Answer, CaseVerdicts, StepBudget};
+use super::{CaseVerdicts, StepBudget, Verdict};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -45,7 +45,7 @@ pub struct Boundary {
     /// Where the answer becomes another one.
     pub answer: Change,
     /// What it becomes below and above.
-    pub becomes: [Option<Answer>; 2],
+    pub becomes: [Option<Verdict>; 2],
     /// The same for every model, in the order of [`ModelId::ALL`].
     pub models: Vec<Change>,
 }
@@ -69,7 +69,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
         let (below, above) = (side(least.min(value)), side(most.max(value)));
-        let answers = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.answer());
+        let answers = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.verdict());
         let change = |model: &ModelId| {
             let found = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.collides(*model));
             change_of(&found)
@@ -128,5 +128,5 @@ fn verdicts(
     }
     let point = subject.point().with(parameter.quantity, parameter.si(value));
     let lane = subject.lane(profile, &point).ok()?;
-    Some(super::verdicts(&lane, profile, subject.category(), budget))
+    Some(super::verdicts(&lane, &point, profile, subject.category(), budget))
 }

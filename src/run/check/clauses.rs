@@ -73,18 +73,22 @@ impl Reading {
     }
 }
 
-/// The readings of a category, in the order of the clauses; `unreacting` is the ego that keeps its speed.
+/// The readings of a category, in the order of the clauses; `unreacting` is the ego that keeps its speed. A driver that
+/// attends at once reads no deviation.
 pub(super) fn readings(
     profile: &Profile,
     category: Category,
     unreacting: &Trace,
     trace: &dyn Fn(ModelId) -> Trace,
+    attends_at_once: bool,
 ) -> Vec<Reading> {
     let mut list = match category {
         Category::CutIn => lane_intrusion(profile, unreacting),
         Category::CutOut | Category::Lvd => Vec::new(),
     };
-    list.extend(competent_driver(profile, category, &trace(ModelId::Cchdm)));
+    if !attends_at_once {
+        list.extend(competent_driver(profile, category, &trace(ModelId::Cchdm)));
+    }
     list.extend(fuzzy_driver(&trace(ModelId::Fsm)));
     list
 }

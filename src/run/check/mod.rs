@@ -72,6 +72,8 @@ pub struct Judgement {
     pub danger: String,
     /// Why the case is none that Annex 3 describes; `None` where it is one, or the profile does not read Annex 3.
     pub outside_annex: Option<String>,
+    /// Perturbations under which that is another one.
+    pub annex_flips: Vec<&'static str>,
     /// Readings where the regulation is silent, of which another one changes the answer or the verdict of CCHDM.
     pub silent: Vec<&'static str>,
     /// What the clauses say of the case.
@@ -106,11 +108,10 @@ impl Judged {
 impl Judgement {
     /// The answer, where no perturbation changes it, and Annex 3 describes the case. No conflict needs no driver.
     pub fn verdict(&self) -> Verdict {
-        match (self.verdicts.answer(), self.flips.is_empty()) {
-            (Answer::NoConflict, true) => Verdict::Answer(Answer::NoConflict),
-            _ if self.outside_annex.is_some() => Verdict::OutsideAnnex,
-            (answer, true) => Verdict::Answer(answer),
-            (_, false) => Verdict::Undecided,
+        match self.verdicts.verdict() {
+            Verdict::OutsideAnnex => Verdict::OutsideAnnex,
+            verdict if self.flips.is_empty() => verdict,
+            _ => Verdict::Undecided,
         }
     }
 
@@ -137,7 +138,7 @@ impl Judgement {
 }
 
 /// Does each model collide, and an ego that never reacts?
-fn verdicts(lane: &Lane, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
+fn verdicts(lane: &Lane, point: &Point, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
     let ran = |profile: &Profile, model| {
         let outcome = lane.run(profile, category, model);
         budget.take(&outcome);
@@ -146,6 +147,7 @@ fn verdicts(lane: &Lane, profile: &Profile, category: Category, budget: &StepBud
     CaseVerdicts {
         collide: ModelId::ALL.map(|model| ran(profile, model)),
         conflict: ran(&without_reaction(profile), ModelId::Reg157),
+        is_outside_annex: annex::outside(profile, category, point).is_some(),
     }
 }
 
@@ -231,9 +233,16 @@ impl Check {
             demand_flips: flips(&changed, |changed| changed.is_demanded),
             clause: profile.reg157.clause.clone(),
             danger: annex::danger(profile, self.subject.category()),
-            outside_annex: annex::outside(profile, &self.subject),
+            outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
+            annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
             silent: self.silent(profile, &changed[0].verdicts, &budget)?,
-            readings: clauses::readings(profile, self.subject.category(), &unreacting, &trace),
+            readings: clauses::readings(
+                profile,
+                self.subject.category(),
+                &unreacting,
+                &trace,
+                annex::attends_at_once(profile, self.subject.category(), &lane).is_some(),
+            ),
             boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
         })
     }
@@ -244,7 +253,7 @@ impl Check {
         let decides = |other: &Profile| -> Result<bool> {
             budget.check()?;
             let lane = self.subject.lane(other, self.subject.point())?;
-            let found = verdicts(&lane, other, category, budget);
+            let found = verdicts(&lane, self.subject.point(), other, category, budget);
             Ok(found.answer() != is.answer() || found.collides(ModelId::Cchdm) != is.collides(ModelId::Cchdm))
         };
         let mut all = Vec::new();
@@ -264,7 +273,7 @@ impl Check {
         let changed = |by, profile: &Profile, point: &Point| -> Result<Changed> {
             budget.check()?;
             let lane = self.subject.lane(profile, point)?;
-            let verdicts = verdicts(&lane, profile, category, budget);
+            let verdicts = verdicts(&lane, point, profile, category, budget);
             let readings = match category {
                 Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
                 Category::CutOut | Category::Lvd => Vec::new(),

@@ -54,6 +54,8 @@ pub struct CaseVerdicts {
     pub collide: [bool; MODELS],
     /// The ego that never reacts.
     pub conflict: bool,
+    /// Annex 3 does not describe the case.
+    pub is_outside_annex: bool,
 }
 
 impl CaseVerdicts {
@@ -65,6 +67,15 @@ impl CaseVerdicts {
     /// Drivers of Annex 3 that do not collide.
     pub fn avoided_by(&self) -> Vec<ModelId> {
         REFERENCE_DRIVERS.into_iter().filter(|model| !self.collides(*model)).collect()
+    }
+
+    /// The answer where Annex 3 describes the case; no conflict needs no driver.
+    pub fn verdict(&self) -> Verdict {
+        match self.answer() {
+            Answer::NoConflict => Verdict::Answer(Answer::NoConflict),
+            _ if self.is_outside_annex => Verdict::OutsideAnnex,
+            answer => Verdict::Answer(answer),
+        }
     }
 
     /// What they answer.

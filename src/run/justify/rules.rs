@@ -77,6 +77,15 @@ impl Conclusion {
         }
     }
 
+    /// Of one rule: what it says is no conclusion on the parameterization.
+    pub fn of_rule(self) -> &'static str {
+        match self {
+            Conclusion::Appropriate => "passes",
+            Conclusion::NotAppropriate => "fails",
+            Conclusion::Undecided => "undecided",
+        }
+    }
+
     /// Of several rules: the worst.
     pub fn of(findings: &[Finding]) -> Conclusion {
         let any = |conclusion| findings.iter().any(|finding| finding.conclusion == conclusion);

@@ -96,19 +96,25 @@ fn replay(
 }
 
 impl Sample {
-    /// What S and S' are replayed with; `None` where a condition or the density's own headway leaves nothing to compare.
+    /// What S and S' are replayed with: from the recorded gaps where the density draws the headway. `None` where a condition
+    /// leaves nothing to compare.
     fn replayed_with(&self) -> Option<(&Profile, &[ModelId], Vec<Headway>, f64)> {
         let (profile, models, headways, level) = match &self.0 {
             SampleKind::Crude(plan, _) if plan.facts.given.is_empty() => {
-                (&plan.facts.profile, &plan.facts.models, plan.facts.headways.clone()?, plan.facts.level)
+                let headways = plan.facts.headways.clone().unwrap_or_else(|| vec![Headway::Observed]);
+                (&plan.facts.profile, &plan.facts.models, headways, plan.facts.level)
             }
             SampleKind::Crude(..) => return None,
             SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
-                (&plan.facts.profile, &plan.facts.models, vec![plan.facts.headway?], plan.facts.level)
+                let headway = plan.facts.headway.unwrap_or(Headway::Observed);
+                (&plan.facts.profile, &plan.facts.models, vec![headway], plan.facts.level)
             }
             SampleKind::Sequential(run) => {
-                let SampleHeadways::Each(headways) = &run.options.headways else { return None };
-                (&run.profile, &run.options.models, headways.clone(), run.options.level)
+                let headways = match &run.options.headways {
+                    SampleHeadways::Each(headways) => headways.clone(),
+                    _ => vec![Headway::Observed],
+                };
+                (&run.profile, &run.options.models, headways, run.options.level)
             }
         };
         Some((profile, models.as_slice(), headways, level))
@@ -120,13 +126,13 @@ impl Sample {
     /// # Errors
     /// Of the lanes of S and S'.
     pub(super) fn against_recorded(&self, mut result: SampleResult) -> Result<SampleResult> {
-        let Some((profile, models, headways, level)) = self.replayed_with() else { return Ok(result) };
         let density = self.density();
-        let counts = match density.scenarios.is_empty() {
-            true => None,
-            false => replay(density, profile, models, &headways)?,
+        let with = self.replayed_with().filter(|_| !density.scenarios.is_empty());
+        let counts = match &with {
+            Some((profile, models, headways, _)) => replay(density, profile, models, headways)?,
+            None => None,
         };
-        let Some([recorded, replayed]) = counts else {
+        let (Some([recorded, replayed]), Some((_, models, headways, level))) = (counts, with) else {
             result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));
             return Ok(result);
         };
@@ -151,15 +157,17 @@ impl Sample {
 fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
     let model = models.iter().position(|model| *model == row.model).unwrap_or_default();
     let cell = |headway: usize| (headway * models.len() + model) * Criterion::ALL.len() + row.criterion.index();
-    let is_of = |at: &usize| row.headway == "all" || headways[*at].to_string() == row.headway;
+    // Headways of the density's own have one name or another, and are one.
+    let is_of = |at: &usize| headways.len() == 1 || row.headway == "all" || headways[*at].to_string() == row.headway;
     (0..headways.len()).filter(is_of).map(cell).collect()
 }
 
-/// S' comes first: where the replay of the same scenarios fails differently, its samples do so too.
+/// What is decided comes first, then S': where the replay of the same scenarios fails differently, its samples do so too.
 fn warn(row: &mut EstimateRow, ratios: &RecordedRatios) {
     let named = [("S'/S", Some(ratios.replayed)), ("P/S", ratios.sampled)];
-    let found = named.into_iter().find_map(|(name, ratio)| Some((name, ratio?)).filter(|(_, r)| !r.agrees()));
-    let Some((name, ratio)) = found else { return };
+    let differing = || named.into_iter().filter_map(|(name, ratio)| Some((name, ratio?))).filter(|(_, r)| !r.agrees());
+    let decided = differing().find(|(_, ratio)| ratio.verdict != RatioVerdict::Undecided);
+    let Some((name, ratio)) = decided.or_else(|| differing().next()) else { return };
     let is_decided = ratio.verdict != RatioVerdict::Undecided;
     let name = name.to_owned();
     let Ratio { ratio, low, high, .. } = ratio;

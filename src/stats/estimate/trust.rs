@@ -158,8 +158,8 @@ impl fmt::Display for Warning {
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
             Warning::NotCompared => write!(
                 f,
-                "not compared with recorded scenarios (the density file does not hold them, or they cannot be \
-                 replayed): the error of the parameterization is not known"
+                "not compared with recorded scenarios (the density file does not hold them, they cannot be replayed, or a \
+                 condition is given): the error of the parameterization is not known"
             ),
             Warning::AgainstRecorded { ratio: None, is_decided, .. } => match is_decided {
                 true => write!(f, "no recorded scenario fails, but more of the density than chance explains"),
@@ -171,7 +171,10 @@ impl fmt::Display for Warning {
                 let by = if name.starts_with('P') { "density" } else { "parameterization" };
                 match is_decided {
                     true => write!(f, "{interval}: the {by} changes the rate of failure of the recorded scenarios"),
-                    false => write!(f, "{interval}: too few failures tell whether the {by} keeps the recorded rate"),
+                    false => write!(
+                        f,
+                        "{interval}: too few recorded scenarios fail to tell whether the {by} keeps their rate"
+                    ),
                 }
             }
             Warning::LowEffectiveSize { effective_size } => {

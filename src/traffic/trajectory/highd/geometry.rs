@@ -18,8 +18,9 @@ const MAX_OFFSET: f64 = 0.6;
 /// Lateral motion below this is noise, m/s, root mean square.
 const MIN_LATERAL_MPS: f64 = 0.02;
 
-const HELP: &str = "convert the files again: y points down, x and y are the left and upper edge of the box in the image; \
-                    option `accept_implausible` uses them as they are";
+const HELP: &str = "look at y (it points down; x and y are the left and upper edge of the box in the image), at the lane \
+                    markings of the recording, `laneId` and the sizes: one of them does not fit the others; option \
+                    `accept_implausible` uses them as they are";
 
 /// Readings of y that would explain misplaced vehicles: the centre of the box in the image, from the centre as it was
 /// read and the vehicle's width; `road` has the smallest and largest lane line.
