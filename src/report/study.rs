@@ -80,9 +80,9 @@ impl StudyReport {
     /// What the scenarios start from, in a few words.
     pub(super) fn headways_in_words(&self) -> String {
         match self.scores.headways.len() {
-            _ if Headway::is_observed(&self.scores.headways) => "recorded headways".to_owned(),
-            1 => "1 imposed headway".to_owned(),
-            n => format!("{n} imposed headways"),
+            _ if Headway::is_observed(&self.scores.headways) => "recorded THW".to_owned(),
+            1 => "1 imposed THW".to_owned(),
+            n => format!("{n} imposed THW"),
         }
     }
 
