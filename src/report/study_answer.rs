@@ -45,7 +45,7 @@ impl StudyReport {
         lines.extend(
             self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
         );
-        let legend = "hides: simulations in which S collides and the best does not. not told apart: F1 within chance of the \
+        let legend = "hides: colliding runs of S that the best lacks. not told apart: F1 within chance of the \
                       best's. needs: times as many scenarios to tell, if F1 stays.";
         lines.push(wrap(legend, width));
         lines.join("\n") + "\n"
@@ -81,7 +81,7 @@ impl StudyReport {
         }
         let more = self.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
-            lines.push(format!("… and {} more: --tables", count_of(more)));
+            lines.push(format!("… and {} more: report.txt", count_of(more)));
         }
         lines
     }

@@ -26,23 +26,35 @@ pub(super) fn table(header: Vec<String>) -> Table {
 /// Numbers to the right, the first `texts` columns to the left. No word and no number is broken: the table is rather wider
 /// than [`WIDTH`].
 pub(super) fn aligned(mut table: Table, texts: usize) -> String {
-    let mut longest: Vec<usize> = Vec::new();
-    for row in table.header().into_iter().chain(table.row_iter()) {
-        for (at, cell) in row.cell_iter().enumerate() {
-            longest.resize(longest.len().max(at + 1), 0);
-            let words = cell.content();
-            let words = words.split_whitespace().map(|word| word.chars().count());
-            longest[at] = longest[at].max(words.max().unwrap_or(0));
-        }
-    }
-    for (column, longest) in table.column_iter_mut().zip(longest) {
+    let widths = column_widths(&table);
+    for (column, width) in table.column_iter_mut().zip(widths) {
         // With a space on either side.
-        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(longest as u16 + 2)));
+        column.set_constraint(ColumnConstraint::Absolute(Width::Fixed(width as u16 + 2)));
     }
     for (at, column) in table.column_iter_mut().enumerate() {
         column.set_cell_alignment(if at < texts { CellAlignment::Left } else { CellAlignment::Right });
     }
     format!("{table}\n")
+}
+
+/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of [`WIDTH`].
+fn column_widths(table: &Table) -> Vec<usize> {
+    let mut sizes: Vec<[usize; 2]> = Vec::new();
+    for row in table.header().into_iter().chain(table.row_iter()) {
+        for (at, cell) in row.cell_iter().enumerate() {
+            sizes.resize(sizes.len().max(at + 1), [0; 2]);
+            let text = cell.content();
+            let longest =
+                |parts: &mut dyn Iterator<Item = &str>| parts.map(|part| part.chars().count()).max().unwrap_or(0);
+            let [word, line] = &mut sizes[at];
+            *word = longest(&mut text.split_ascii_whitespace()).max(*word);
+            *line = longest(&mut text.lines()).max(*line);
+        }
+    }
+    let words: usize = sizes.iter().map(|[word, _]| word).sum();
+    let wanted: usize = sizes.iter().map(|[word, line]| line - word).sum();
+    let left = wanted.min(WIDTH.saturating_sub(3 * sizes.len() + 1 + words));
+    sizes.iter().map(|[word, line]| word + (line - word) * left / wanted.max(1)).collect()
 }
 
 /// A table within so many columns of the terminal, its first `texts` columns to the left. Where it is too wide it becomes

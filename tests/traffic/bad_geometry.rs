@@ -88,7 +88,12 @@ fn a_mirrored_axis_and_a_wrong_reference_point_are_named_with_vehicle_and_frame(
         }
         assert!(text.contains("01_tracks.csv"), "{what}: {text}");
         let help = error.help().unwrap();
-        assert!(help.contains("y points down") && help.contains("option `accept_implausible`"), "{what}: {help}");
+        assert!(
+            help.contains("it points down")
+                && help.contains("lane markings")
+                && help.contains("option `accept_implausible`"),
+            "{what}: {help}"
+        );
         let notes = read(&texts, Implausible::Accepted).unwrap().notes;
         assert!(!notes.is_empty(), "{what}: accepted without a word");
     }
