@@ -24,7 +24,7 @@ pub(super) fn table(header: Vec<String>) -> Table {
 }
 
 /// Numbers to the right, the first `texts` columns to the left. No word and no number is broken: the table is rather wider
-/// than [`WIDTH`].
+/// than it was set.
 pub(super) fn aligned(mut table: Table, texts: usize) -> String {
     let widths = column_widths(&table);
     for (column, width) in table.column_iter_mut().zip(widths) {
@@ -37,7 +37,8 @@ pub(super) fn aligned(mut table: Table, texts: usize) -> String {
     format!("{table}\n")
 }
 
-/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of [`WIDTH`].
+/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of the
+/// table's width.
 fn column_widths(table: &Table) -> Vec<usize> {
     let mut sizes: Vec<[usize; 2]> = Vec::new();
     for row in table.header().into_iter().chain(table.row_iter()) {
@@ -53,7 +54,8 @@ fn column_widths(table: &Table) -> Vec<usize> {
     }
     let words: usize = sizes.iter().map(|[word, _]| word).sum();
     let wanted: usize = sizes.iter().map(|[word, line]| line - word).sum();
-    let left = wanted.min(WIDTH.saturating_sub(3 * sizes.len() + 1 + words));
+    let width = table.width().map_or(WIDTH, usize::from);
+    let left = wanted.min(width.saturating_sub(3 * sizes.len() + 1 + words));
     sizes.iter().map(|[word, line]| word + (line - word) * left / wanted.max(1)).collect()
 }
 
