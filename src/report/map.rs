@@ -71,7 +71,7 @@ impl MapReport {
     /// Puts every file into its folder; gives their names, without the record's.
     ///
     /// # Errors
-    /// [`Error::Io`] where the folder cannot be written.
+    /// [`crate::Error::Io`] where the folder cannot be written.
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         let mut figures = Vec::new();
         let (outcomes, agreements) = (self.shown_outcomes(), self.shown_agreements());
