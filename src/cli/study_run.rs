@@ -14,6 +14,7 @@ use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
+use crate::report::tables;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{ScoreTable, best_parameterizations, f1, judge_claims};
 use crate::run::study::{CategoryFacts, Study, StudyCases, WINDOW};
@@ -144,8 +145,8 @@ pub(super) fn finish_study(
     report.write(results)?;
     let width = console::width();
     let claims = if report.claims.is_empty() { "" } else { ", claims" };
-    let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.\n");
-    let answer = || report.answer(width) + &rest;
+    let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
+    let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
     format.print(|| if tables { report.text(width) } else { answer() }, || report.json())?;
     tracing::info!("{} files written; start with {}", report.run.files.len() + 1, out.join("report.html").display());
     Ok(if facts.incomplete { Exit::Incomplete } else { Exit::Ok })
