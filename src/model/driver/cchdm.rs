@@ -50,7 +50,7 @@ pub struct CchdmProfile {
     pub abort_on_large_ttc: bool,
 }
 
-/// When braking for a vehicle that cuts in ends. Annex 3 is silent; its charts do not tell the two apart.
+/// When braking for a vehicle that cuts in ends. The tables of Annex 3 do not say it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutInBraking {
