@@ -81,9 +81,14 @@ impl Check {
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let asked = self.asked(&profiles[0])?;
-        // The EU's clause is one of cut-ins.
-        let is_of_case = |p: &Profile| asked.subject.category() == Category::CutIn || !p.name.starts_with("eu-");
-        profiles.retain(|profile| !self.profiles.is_empty() || is_of_case(profile));
+        // A profile that has only a clause of cut-ins of its own says nothing of other cases.
+        if self.profiles.is_empty() && asked.subject.category() != Category::CutIn {
+            let first = profiles[0].clone();
+            let is_first = |p: &Profile| {
+                (&p.frame, &p.cchdm, &p.rss, &p.fsm) == (&first.frame, &first.cchdm, &first.rss, &first.fsm)
+            };
+            profiles.retain(|profile| profile.name == first.name || !is_first(profile));
+        }
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         let check = Checked { subject: asked.subject, profiles, models };
         let judgements = check.run()?;

@@ -58,9 +58,10 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
 }
 
 /// Readings where the annex is silent, each with a profile that reads otherwise.
-pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(&'static str, Profile)> {
+pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(String, Profile)> {
     let mut all = Vec::new();
-    let mut other = |sentence, change: &dyn Fn(&mut Profile)| {
+    let (coasting_mps2, ttc_s) = (value(profile.cchdm.coasting_mps2), value(profile.cchdm.ttc_s));
+    let mut other = |sentence: String, change: &dyn Fn(&mut Profile)| {
         let mut other = profile.clone();
         change(&mut other);
         if other != *profile {
@@ -71,23 +72,17 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
     if profile.cchdm.wandering_m <= 0.0 {
         return all;
     }
-    other("CCHDM coasts at 0.4 m/s² during its delay (the JRC's; the annex gives no value)", &|other| {
-        other.cchdm.coasting_mps2 = 0.0;
-    });
+    let coasts = format!("CCHDM coasts at {coasting_mps2} m/s² during its delay (the JRC's; the annex gives no value)");
+    other(coasts, &|other| other.cchdm.coasting_mps2 = 0.0);
     match category {
         Category::CutIn => {
-            other("CCHDM brakes until the speeds are equal, not only while TTC ≤ 2 s (ours)", &|other| {
-                other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe;
-            });
+            let brakes = format!("CCHDM brakes until the speeds are equal, not only while TTC ≤ {ttc_s} s (ours)");
+            other(brakes, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
         }
         Category::Lvd => {
             for below in [BelowTrigger::Never, BelowTrigger::DelayOnly, BelowTrigger::AtOnce] {
-                other(
-                    "CCHDM reacts to a leader that never exceeds the trigger by `lvd_below_threshold` (ours)",
-                    &|other| {
-                        other.cchdm.lvd_below_threshold = below;
-                    },
-                );
+                let reacts = "CCHDM reacts to a leader that never exceeds the trigger by `lvd_below_threshold` (ours)";
+                other(reacts.to_owned(), &|other| other.cchdm.lvd_below_threshold = below);
             }
         }
         Category::CutOut => {}

@@ -75,7 +75,7 @@ pub struct Judgement {
     /// Perturbations under which that is another one.
     pub annex_flips: Vec<&'static str>,
     /// Readings where the regulation is silent, of which another one changes the answer or the verdict of CCHDM.
-    pub silent: Vec<&'static str>,
+    pub silent: Vec<String>,
     /// What the clauses say of the case.
     pub readings: Vec<Reading>,
     /// Where along each parameter the answer becomes another one.
@@ -224,6 +224,7 @@ impl Check {
         let driver = |model: ModelId| flips(&changed, |changed| changed.verdicts.collides(model));
         let models = self.models.iter().map(|&model| Judged { trace: trace(model), flips: driver(model) });
         let unreacting = lane.unreacting(profile, self.subject.category());
+        let attends_at_once = annex::attends_at_once(profile, self.subject.category(), &lane);
         Ok(Judgement {
             profile: profile.name.clone(),
             models: models.collect(),
@@ -235,20 +236,26 @@ impl Check {
             danger: annex::danger(profile, self.subject.category()),
             outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
-            silent: self.silent(profile, &changed[0].verdicts, &budget)?,
+            silent: self.silent(profile, &changed[0].verdicts, attends_at_once, &budget)?,
             readings: clauses::readings(
                 profile,
                 self.subject.category(),
                 &unreacting,
                 &trace,
-                annex::attends_at_once(profile, self.subject.category(), &lane).is_some(),
+                attends_at_once.is_some(),
             ),
             boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
         })
     }
 
     /// Readings where the regulation is silent that the answer rests on.
-    fn silent(&self, profile: &Profile, is: &CaseVerdicts, budget: &StepBudget) -> Result<Vec<&'static str>> {
+    fn silent(
+        &self,
+        profile: &Profile,
+        is: &CaseVerdicts,
+        attends_at_once: Option<&str>,
+        budget: &StepBudget,
+    ) -> Result<Vec<String>> {
         let category = self.subject.category();
         let decides = |other: &Profile| -> Result<bool> {
             budget.check()?;
@@ -262,8 +269,7 @@ impl Check {
                 all.push(sentence);
             }
         }
-        let lane = self.subject.lane(profile, self.subject.point())?;
-        all.extend(annex::attends_at_once(profile, category, &lane));
+        all.extend(attends_at_once.map(str::to_owned));
         Ok(all)
     }
 
