@@ -8,7 +8,7 @@
 //! The fit sees the 36 shares of failures of S in the paper's table, the number of scenarios found and kept, the density,
 //! the speeds of the traffic, and overlapping vehicles. It never sees an F1 or a claim: those of the paper are predictions.
 //! It starts from the defaults, or from other numbers that are named, and prints `[generator.behaviour]` whenever it has
-//! found something better. Its seed is not that of the default recordings.
+//! found something better. Its seed is not that of the default recordings. `profile="paper-fit"` chooses another profile.
 //!
 //! `show` prints each number of the paper beside that of every seed: shares, traffic figures, the F1 of LVD and the
 //! verdicts of the claims.
@@ -38,17 +38,17 @@ const NOT_REACHED: &str = "cut-out CCHDM TTC";
 /// What the optimiser moves, and between which values.
 const RANGES: [(&str, f64, f64); 18] = [
     ("truck_change_factor", 1.0, 12.0),
-    ("truck_duration_factor", 0.9, 1.6),
     ("car_speed_factor", 0.75, 1.02),
     ("dense_share", 0.0, 0.05),
     ("dense_speed_mps", 6.0, 25.0),
     ("wave_amplitude", 0.1, 0.6),
-    ("wave_own_share", 0.0, 1.0),
-    ("follower_braking_mps2", 0.02, 0.3),
+    ("follower_braking_mps2", 0.01, 0.3),
+    ("accelerating_share", 0.0, 0.6),
+    ("change_acceleration_mps2", 0.0, 2.5),
     ("bold_share", 0.0, 0.3),
+    ("yielding", 0.0, 3.0),
     ("bold_follower_braking_mps2", 0.3, 4.0),
     ("change_duration_s", 4.0, 7.0),
-    ("change_acceleration_mps2", 0.0, 2.5),
     ("change_headway_share", 0.0, 0.8),
     ("brakings_per_s", 0.00005, 0.00015),
     ("braking_hold_s", 1.0, 16.0),
@@ -128,7 +128,7 @@ fn mode(values: &[f64], bin: f64) -> f64 {
 }
 
 impl Outcome {
-    fn of(options: &GeneratorOptions) -> Result<Outcome, Box<dyn Error>> {
+    fn of(options: &GeneratorOptions, profile: &Profile) -> Result<Outcome, Box<dyn Error>> {
         let part = |index| {
             let recording = generate_one(options, index)?;
             let mined = mine(&recording, &MiningOptions::default());
@@ -141,7 +141,7 @@ impl Outcome {
             traffic = traffic.add(of_recording);
             collection.scenarios.extend(scenarios);
         }
-        let study = Study::builder(&collection, Profile::load("paper")?).plan()?;
+        let study = Study::builder(&collection, profile.clone()).plan()?;
         let backend = CpuBackend::lane_arithmetic();
         let counts = study.run(&Executor::new(&backend))?.counts;
         let scores = study.score(&counts)?;
@@ -238,7 +238,7 @@ fn behaviour(point: &[f64]) -> Result<Behaviour, Box<dyn Error>> {
     Ok(table.try_into()?)
 }
 
-fn fit(evaluations: usize, start: Behaviour) -> Result<(), Box<dyn Error>> {
+fn fit(evaluations: usize, start: Behaviour, profile: &Profile) -> Result<(), Box<dyn Error>> {
     let start = toml::Table::try_from(start)?;
     let place = |(name, low, high): (&str, f64, f64)| {
         let value =
@@ -257,7 +257,7 @@ fn fit(evaluations: usize, start: Behaviour) -> Result<(), Box<dyn Error>> {
                 behaviour,
                 ..GeneratorOptions::default()
             };
-            let outcome = Outcome::of(&options)?;
+            let outcome = Outcome::of(&options, profile)?;
             let loss = outcome.loss();
             if loss < best {
                 best = loss;
@@ -288,10 +288,10 @@ fn row(name: &str, published: &str, of_seeds: impl Iterator<Item = String>) {
 }
 
 /// Everything that is published, beside the same of each seed.
-fn show(seeds: &[u64], behaviour: Behaviour) -> Result<(), Box<dyn Error>> {
+fn show(seeds: &[u64], behaviour: Behaviour, profile: &Profile) -> Result<(), Box<dyn Error>> {
     let of_seed = |&seed: &u64| {
         let options = GeneratorOptions { seed, behaviour, ..GeneratorOptions::default() };
-        Outcome::of(&options)
+        Outcome::of(&options, profile)
     };
     let outcomes = seeds.iter().map(of_seed).collect::<Result<Vec<_>, _>>()?;
     let each = |text: &dyn Fn(&Outcome) -> String| outcomes.iter().map(text).collect::<Vec<_>>().into_iter();
@@ -339,12 +339,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let what = arguments.next();
     let (changed, numbers): (Vec<_>, Vec<_>) = arguments.partition(|text| text.contains('='));
-    let behaviour = toml::from_str(&changed.join("\n"))?;
+    let mut changed: toml::Table = toml::from_str(&changed.join("\n"))?;
+    let profile = match changed.remove("profile") {
+        Some(name) => Profile::load(name.as_str().ok_or("profile is a name or a path")?)?,
+        None => Profile::load("paper")?,
+    };
+    let behaviour = changed.try_into()?;
     let numbers = numbers.iter().map(|text| text.parse()).collect::<Result<Vec<u64>, _>>()?;
     match (what.as_deref(), &numbers[..]) {
-        (Some("fit"), []) => fit(600, behaviour),
-        (Some("fit"), [evaluations]) => fit(usize::try_from(*evaluations)?, behaviour),
-        (Some("show"), [_, ..]) => show(&numbers, behaviour),
+        (Some("fit"), []) => fit(600, behaviour, &profile),
+        (Some("fit"), [evaluations]) => fit(usize::try_from(*evaluations)?, behaviour, &profile),
+        (Some("show"), [_, ..]) => show(&numbers, behaviour, &profile),
         _ => Err("say `fit [EVALUATIONS] [NAME=VALUE…]` or `show SEED… [NAME=VALUE…]`".into()),
     }
 }

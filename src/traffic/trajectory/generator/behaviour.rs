@@ -26,38 +26,40 @@ pub struct Behaviour {
     /// Standard deviation of the speed in the waves, as a fraction of their mean.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wave_amplitude: f64,
-    /// Share of the waves' variance that each lane has for itself, 0 (all lanes alike) to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub wave_own_share: f64,
     /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub follower_braking_mps2: f64,
-    /// Share of decisions by a bold driver, 0 to 1.
+    /// Share of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
+    /// Together with `bold_share` at most 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub accelerating_share: f64,
+    /// Mean acceleration of such a driver during the change where there is room, m/s².
+    #[schemars(range(min = 0.0, max = 4.0))]
+    pub change_acceleration_mps2: f64,
+    /// Share of decisions by a bold driver, who changes before a faster follower and keeps the speed, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub bold_share: f64,
-    /// The same braking of the new follower, for a bold driver, m/s².
+    /// The same braking of the new follower, for a driver who accelerates and for a bold one, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub bold_follower_braking_mps2: f64,
+    /// Strength of the motive to let a close follower pass on the right even at a loss of speed, as a fraction of the
+    /// full motive.
+    #[schemars(range(min = 0.0, max = 4.0))]
+    pub yielding: f64,
     /// Median duration of lane changes, before those outside of the published 2.9 to 7.3 s are left out, s.
     #[schemars(range(min = 2.9, max = 7.3))]
     pub change_duration_s: f64,
     /// Factor on the rate at which trucks change lanes.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub truck_change_factor: f64,
-    /// Factor on the median duration of their changes.
-    #[schemars(range(min = 0.6, max = 1.8))]
-    pub truck_duration_factor: f64,
-    /// Mean acceleration during a lane change where there is room, m/s².
-    #[schemars(range(min = 0.0, max = 4.0))]
-    pub change_acceleration_mps2: f64,
     /// Fraction of the time headway that a driver keeps to the new leader during a lane change.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub change_headway_share: f64,
     /// Rate of hard brakings of a vehicle with a follower, 1/s.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub brakings_per_s: f64,
-    /// Mean time for which a hard braking is held, s.
-    #[schemars(range(min = 0.01, max = 60.0))]
+    /// Median time for which a hard braking is held, s.
+    #[schemars(range(min = 0.1, max = 60.0))]
     pub braking_hold_s: f64,
     /// Mean excess of its peak over 1.4 m/s², m/s².
     #[schemars(range(min = 0.0, max = 5.0))]
@@ -78,14 +80,14 @@ impl Default for Behaviour {
             dense_share: 0.0195,
             dense_speed_mps: 8.93,
             wave_amplitude: 0.327,
-            wave_own_share: 0.819,
             follower_braking_mps2: 0.0242,
+            accelerating_share: 0.15,
+            change_acceleration_mps2: 1.2,
             bold_share: 0.0564,
             bold_follower_braking_mps2: 2.43,
+            yielding: 0.5,
             change_duration_s: 4.39,
             truck_change_factor: 3.84,
-            truck_duration_factor: 1.2,
-            change_acceleration_mps2: 0.0432,
             change_headway_share: 0.159,
             brakings_per_s: 0.0000733,
             braking_hold_s: 8.1,
@@ -104,17 +106,17 @@ impl Behaviour {
             ("dense_share", self.dense_share, 0.0, 1.0),
             ("dense_speed_mps", self.dense_speed_mps, 3.0, 40.0),
             ("wave_amplitude", self.wave_amplitude, 0.0, 1.0),
-            ("wave_own_share", self.wave_own_share, 0.0, 1.0),
             ("follower_braking_mps2", self.follower_braking_mps2, 0.001, 10.0),
+            ("accelerating_share", self.accelerating_share, 0.0, 1.0 - self.bold_share.clamp(0.0, 1.0)),
+            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 4.0),
             ("bold_share", self.bold_share, 0.0, 1.0),
             ("bold_follower_braking_mps2", self.bold_follower_braking_mps2, 0.001, 10.0),
+            ("yielding", self.yielding, 0.0, 4.0),
             ("change_duration_s", self.change_duration_s, 2.9, 7.3),
             ("truck_change_factor", self.truck_change_factor, 0.0, 20.0),
-            ("truck_duration_factor", self.truck_duration_factor, 0.6, 1.8),
-            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 4.0),
             ("change_headway_share", self.change_headway_share, 0.0, 1.0),
             ("brakings_per_s", self.brakings_per_s, 0.0, 1.0),
-            ("braking_hold_s", self.braking_hold_s, 0.01, 60.0),
+            ("braking_hold_s", self.braking_hold_s, 0.1, 60.0),
             ("braking_excess_mps2", self.braking_excess_mps2, 0.0, 5.0),
             ("hardest_share", self.hardest_share, 0.0, 1.0),
             ("overreaction", self.overreaction, 0.0, 2.0),

@@ -14,8 +14,9 @@ const HARDEST_PEAK_MPS2: f64 = 7.5;
 /// Fraction of brakings with a second phase.
 const SECOND_PHASE: f64 = 0.35;
 
-/// Longest hold over its mean.
-const LONGEST_HOLD: f64 = 3.125;
+/// Standard deviation of the logarithm of the hold, and the longest hold over its median.
+const HOLD_SIGMA: f64 = 0.45;
+const LONGEST_HOLD: f64 = 3.0;
 
 /// One rise, hold and release.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,8 +78,8 @@ impl Braking {
 
     fn phase(behaviour: &Behaviour, peak_mps2: f64, start_s: f64, stream: &mut TrafficRandom) -> Phase {
         let rise_s = stream.lognormal_within(0.7, 0.4, 0.3, 2.5);
-        let mean_s = behaviour.braking_hold_s;
-        let hold_s = stream.exponential(mean_s).min(LONGEST_HOLD * mean_s) + 0.04;
+        let median_s = behaviour.braking_hold_s;
+        let hold_s = stream.lognormal_within(median_s, HOLD_SIGMA, 0.04, LONGEST_HOLD * median_s);
         let release_s = stream.lognormal_within(1.3, 0.4, 0.5, 4.0);
         // Limited by a car's brakes: 12.65 m/s³ on average.
         let quickest_s = peak_mps2 / 12.65;

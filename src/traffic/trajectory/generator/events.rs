@@ -6,7 +6,7 @@
 
 use super::braking::Braking;
 use super::hazards::{DECISION_S, Hazards};
-use super::lane_change::{Way, acceptance, motive};
+use super::lane_change::{Manner, Way, acceptance, motive};
 use super::lateral::LaneChangeMotion;
 use super::traffic::{Traffic, centre_of};
 use super::vehicle::draw_line;
@@ -64,7 +64,7 @@ impl Traffic {
             return;
         }
         let lane = own.lane;
-        let here = self.view(place, lane).ahead;
+        let here = self.view(place, lane);
         for way in [Way::Left, Way::Right] {
             let to = match way {
                 Way::Left if lane > 0 => lane - 1,
@@ -79,21 +79,24 @@ impl Traffic {
             let there = self.view(place, to);
             let behaviour = &self.setting.behaviour;
             let of_class = if own.class == VehicleClass::Truck { behaviour.truck_change_factor } else { 1.0 };
-            let rate = LANE_CHANGES_PER_S * of_class * motive(way, own.speed_mps, &own.driver, here, there.ahead);
-            let accepted = acceptance(own.speed_mps, there, behaviour);
+            let motive = motive(way, own.speed_mps, &own.driver, here, there.ahead, behaviour.yielding);
+            let rate = LANE_CHANGES_PER_S * of_class * motive;
+            let manner = Manner::draw(behaviour, &mut self.decisions);
+            let accepted = acceptance(own.speed_mps, there, manner, behaviour);
             if self.decisions.chance(rate * factor * accepted * DECISION_S) {
-                self.start_lane_change(i, to);
+                self.start_lane_change(i, to, manner == Manner::Accelerating);
                 return;
             }
         }
     }
 
-    fn start_lane_change(&mut self, i: usize, to: usize) {
+    fn start_lane_change(&mut self, i: usize, to: usize, accelerates: bool) {
         let width = self.setting.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
         let (lanes, way_m) = ((own.lane, to), (own.line_m, target_m));
-        let change = LaneChangeMotion::draw(lanes, way_m, own.class, &self.setting.behaviour, &mut self.decisions);
+        let behaviour = &self.setting.behaviour;
+        let change = LaneChangeMotion::draw(lanes, way_m, own.class, accelerates, behaviour, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;
         own.change = Some(change);

@@ -2,6 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::idm::DriverParameters;
+use super::random::TrafficRandom;
 
 /// The motive to change to a faster lane increases up to this gain in speed, m/s.
 const FULL_GAIN_MPS: f64 = 4.5;
@@ -35,6 +36,10 @@ const MIN_ROOM_M: f64 = 15.0;
 const LOOK_AHEAD_S: f64 = 2.0;
 /// Maximum loss of speed for keeping right, m/s.
 const KEEP_RIGHT_LOSS_MPS: f64 = 0.8;
+/// Maximum loss of speed for letting a follower pass, m/s.
+const YIELDING_LOSS_MPS: f64 = 5.0;
+/// Headway below which a follower presses, s.
+const PRESSING_S: f64 = 1.5;
 
 /// A vehicle next to the deciding one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +68,31 @@ pub(super) enum Way {
     Right,
 }
 
+/// How a driver treats the vehicle behind in the lane to enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Hardly lets it brake.
+    Considerate,
+    /// Lets it brake, and accelerates.
+    Accelerating,
+    /// Lets it brake.
+    Bold,
+}
+
+impl Manner {
+    /// That of one decision.
+    pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
+        let at = stream.uniform();
+        if at < behaviour.accelerating_share {
+            Manner::Accelerating
+        } else if at < behaviour.accelerating_share + behaviour.bold_share {
+            Manner::Bold
+        } else {
+            Manner::Considerate
+        }
+    }
+}
+
 /// Expected speed in a lane: the desired one on a free road, the leader's close behind it.
 fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neighbour>) -> f64 {
     let desired = driver.desired_speed_mps;
@@ -80,12 +110,15 @@ pub(super) fn motive(
     way: Way,
     speed_mps: f64,
     driver: &DriverParameters,
-    here: Option<Neighbour>,
+    here: LaneView,
     there: Option<Neighbour>,
+    yielding: f64,
 ) -> f64 {
-    let gain = promised_speed(speed_mps, driver, there) - promised_speed(speed_mps, driver, here);
+    let gain = promised_speed(speed_mps, driver, there) - promised_speed(speed_mps, driver, here.ahead);
+    let pressed = here.behind.is_some_and(|follower| follower.gap_m < PRESSING_S * follower.speed_mps);
     let share = match way {
         Way::Left => (gain / FULL_GAIN_MPS).clamp(0.0, 1.0),
+        Way::Right if pressed && gain > -YIELDING_LOSS_MPS => KEEP_RIGHT.max(yielding),
         Way::Right if gain > -KEEP_RIGHT_LOSS_MPS => KEEP_RIGHT,
         Way::Right => 0.0,
     };
@@ -94,7 +127,7 @@ pub(super) fn motive(
 }
 
 /// Probability of accepting the gaps of the lane to enter.
-pub(super) fn acceptance(speed_mps: f64, there: LaneView, behaviour: &Behaviour) -> f64 {
+pub(super) fn acceptance(speed_mps: f64, there: LaneView, manner: Manner, behaviour: &Behaviour) -> f64 {
     let soft_step = |value: f64, half: f64| {
         let squared = (value / half) * (value / half);
         squared * squared / (1.0 + squared * squared)
@@ -114,9 +147,11 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView, behaviour: &Behaviour)
         accepted *= NO_HURRY + (1.0 - NO_HURRY) * (1.0 - soft_step(lag_s, HURRY_S));
         if closing_mps > 0.0 {
             let braking = closing_mps * closing_mps / (2.0 * lag.gap_m);
-            let willing = |tolerated_mps2: f64| libm::exp(-braking / tolerated_mps2);
-            accepted *= (1.0 - behaviour.bold_share) * willing(behaviour.follower_braking_mps2)
-                + behaviour.bold_share * willing(behaviour.bold_follower_braking_mps2);
+            let tolerated_mps2 = match manner {
+                Manner::Considerate => behaviour.follower_braking_mps2,
+                Manner::Accelerating | Manner::Bold => behaviour.bold_follower_braking_mps2,
+            };
+            accepted *= libm::exp(-braking / tolerated_mps2);
         }
     }
     if let Some(lead) = there.ahead {
@@ -156,19 +191,28 @@ mod tests {
     #[test]
     fn a_slow_leader_is_the_reason_to_pull_out_and_a_free_lane_the_one_to_return() {
         let truck = Some(Neighbour { gap_m: 35.0, speed_mps: 23.0 });
-        let out = motive(Way::Left, 24.0, &driver(), truck, None);
-        let without = motive(Way::Left, 24.0, &driver(), None, None);
-        assert!(out > 5.0 * without);
-        let back = motive(Way::Right, 33.0, &driver(), None, None);
-        let behind_truck = motive(Way::Right, 33.0, &driver(), None, truck);
-        assert!(back > 5.0 * behind_truck);
+        let of = |way, speed_mps, ahead, there| {
+            motive(way, speed_mps, &driver(), LaneView { ahead, behind: None }, there, 0.5)
+        };
+        assert!(of(Way::Left, 24.0, truck, None) > 5.0 * of(Way::Left, 24.0, None, None));
+        assert!(of(Way::Right, 33.0, None, None) > 5.0 * of(Way::Right, 33.0, None, truck));
+    }
+
+    #[test]
+    fn a_close_follower_is_let_pass_at_a_loss_of_speed() {
+        let slower = Some(Neighbour { gap_m: 50.0, speed_mps: 30.0 });
+        let of = |gap_m| {
+            let here = LaneView { ahead: None, behind: Some(Neighbour { gap_m, speed_mps: 33.0 }) };
+            motive(Way::Right, 33.0, &driver(), here, slower, 0.5)
+        };
+        assert!(of(20.0) > 3.0 * of(80.0));
     }
 
     #[test]
     fn a_gap_that_just_fits_is_taken_sooner_than_a_tight_or_a_wide_one() {
         let at = |headway_s: f64| {
             let behind = Some(Neighbour { gap_m: 30.0 * headway_s, speed_mps: 30.0 });
-            acceptance(30.0, LaneView { behind, ahead: None }, &Behaviour::default())
+            acceptance(30.0, LaneView { behind, ahead: None }, Manner::Considerate, &Behaviour::default())
         };
         assert!(at(0.8) > 3.0 * at(0.4));
         assert!(at(0.8) > 1.5 * at(2.5));
@@ -177,7 +221,7 @@ mod tests {
     #[test]
     fn nobody_moves_into_a_vehicle_or_before_one_that_closes_fast() {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
-        let accepts = |view| acceptance(25.0, view, &Behaviour::default());
+        let accepts = |view| acceptance(25.0, view, Manner::Bold, &Behaviour::default());
         assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
         assert_eq!(accepts(view(20.0, 34.0)), 0.0);
         assert!(accepts(view(40.0, 25.0)) > 0.4);

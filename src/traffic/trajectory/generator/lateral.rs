@@ -8,8 +8,10 @@ use crate::traffic::trajectory::VehicleClass;
 const DURATION_S: [f64; 2] = [2.9, 7.3];
 /// Standard deviation of the duration's logarithm.
 const DURATION_SIGMA: f64 = 0.28;
-/// Standard deviation of the acceleration during a change, as a fraction of its mean.
-const ACCELERATION_SPREAD: f64 = 0.6;
+/// Factor on the median duration of the changes of trucks.
+const TRUCK_DURATION: f64 = 1.2;
+/// Standard deviation of the acceleration of a driver who accelerates during a change, as a fraction of its mean.
+const ACCELERATION_SPREAD: f64 = 0.4;
 /// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
 /// duration earlier or later.
 const ASYMMETRY_SD: f64 = 0.7;
@@ -41,18 +43,17 @@ impl LaneChangeMotion {
         lanes: (usize, usize),
         way_m: (f64, f64),
         class: VehicleClass,
+        accelerates: bool,
         behaviour: &Behaviour,
         stream: &mut TrafficRandom,
     ) -> LaneChangeMotion {
-        let mean_acceleration_mps2 = behaviour.change_acceleration_mps2;
-        let of_class = if class == VehicleClass::Truck { behaviour.truck_duration_factor } else { 1.0 };
+        let of_class = if class == VehicleClass::Truck { TRUCK_DURATION } else { 1.0 };
         let median_s = behaviour.change_duration_s * of_class;
         let duration_s = stream.lognormal_within(median_s, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
-        let spread_mps2 = ACCELERATION_SPREAD * mean_acceleration_mps2;
-        let accelerates = mean_acceleration_mps2 > 0.0;
+        let mean_mps2 = behaviour.change_acceleration_mps2;
         let acceleration_mps2 =
-            accelerates.then(|| stream.normal_within(mean_acceleration_mps2, spread_mps2, -1.0, 4.0));
+            accelerates.then(|| stream.normal_within(mean_mps2, ACCELERATION_SPREAD * mean_mps2, 0.0, 4.0));
         let ((from_lane, to_lane), (from_m, to_m)) = (lanes, way_m);
         LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, acceleration_mps2, from_m, to_m, asymmetry }
     }
@@ -113,7 +114,7 @@ mod tests {
         let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
             let mut change =
-                LaneChangeMotion::draw((1, 0), (-5.6, -1.9), VehicleClass::Truck, &Behaviour::default(), &mut stream);
+                LaneChangeMotion::draw((1, 0), (-5.6, -1.9), VehicleClass::Truck, true, &Behaviour::default(), &mut stream);
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;

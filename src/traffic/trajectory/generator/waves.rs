@@ -17,6 +17,8 @@ const SPEED_SIGMA: f64 = 0.15;
 const PERIOD_S: f64 = 70.0;
 /// Slowest speed in a wave, m/s.
 const SLOWEST_MPS: f64 = 1.5;
+/// Share of the variance that each lane has for itself: drivers change lanes where the next one is faster.
+const OWN_SHARE: f64 = 0.3;
 /// Waves that add up.
 const PARTS: usize = 3;
 
@@ -43,7 +45,6 @@ impl Ripple {
 pub(super) struct Waves {
     mean_mps: f64,
     amplitude: f64,
-    own_share: f64,
     common: Ripple,
     lanes: Vec<Ripple>,
 }
@@ -54,14 +55,14 @@ impl Waves {
         let mean_mps = stream.lognormal_within(behaviour.dense_speed_mps, SPEED_SIGMA, 3.0, 40.0);
         let common = Ripple::draw(stream);
         let lanes = (0..lanes).map(|_| Ripple::draw(stream)).collect();
-        Waves { mean_mps, amplitude: behaviour.wave_amplitude, own_share: behaviour.wave_own_share, common, lanes }
+        Waves { mean_mps, amplitude: behaviour.wave_amplitude, common, lanes }
     }
 
     /// Speed that traffic allows at a place and time, m/s.
     pub fn limit_mps(&self, lane: usize, s_m: f64, time_s: f64) -> f64 {
         let time_s = time_s + s_m / WAVE_MPS;
         let (common, own) = (self.common.at(time_s), self.lanes[lane].at(time_s));
-        let wave = (1.0 - self.own_share).sqrt() * common + self.own_share.sqrt() * own;
+        let wave = (1.0 - OWN_SHARE).sqrt() * common + OWN_SHARE.sqrt() * own;
         (self.mean_mps * (1.0 + self.amplitude * wave)).max(SLOWEST_MPS)
     }
 }
