@@ -32,29 +32,21 @@ use rayon::prelude::*;
 const FITTED_SEED: u64 = 1_000_001;
 const FITTED_RECORDINGS: usize = 80;
 
-/// The share that no set came near to.
-const NOT_REACHED: &str = "cut-out CCHDM TTC";
-
 /// What the optimiser moves, and between which values.
-const RANGES: [(&str, f64, f64); 18] = [
-    ("truck_change_factor", 1.0, 12.0),
-    ("car_speed_factor", 0.75, 1.02),
-    ("dense_share", 0.0, 0.05),
-    ("dense_speed_mps", 6.0, 25.0),
-    ("wave_amplitude", 0.1, 0.6),
-    ("follower_braking_mps2", 0.01, 0.3),
-    ("accelerating_share", 0.0, 0.6),
-    ("change_acceleration_mps2", 0.0, 2.5),
-    ("bold_share", 0.0, 0.3),
-    ("yielding", 0.0, 3.0),
-    ("bold_follower_braking_mps2", 0.3, 4.0),
-    ("change_duration_s", 4.0, 7.0),
+const RANGES: [(&str, f64, f64); 13] = [
+    ("car_speed_factor", 0.8, 1.05),
+    ("follower_braking_mps2", 0.002, 0.1),
+    ("accelerating_share", 0.0, 0.2),
+    ("change_acceleration_mps2", 0.0, 3.5),
+    ("accelerating_follower_braking_mps2", 0.5, 10.0),
+    ("yielding", 0.0, 4.0),
+    ("change_duration_s", 4.0, 7.2),
+    ("truck_change_factor", 0.3, 8.0),
     ("change_headway_share", 0.0, 0.8),
-    ("brakings_per_s", 0.00005, 0.00015),
-    ("braking_hold_s", 1.0, 16.0),
-    ("braking_excess_mps2", 0.2, 1.0),
-    ("hardest_share", 0.0, 0.3),
-    ("overreaction", 0.0, 0.6),
+    ("brakings_per_s", 0.0, 0.0002),
+    ("braking_hold_s", 0.5, 10.0),
+    ("braking_excess_mps2", 0.1, 1.0),
+    ("overreaction", 0.0, 0.4),
 ];
 
 /// What one set of numbers gives.
@@ -173,13 +165,14 @@ impl Outcome {
             let ours = count(&self.collection.scenarios, category);
             let (our_found, our_kept) = (ours.found as f64, ours.kept as f64);
             let raised = our_found / sets as f64 / (found / PUBLISHED_SETS);
-            let kept_share = our_kept / our_found.max(1.0) / (kept / found);
+            let kept_raised = our_kept / sets as f64 / (kept / PUBLISHED_SETS);
             let name = category.label();
             // Gentle decelerations are not raised by the rate factor, and hard ones more.
             let (raise, most) = if category == Category::Lvd { (1.0, 2.0) } else { (self.rate_factor, 1.2) };
             figures.push((format!("{name} found per data set, factor"), raised / raise, 0.6, most));
-            let (kept_raise, most) = if category == Category::Lvd { (self.rate_factor, 1.1) } else { (1.0, 1.5) };
-            figures.push((format!("{name} kept among found, factor"), kept_share / kept_raise, 0.3, most));
+            // The published failures of LVD ask for more hard brakings than were published.
+            let most = if category == Category::Lvd { 2.2 } else { 1.5 };
+            figures.push((format!("{name} kept per data set, factor"), kept_raised / self.rate_factor, 0.8, most));
         }
         let traffic = &self.traffic;
         figures.push(("density, veh/km and lane".to_owned(), traffic.density / traffic.looks as f64, 12.0, 16.5));
@@ -191,13 +184,12 @@ impl Outcome {
     }
 
     /// Mean squared misfit of the shares, in units of 2 points or a sixth of the share, and again of what is beyond the
-    /// limit, in points; plus that of the figures outside their spans. One share, far from every set that was tried, has no
-    /// second part: it would outweigh the others.
+    /// limit, in points; plus that of the figures outside their spans.
     fn loss(&self) -> f64 {
         let shares = self.shares();
-        let square = |(name, ours, theirs): &(String, f64, f64)| {
+        let square = |(_, ours, theirs): &(String, f64, f64)| {
             ((ours - theirs) / (theirs / 6.0).max(2.0)).powi(2)
-                + if name == NOT_REACHED { 0.0 } else { beyond(*ours, *theirs).powi(2) }
+                + Misfit::beyond_points(*ours, *theirs).powi(2)
         };
         let squares: f64 = shares.iter().map(square).sum();
         let outside = |(_, ours, low, high): &(String, f64, f64, f64)| {
@@ -208,7 +200,7 @@ impl Outcome {
 
     fn print(&self) {
         for (name, ours, theirs) in self.shares() {
-            let mark = if beyond(ours, theirs) > 0.0 { "BEYOND" } else { "" };
+            let mark = if Misfit::beyond_points(ours, theirs) > 0.0 { "BEYOND" } else { "" };
             println!("{name:<24} published {theirs:6.1} %, ours {ours:6.1} % {mark}");
         }
         for (name, ours, low, high) in self.figures() {
@@ -219,12 +211,6 @@ impl Outcome {
         }
         println!("loss {:.3}", self.loss());
     }
-}
-
-/// Points by which a share misses the limit: 3 points, or a factor 1.5 where that is more.
-fn beyond(ours: f64, theirs: f64) -> f64 {
-    let (low, high) = ((theirs - 3.0).min(theirs / 1.5), (theirs + 3.0).max(theirs * 1.5));
-    (low - ours).max(ours - high).max(0.0)
 }
 
 /// The numbers of a point of the unit cube; outside of it, of its mirror image inside.
@@ -299,7 +285,7 @@ fn show(seeds: &[u64], behaviour: Behaviour, profile: &Profile) -> Result<(), Bo
     for (at, (name, _, theirs)) in outcomes[0].shares().into_iter().enumerate() {
         let text = |outcome: &Outcome| {
             let ours = outcome.shares()[at].1;
-            format!("{}{ours:.1}", if beyond(ours, theirs) > 0.0 { "BEYOND " } else { "" })
+            format!("{}{ours:.1}", if Misfit::beyond_points(ours, theirs) > 0.0 { "BEYOND " } else { "" })
         };
         row(&format!("{name}, %"), &format!("{theirs:.1}"), each(&text));
     }
@@ -323,12 +309,7 @@ fn show(seeds: &[u64], behaviour: Behaviour, profile: &Profile) -> Result<(), Bo
         row(claim.claim.id, "", outcomes.iter().map(|of| of.claims[at].verdict.text().to_owned()));
     }
     let misfit = |outcome: &Outcome| Misfit::of(&outcome.scores).expect("all models are published");
-    let within = |outcome: &Outcome| {
-        let shares = outcome.shares();
-        let near = shares.iter().filter(|(_, ours, theirs)| beyond(*ours, *theirs) == 0.0).count();
-        format!("{near} of {}", shares.len())
-    };
-    row("shares within the limits", "", each(&within));
+    row("shares within the limits", "", each(&|of| format!("{} of {}", misfit(of).near, misfit(of).shares)));
     row("root mean square of the shares, points", "", each(&|of| format!("{:.2}", misfit(of).share_rms_points)));
     row("mean difference of the LVD F1", "", each(&|of| format!("{:.3}", misfit(of).f1_mean)));
     row("largest", "", each(&|of| format!("{:.3}", misfit(of).f1_largest)));

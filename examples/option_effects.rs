@@ -7,23 +7,32 @@
 //!
 //! Each row changes one option. `s_points` is the root mean square change of the shares of failures of S, per cent;
 //! `f1_change` the mean absolute change of the F1 that are defined in both runs; the misfits are those to the published
-//! shares and to the published F1 of LVD. `claims` are those whose verdict differs from the default's.
+//! shares and to the published F1 of LVD. `claims` are those whose verdict differs from the default's. In the row
+//! `recorded track` S runs on with the recorded motions after T, as long as every vehicle is in view, and then holds.
 
 use std::error::Error;
 
-use lanesweep::engine::{CpuBackend, Executor};
+use lanesweep::engine::{Chunk, CpuBackend, Executor, Partial, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, f1, judge_claims};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
-use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::scenario::{Other, Scenario};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::{Recording, Track};
 
 /// Where an option stands, its key, and another value of it in TOML.
-const OPTIONS: [(&str, &str, &str); 57] = [
+const OPTIONS: [(&str, &str, &str); 63] = [
     ("frame", "dt_s", "0.01"),
     ("frame", "dt_s", "0.1"),
     ("frame", "time_cap_s", "60.0"),
+    ("frame", "time_cap_s", "30.0"),
+    ("frame", "time_cap_s", "20.0"),
+    ("frame", "run_on_s", "5.0"),
+    ("frame", "run_on_s", "15.0"),
+    ("frame", "run_on_s", "30.0"),
+    ("frame", "run_on_s", "60.0"),
     ("frame", "start_shift", "true"),
     ("frame", "end_when_settled", "false"),
     ("frame", "cut_out_target", "\"exposed\""),
@@ -108,21 +117,88 @@ impl Settings {
         Ok(changed)
     }
 
-    fn scores(&self, collection: &Collection) -> Result<Scored, Box<dyn Error>> {
+    fn study(&self, collection: &Collection) -> lanesweep::Result<Study> {
         let options = StudyOptions { parameterization: self.parameterization.clone(), ..StudyOptions::default() };
-        let study = Study::builder(collection, self.profile.clone()).options(options).plan()?;
-        let backend = CpuBackend::lane_arithmetic();
-        let counts = study.run(&Executor::new(&backend))?.counts;
-        let table = study.score(&counts)?;
-        let claims = judge_claims(&table, study.plan(), &counts);
-        Ok(Scored { table, claims })
+        Study::builder(collection, self.profile.clone()).options(options).plan()
     }
+
+    fn scores(&self, collection: &Collection) -> Result<Scored, Box<dyn Error>> {
+        let study = self.study(collection)?;
+        let backend = CpuBackend::lane_arithmetic();
+        Ok(Scored::of(&study, &study.run(&Executor::new(&backend))?.counts)?)
+    }
+
+    /// The scores of S with the recorded motions after T, and of the same S' as ever.
+    fn scores_of_recorded_track(&self, collection: &Collection) -> Result<Scored, Box<dyn Error>> {
+        let recording = |index| generate_one(&self.generator, index);
+        let recordings = (0..self.generator.recordings).map(recording).collect::<lanesweep::Result<Vec<_>>>()?;
+        let mut longer =
+            Collection { scenarios: collection.scenarios.clone(), synthetic: true, ..Collection::default() };
+        for scenario in longer.scenarios.iter_mut().filter(|scenario| scenario.kept) {
+            let of = recordings.iter().find(|recording| recording.id == scenario.recording).ok_or("no recording")?;
+            prolong(scenario, of).ok_or("a vehicle is not in its recording")?;
+        }
+        let (study, prolonged) = (self.study(collection)?, self.study(&longer)?);
+        let (mut chunks, of_s) = (verdicts(&study)?, verdicts(&prolonged)?);
+        let plan = study.plan();
+        let mut counts = Partial::empty(plan);
+        for (chunk, other) in chunks.iter_mut().zip(&of_s) {
+            assert_eq!(chunk.units, other.units);
+            for (at, verdict) in chunk.verdicts.iter_mut().enumerate() {
+                if plan.key(chunk.first_lane + at as u64).is_some_and(|key| key.variant == 0) {
+                    *verdict = other.verdicts[at];
+                }
+            }
+            counts = counts.merge(Partial::from_chunk(plan, chunk)?)?;
+        }
+        Ok(Scored::of(&study, &counts)?)
+    }
+}
+
+/// The verdicts of every lane, one chunk per unit, in order.
+fn verdicts(study: &Study) -> lanesweep::Result<Vec<Chunk>> {
+    let backend = CpuBackend::lane_arithmetic();
+    let mut chunks = Vec::new();
+    for unit in 0..study.plan().unit_count() {
+        study.cases().sweep(unit..unit + 1, Wanted::Verdicts, &Executor::new(&backend), |_, chunk| {
+            chunks.push(chunk);
+            Ok(())
+        })?;
+    }
+    Ok(chunks)
+}
+
+/// Adds what is recorded after T while every vehicle of the scenario is in view.
+fn prolong(scenario: &mut Scenario, recording: &Recording) -> Option<()> {
+    let target = recording.track(scenario.target_id)?;
+    let lead = scenario.lead_id.and_then(|id| recording.track(id));
+    let last = target.last_frame().min(lead.map_or(i64::MAX, Track::last_frame));
+    let (frame1, sign) = (scenario.frame1, scenario.side.sign());
+    let add = |other: &mut Other, track: &Track| {
+        let (from, to) = (track.index_of(frame1)?, track.index_of(last)?);
+        let y = *other.y.last()?;
+        other.v.extend(&track.v_s_mps[from + 1..=to]);
+        other.y.extend(track.d_m[from + 1..=to].iter().map(|d| y + sign * (d - track.d_m[from])));
+        Some(())
+    };
+    add(&mut scenario.target, target)?;
+    scenario.lead.as_mut().zip(lead).map_or(Some(()), |(other, track)| add(other, track))?;
+    scenario.frame1 = last;
+    Some(())
 }
 
 /// Scores of a study with its claims.
 struct Scored {
     table: ScoreTable,
     claims: Vec<ClaimResult>,
+}
+
+impl Scored {
+    fn of(study: &Study, counts: &Partial) -> lanesweep::Result<Scored> {
+        let table = study.score(counts)?;
+        let claims = judge_claims(&table, study.plan(), counts);
+        Ok(Scored { table, claims })
+    }
 }
 
 fn merged(mut old: toml::Table, new: toml::Table) -> toml::Table {
@@ -208,6 +284,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "option,value,kept,s_points,largest_s_change,f1_change,largest_f1_change,misfit_points,misfit_lvd_f1,claims"
     );
     println!("(default),,{}", row(&base, &base));
+    println!("S after T,recorded track,{}", row(&base, &settings.scores_of_recorded_track(&collection)?));
     for (table, key, value) in OPTIONS {
         let changed = settings.with(table, key, value)?;
         let scores = if table.starts_with("mining") || table == "generator" {

@@ -77,6 +77,8 @@ pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> 
 pub struct Misfit {
     /// Shares of failures of S that are published and were simulated, at most 36.
     pub shares: usize,
+    /// How many of them are near the published ones; see [`Misfit::beyond_points`].
+    pub near: usize,
     /// Root mean square difference of these shares, percentage points.
     pub share_rms_points: f64,
     /// F1 of LVD parameterizations that are published and defined here, at most 60.
@@ -90,7 +92,7 @@ pub struct Misfit {
 impl Misfit {
     /// `None` where no share of the study is published.
     pub fn of(scores: &ScoreTable) -> Option<Misfit> {
-        let (mut squares, mut differences) = (Vec::new(), Vec::new());
+        let (mut squares, mut differences, mut near) = (Vec::new(), Vec::new(), 0);
         for category in &scores.categories {
             for cell in &category.cells {
                 let variant = &category.variants[cell.variant];
@@ -98,6 +100,7 @@ impl Misfit {
                 if let (0, Some(theirs)) = (cell.variant, theirs) {
                     let ours = 100.0 * cell.counts.tp as f64 / category.simulations as f64;
                     squares.push((ours - theirs.percent()).powi(2));
+                    near += usize::from(Self::beyond_points(ours, theirs.percent()) == 0.0);
                 } else if let (Category::Lvd, Some(theirs), Some(ours)) =
                     (category.category, published_lvd_f1(variant, cell.model, cell.criterion), f1(&cell.counts))
                 {
@@ -108,11 +111,19 @@ impl Misfit {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         (!squares.is_empty()).then(|| Misfit {
             shares: squares.len(),
+            near,
             share_rms_points: mean(&squares).sqrt(),
             f1_values: differences.len(),
             f1_mean: mean(&differences),
             f1_largest: differences.iter().copied().fold(0.0, f64::max),
         })
+    }
+
+    /// Percentage points by which a share misses what counts as near: within 3 points of the published one or within a
+    /// factor 1.5, whichever is wider.
+    pub fn beyond_points(ours: f64, theirs: f64) -> f64 {
+        let (low, high) = ((theirs - 3.0).min(theirs / 1.5), (theirs + 3.0).max(theirs * 1.5));
+        (low - ours).max(ours - high).max(0.0)
     }
 
     /// The misfit in one sentence.
@@ -127,8 +138,8 @@ impl Misfit {
         };
         format!(
             "Difference to the published numbers of highD: {} shares of failures, root mean square {:.1} percentage \
-             points{f1}.",
-            self.shares, self.share_rms_points
+             points, {} within 3 points or a factor 1.5{f1}.",
+            self.shares, self.share_rms_points, self.near
         )
     }
 }

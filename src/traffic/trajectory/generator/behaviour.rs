@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::support::error::{Error, Place, Result};
 
-/// How drivers change lanes and brake, and how often traffic is dense, where scenarios arise. Rates and shares are those
-/// at rate factor 1.
+/// How drivers change lanes and brake. Rates and shares are those at rate factor 1.
 ///
 /// All defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
 /// (`examples/calibrate_generator.rs`, which also prints what other numbers give). The fit never saw an F1, a claim of the
@@ -17,31 +16,18 @@ pub struct Behaviour {
     /// Factor on the desired speeds of cars.
     #[schemars(range(min = 0.5, max = 1.5))]
     pub car_speed_factor: f64,
-    /// Share of carriageways with stop-and-go traffic, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub dense_share: f64,
-    /// Median of the mean speed that the waves of stop-and-go traffic allow, m/s.
-    #[schemars(range(min = 3.0, max = 40.0))]
-    pub dense_speed_mps: f64,
-    /// Standard deviation of the speed in the waves, as a fraction of their mean.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub wave_amplitude: f64,
     /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub follower_braking_mps2: f64,
     /// Share of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
-    /// Together with `bold_share` at most 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub accelerating_share: f64,
+    /// The same braking of the new follower, for such a driver, m/s².
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub accelerating_follower_braking_mps2: f64,
     /// Mean acceleration of such a driver during the change where there is room, m/s².
     #[schemars(range(min = 0.0, max = 4.0))]
     pub change_acceleration_mps2: f64,
-    /// Share of decisions by a bold driver, who changes before a faster follower and keeps the speed, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub bold_share: f64,
-    /// The same braking of the new follower, for a driver who accelerates and for a bold one, m/s².
-    #[schemars(range(min = 0.001, max = 10.0))]
-    pub bold_follower_braking_mps2: f64,
     /// Strength of the motive to let a close follower pass on the right even at a loss of speed, as a fraction of the
     /// full motive.
     #[schemars(range(min = 0.0, max = 4.0))]
@@ -61,12 +47,9 @@ pub struct Behaviour {
     /// Median time for which a hard braking is held, s.
     #[schemars(range(min = 0.1, max = 60.0))]
     pub braking_hold_s: f64,
-    /// Mean excess of its peak over 1.4 m/s², m/s².
+    /// Mean excess of its peak over 2 m/s², m/s².
     #[schemars(range(min = 0.0, max = 5.0))]
     pub braking_excess_mps2: f64,
-    /// Share of hard brakings with a mean excess of 1.8 m/s², 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub hardest_share: f64,
     /// How much harder than needed a driver brakes where the gap is too short, as a fraction of the comfortable
     /// deceleration.
     #[schemars(range(min = 0.0, max = 2.0))]
@@ -76,24 +59,19 @@ pub struct Behaviour {
 impl Default for Behaviour {
     fn default() -> Self {
         Behaviour {
-            car_speed_factor: 0.93,
-            dense_share: 0.0195,
-            dense_speed_mps: 8.93,
-            wave_amplitude: 0.327,
-            follower_braking_mps2: 0.0242,
-            accelerating_share: 0.15,
-            change_acceleration_mps2: 1.2,
-            bold_share: 0.0564,
-            bold_follower_braking_mps2: 2.43,
-            yielding: 0.5,
-            change_duration_s: 4.39,
-            truck_change_factor: 3.84,
-            change_headway_share: 0.159,
-            brakings_per_s: 0.0000733,
-            braking_hold_s: 8.1,
-            braking_excess_mps2: 0.747,
-            hardest_share: 0.0103,
-            overreaction: 0.336,
+            car_speed_factor: 0.914,
+            follower_braking_mps2: 0.0134,
+            accelerating_share: 0.0409,
+            accelerating_follower_braking_mps2: 5.82,
+            change_acceleration_mps2: 2.2,
+            yielding: 0.934,
+            change_duration_s: 6.07,
+            truck_change_factor: 0.428,
+            change_headway_share: 0.141,
+            brakings_per_s: 0.00006,
+            braking_hold_s: 8.0,
+            braking_excess_mps2: 0.6,
+            overreaction: 0.224,
         }
     }
 }
@@ -103,14 +81,10 @@ impl Behaviour {
     pub fn validate(&self) -> Result<()> {
         let ranges = [
             ("car_speed_factor", self.car_speed_factor, 0.5, 1.5),
-            ("dense_share", self.dense_share, 0.0, 1.0),
-            ("dense_speed_mps", self.dense_speed_mps, 3.0, 40.0),
-            ("wave_amplitude", self.wave_amplitude, 0.0, 1.0),
             ("follower_braking_mps2", self.follower_braking_mps2, 0.001, 10.0),
-            ("accelerating_share", self.accelerating_share, 0.0, 1.0 - self.bold_share.clamp(0.0, 1.0)),
+            ("accelerating_share", self.accelerating_share, 0.0, 1.0),
+            ("accelerating_follower_braking_mps2", self.accelerating_follower_braking_mps2, 0.001, 10.0),
             ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 4.0),
-            ("bold_share", self.bold_share, 0.0, 1.0),
-            ("bold_follower_braking_mps2", self.bold_follower_braking_mps2, 0.001, 10.0),
             ("yielding", self.yielding, 0.0, 4.0),
             ("change_duration_s", self.change_duration_s, 2.9, 7.3),
             ("truck_change_factor", self.truck_change_factor, 0.0, 20.0),
@@ -118,7 +92,6 @@ impl Behaviour {
             ("brakings_per_s", self.brakings_per_s, 0.0, 1.0),
             ("braking_hold_s", self.braking_hold_s, 0.1, 60.0),
             ("braking_excess_mps2", self.braking_excess_mps2, 0.0, 5.0),
-            ("hardest_share", self.hardest_share, 0.0, 1.0),
             ("overreaction", self.overreaction, 0.0, 2.0),
         ];
         check_ranges("generator.behaviour", &ranges)

@@ -6,16 +6,14 @@ use super::random::TrafficRandom;
 
 /// Minimum peak of a scheduled braking, m/s². Weaker braking occurs in the traffic anyway, so the rate factor does
 /// not apply to it.
-pub(super) const WEAKEST_PEAK_MPS2: f64 = 1.4;
-/// Mean excess over it of the peaks of the hardest brakings, m/s².
-const HARDEST_EXCESS_MPS2: f64 = 1.8;
+const WEAKEST_PEAK_MPS2: f64 = 2.0;
 /// Maximum peak, m/s² (dry road).
 const HARDEST_PEAK_MPS2: f64 = 7.5;
 /// Fraction of brakings with a second phase.
 const SECOND_PHASE: f64 = 0.35;
 
 /// Standard deviation of the logarithm of the hold, and the longest hold over its median.
-const HOLD_SIGMA: f64 = 0.45;
+const HOLD_SIGMA: f64 = 0.2;
 const LONGEST_HOLD: f64 = 3.0;
 
 /// One rise, hold and release.
@@ -64,9 +62,8 @@ pub(super) struct Braking {
 impl Braking {
     /// Draws peak and shape.
     pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Braking {
-        let excess =
-            if stream.chance(behaviour.hardest_share) { HARDEST_EXCESS_MPS2 } else { behaviour.braking_excess_mps2 };
-        let peak = (WEAKEST_PEAK_MPS2 + stream.exponential(excess)).min(HARDEST_PEAK_MPS2);
+        let excess_mps2 = stream.exponential(behaviour.braking_excess_mps2);
+        let peak = (WEAKEST_PEAK_MPS2 + excess_mps2).min(HARDEST_PEAK_MPS2);
         let first = Self::phase(behaviour, peak, 0.0, stream);
         let second = stream.chance(SECOND_PHASE).then(|| {
             // Starts between the middle of the first release and a second after it.

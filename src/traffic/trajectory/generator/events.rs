@@ -20,7 +20,7 @@ const LANE_CHANGES_PER_S: f64 = 0.175;
 /// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
 /// Minimum speed at which braking is scheduled, m/s.
-const BRAKING_FROM_MPS: f64 = 17.0;
+const BRAKING_FROM_MPS: f64 = 22.0;
 /// A vehicle that already decelerates more than this does not start a scheduled braking, m/s².
 const BRAKING_ALREADY_MPS2: f64 = -0.6;
 

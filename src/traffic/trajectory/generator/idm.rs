@@ -37,6 +37,12 @@ pub(super) struct LeaderView {
 /// Maximum braking of any driver, m/s².
 pub(super) const HARDEST_BRAKING_MPS2: f64 = 8.0;
 
+/// Braking that drivers exceed only where they must, m/s²: 2.4 % of the published decelerations of leaders exceed 2 m/s².
+const GENTLE_MPS2: f64 = 1.8;
+/// They must where more than this fraction of it is needed to avoid contact, or where the leader brakes more than this.
+const URGENT: f64 = 0.8;
+const BRAKING_LEADER_MPS2: f64 = -0.5;
+
 /// Weight of the heuristic ("coolness").
 const COOLNESS: f64 = 0.95;
 
@@ -77,7 +83,8 @@ pub(super) fn following_acceleration(
     // Lower bound: the braking that avoids contact.
     let needed = if closing_mps > 0.0 { closing_mps * closing_mps / (2.0 * (gap_m - 1.0).max(0.5)) } else { 0.0 };
     let guarded = if needed > 2.0 * driver.comfortable_mps2 { mixed.min(-1.2 * needed) } else { mixed };
-    guarded.max(-HARDEST_BRAKING_MPS2)
+    let must = needed > URGENT * GENTLE_MPS2 || leader.acceleration_mps2 < BRAKING_LEADER_MPS2;
+    guarded.max(if must { -HARDEST_BRAKING_MPS2 } else { -GENTLE_MPS2 })
 }
 
 /// Deceleration that avoids a collision if the leader keeps its acceleration, m/s².

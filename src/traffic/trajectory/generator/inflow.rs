@@ -6,9 +6,10 @@ use super::vehicle::Vehicle;
 use crate::traffic::trajectory::VehicleClass;
 
 /// Fraction of arrivals that follow the previous vehicle at their desired headway; the others arrive freely.
-const FOLLOWERS: f64 = 0.5;
-/// Maximum excess of the desired speed over the vehicle ahead for an arrival as its follower, m/s.
-const FOLLOWS_WITHIN_MPS: f64 = 4.0;
+const FOLLOWERS: f64 = 0.8;
+/// Largest braking with which an arrival approaches the vehicle ahead, m/s². Vehicles have driven behind each other before
+/// they arrive, so their speeds are much alike.
+const APPROACH_MPS2: f64 = 0.025;
 /// Mean number of lanes per direction in the default mix of roads: the published flow refers to it; other roads scale
 /// with their lanes.
 const MEAN_LANES: f64 = 8.0 / 3.0;
@@ -83,12 +84,11 @@ impl Inflow {
     }
 
     /// The next vehicle, if it is due and has space behind the last one of its lane (`last`: rear bumper and speed),
-    /// at `entrance_m`, not faster than `limit_mps`.
+    /// at `entrance_m`.
     pub fn arrive(
         &mut self,
         now_s: f64,
         entrance_m: f64,
-        limit_mps: f64,
         last: Option<(f64, f64)>,
         stream: &mut TrafficRandom,
     ) -> Option<Vehicle> {
@@ -96,15 +96,14 @@ impl Inflow {
             return None;
         }
         let driver = self.next.driver;
-        let mut speed_mps = driver.desired_speed_mps.min(limit_mps);
+        let mut speed_mps = driver.desired_speed_mps;
         if let Some((rear_m, last_mps)) = last {
             let gap_m = rear_m - entrance_m - 0.5 * self.next.length_m;
             let spare_m = gap_m - driver.standstill_gap_m - 0.8 * driver.time_headway_s * last_mps;
             if spare_m < 0.0 {
                 return None;
             }
-            // The excess over the speed ahead must allow a gentle approach in the available space.
-            speed_mps = speed_mps.min(last_mps + (0.6 * spare_m).sqrt());
+            speed_mps = speed_mps.min(last_mps + (2.0 * APPROACH_MPS2 * spare_m).sqrt());
         }
         let mut vehicle =
             std::mem::replace(&mut self.next, draw(&self.demand, self.lane, self.centre_m, self.lane_width_m, stream));
@@ -122,9 +121,7 @@ impl Inflow {
         let share = self.demand.truck_share;
         let mean_following_s = (1.0 - share) * own_s(1.5, 4.6) + share * own_s(1.85, 12.0);
         let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - FOLLOWERS);
-        // A driver with a much higher desired speed is not a follower: that driver would have changed lanes before.
-        let follows = self.next.driver.desired_speed_mps < speed_mps + FOLLOWS_WITHIN_MPS && stream.chance(FOLLOWERS);
-        if free_s <= 0.0 || follows { following_s } else { following_s + stream.exponential(free_s) }
+        if free_s <= 0.0 || stream.chance(FOLLOWERS) { following_s } else { following_s + stream.exponential(free_s) }
     }
 }
 

@@ -23,7 +23,7 @@ const HURRY_S: f64 = 1.0;
 /// Factor on the acceptance without urgency.
 const NO_HURRY: f64 = 0.35;
 /// Minimum time to collision with the new neighbours at the start of a change, s.
-const MIN_TTC_S: f64 = 3.5;
+const MIN_TTC_S: f64 = 2.0;
 /// Minimum gap to the new neighbours at the start, m.
 const MIN_GAP_M: f64 = 4.0;
 /// Headway to the new leader at which half of the drivers accept, s.
@@ -75,21 +75,12 @@ pub(super) enum Manner {
     Considerate,
     /// Lets it brake, and accelerates.
     Accelerating,
-    /// Lets it brake.
-    Bold,
 }
 
 impl Manner {
     /// That of one decision.
     pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
-        let at = stream.uniform();
-        if at < behaviour.accelerating_share {
-            Manner::Accelerating
-        } else if at < behaviour.accelerating_share + behaviour.bold_share {
-            Manner::Bold
-        } else {
-            Manner::Considerate
-        }
+        if stream.chance(behaviour.accelerating_share) { Manner::Accelerating } else { Manner::Considerate }
     }
 }
 
@@ -149,7 +140,7 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView, manner: Manner, behavi
             let braking = closing_mps * closing_mps / (2.0 * lag.gap_m);
             let tolerated_mps2 = match manner {
                 Manner::Considerate => behaviour.follower_braking_mps2,
-                Manner::Accelerating | Manner::Bold => behaviour.bold_follower_braking_mps2,
+                Manner::Accelerating => behaviour.accelerating_follower_braking_mps2,
             };
             accepted *= libm::exp(-braking / tolerated_mps2);
         }
@@ -221,7 +212,7 @@ mod tests {
     #[test]
     fn nobody_moves_into_a_vehicle_or_before_one_that_closes_fast() {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
-        let accepts = |view| acceptance(25.0, view, Manner::Bold, &Behaviour::default());
+        let accepts = |view| acceptance(25.0, view, Manner::Accelerating, &Behaviour::default());
         assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
         assert_eq!(accepts(view(20.0, 34.0)), 0.0);
         assert!(accepts(view(40.0, 25.0)) > 0.4);

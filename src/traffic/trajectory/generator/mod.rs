@@ -14,7 +14,6 @@
 //! | `vehicle` | sizes, desired speeds, lognormal time headways | speed peaks near 23 m/s (trucks) and 33 m/s (cars); car IDM a 0.55 m/s², s0 3.4 m, T ≈ 1.5 s; sizes as in DLR-HT |
 //! | `idm` | car-following: IDM with constant-acceleration heuristic | as above |
 //! | `traffic` | correlated (Ornstein–Uhlenbeck) acceleration noise, lag, opening of the gap after a cut-in | noise sd 0.20–0.24 m/s², correlation 1.5 s |
-//! | `waves` | dense traffic on a share of the carriageways: stop-and-go waves limit the speed | the paper's shares of failures of LVD |
 //! | `lane_change` | motives and gap acceptance | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
 //! | `lateral` | quintic lane changes with a mild asymmetry, wander in the lane | duration 2.9–7.3 s, profile close to a quintic |
 //! | `braking` | scheduled hard brakings of one or two phases, two kinds of exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's shares of failures of LVD |
@@ -63,7 +62,6 @@ mod random;
 mod recording;
 mod traffic;
 mod vehicle;
-mod waves;
 
 pub use behaviour::Behaviour;
 pub use options::GeneratorOptions;

@@ -31,7 +31,7 @@ pub struct GeneratorOptions {
     /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
     #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_share: f64,
-    /// Factor on the rates of lane changes and hard braking in the camera's view, and on the share of dense carriageways.
+    /// Factor on the rates of lane changes and hard braking in the camera's view.
     /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives about
     /// as many kept cut-ins and LVDs as the paper has and half as many cut-outs, in a quarter of highD's time. A larger one
     /// disturbs the traffic: vehicles brake for lane changes of others.

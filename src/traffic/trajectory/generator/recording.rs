@@ -6,7 +6,6 @@ use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
 use super::traffic::{RoadSetup, Traffic};
 use super::vehicle::Vehicle;
-use super::waves::Waves;
 use crate::support::error::Result;
 use crate::traffic::trajectory::highd::{self, Precision};
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
@@ -38,9 +37,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     for (carriageway, &lanes) in road.iter().enumerate() {
         let flow_level = site.normal_within(1.0, 0.08, 0.8, 1.12);
         let demand = demand(options, lanes, flow_level, truck_level, speed_level);
-        let dense = is_dense(options, 2 * index + carriageway);
-        let waves = dense.then(|| Waves::draw(&options.behaviour, lanes, &mut site));
-        let traffic = Traffic::new(setting.clone(), demand, waves, (options.seed, index, carriageway));
+        let traffic = Traffic::new(setting.clone(), demand, (options.seed, index, carriageway));
         seen.extend(traffic.run(options.samples()).into_iter().map(|vehicle| (carriageway, vehicle)));
     }
     // Numbers ascend by first appearance; the sort is stable, so ties keep carriageway and arrival.
@@ -57,14 +54,6 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     highd::quantize(&mut recording, Precision::Hundredths)?;
     label_lanes(&mut recording);
     Ok(recording)
-}
-
-/// Whether this carriageway, counted over all recordings, has stop-and-go traffic: every so many, so that few
-/// recordings have their share too.
-fn is_dense(options: &GeneratorOptions, carriageway: usize) -> bool {
-    let share = (options.behaviour.dense_share * options.event_rate_factor).min(1.0);
-    let dense_before = |carriageways: usize| (carriageways as f64 * share + 0.5).floor();
-    dense_before(carriageway + 1) > dense_before(carriageway)
 }
 
 /// Lanes by the written centre, because rounding may move it over a line.

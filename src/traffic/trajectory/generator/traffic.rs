@@ -9,7 +9,6 @@ use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
-use super::waves::Waves;
 use crate::traffic::trajectory::VehicleClass;
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
@@ -32,18 +31,15 @@ const RELAXATION_S: f64 = 15.0;
 const TOLERATED_HEADWAY_S: f64 = 0.25;
 /// Fraction of the headway that a driver keeps before leaving the leader's lane.
 const LEAVING_HEADWAY: f64 = 0.5;
-/// Time in which drivers adapt to the speed that a wave allows, s.
-const ADAPTATION_S: f64 = 1.0;
-/// Speed at which the road fills before the recording, m/s: slower than most trucks, and in dense traffic.
+/// Speed at which the road fills before the recording, m/s: slower than most trucks.
 const FILLING_MPS: f64 = 21.0;
-const FILLING_DENSE_MPS: f64 = 5.0;
 /// Speed up to which drivers of cars accelerate during a lane change, as a factor on their desired speed. Trucks have
 /// limiters.
-const EXCEEDING: f64 = 1.15;
+const EXCEEDING: f64 = 1.5;
 /// Room ahead in which they do: length, time headway and time to collision.
 const ROOM_M: f64 = 3.0;
 const ROOM_HEADWAY_S: f64 = 0.3;
-const ROOM_TTC_S: f64 = 6.0;
+const ROOM_TTC_S: f64 = 4.0;
 
 /// Dimensions of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,13 +78,11 @@ pub(super) struct Traffic {
     lag: f64,
     perception: f64,
     relaxation: f64,
-    /// Of dense traffic.
-    waves: Option<Waves>,
 }
 
 impl Traffic {
     /// An empty road. `key` is (seed, recording, carriageway).
-    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, waves: Option<Waves>, key: (u64, usize, usize)) -> Traffic {
+    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
         let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
@@ -117,7 +111,6 @@ impl Traffic {
             relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
             hazards_in_view: Hazards::raised(setting.event_rate_factor),
             setting,
-            waves,
         }
     }
 
@@ -125,8 +118,7 @@ impl Traffic {
     /// order of arrival.
     pub fn run(mut self, samples: usize) -> Vec<Vehicle> {
         // Warm-up: the slowest trucks pass the whole road once.
-        let filling_mps = if self.waves.is_some() { FILLING_DENSE_MPS } else { FILLING_MPS };
-        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / filling_mps;
+        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / FILLING_MPS;
         let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;
         let steps = warm_up + (samples.max(1) - 1) * self.setting.steps_per_sample + 1;
         for step in 0..steps {
@@ -142,19 +134,12 @@ impl Traffic {
         self.vehicles
     }
 
-    /// Speed that the waves of dense traffic allow now, m/s; without limit where traffic is not dense.
-    fn limit_mps(&self, lane: usize, s_m: f64) -> f64 {
-        let now_s = self.step as f64 * self.setting.step_s;
-        self.waves.as_ref().map_or(f64::INFINITY, |waves| waves.limit_mps(lane, s_m, now_s))
-    }
-
     fn inject(&mut self) {
         let now_s = self.step as f64 * self.setting.step_s;
         for lane in 0..self.lanes {
             let last = self.order.iter().rev().find(|&&i| self.vehicles[i].is_in(lane));
             let last = last.map(|&i| (self.vehicles[i].rear_m(), self.vehicles[i].speed_mps));
-            let limit_mps = self.limit_mps(lane, -UPSTREAM_M);
-            if let Some(vehicle) = self.inflows[lane].arrive(now_s, -UPSTREAM_M, limit_mps, last, &mut self.arrivals) {
+            if let Some(vehicle) = self.inflows[lane].arrive(now_s, -UPSTREAM_M, last, &mut self.arrivals) {
                 self.order.push(self.vehicles.len());
                 self.vehicles.push(vehicle);
             }
@@ -195,9 +180,7 @@ impl Traffic {
             let own = &self.vehicles[i];
             let target_lane = own.change.map_or(own.lane, |change| change.to_lane);
             let leader = last_in[target_lane];
-            let mut driver = own.driver;
-            let limit_mps = self.limit_mps(target_lane, own.s_m);
-            driver.desired_speed_mps = driver.desired_speed_mps.min(limit_mps);
+            let driver = own.driver;
             let view_of = |k: usize, perceived_mps2: f64| {
                 let v = &self.vehicles[k];
                 LeaderView {
@@ -228,10 +211,6 @@ impl Traffic {
                 || free_acceleration(own.speed_mps, &driver),
                 |k| following_acceleration(own.speed_mps, kept_s, view_of(k, perceived), &driver),
             );
-            if own.speed_mps > limit_mps {
-                let adaptation_mps2 = (own.speed_mps - limit_mps) / ADAPTATION_S;
-                command = command.min(-adaptation_mps2.min(2.0 * driver.comfortable_mps2));
-            }
             if let Some(change) = own.change
                 && own.is_in(change.from_lane)
                 && let Some(k) = last_in[change.from_lane]
