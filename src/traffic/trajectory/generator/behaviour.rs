@@ -59,19 +59,19 @@ pub struct Behaviour {
 impl Default for Behaviour {
     fn default() -> Self {
         Behaviour {
-            car_speed_factor: 0.914,
-            follower_braking_mps2: 0.0134,
-            accelerating_share: 0.0409,
-            accelerating_follower_braking_mps2: 5.82,
-            change_acceleration_mps2: 2.2,
-            yielding: 0.934,
-            change_duration_s: 6.07,
-            truck_change_factor: 0.428,
-            change_headway_share: 0.141,
-            brakings_per_s: 0.00006,
-            braking_hold_s: 8.0,
-            braking_excess_mps2: 0.6,
-            overreaction: 0.224,
+            car_speed_factor: 0.896,
+            follower_braking_mps2: 0.00556,
+            accelerating_share: 0.0464,
+            accelerating_follower_braking_mps2: 5.48,
+            change_acceleration_mps2: 2.35,
+            yielding: 0.216,
+            change_duration_s: 6.45,
+            truck_change_factor: 0.663,
+            change_headway_share: 0.203,
+            brakings_per_s: 0.0000797,
+            braking_hold_s: 8.44,
+            braking_excess_mps2: 0.543,
+            overreaction: 0.226,
         }
     }
 }

@@ -10,13 +10,13 @@
 //!
 //! | file | what | published figure it is set by (highD, where nothing else is said) |
 //! |---|---|---|
-//! | `inflow` | arrivals per lane: followers at their own headway, others freely | 3,350 veh/h per direction, 11–17 veh/km and lane, about 20 % trucks |
+//! | `inflow` | arrivals per lane in platoons: followers at their own headway and nearly the leader's speed, others freely | 3,350 veh/h per direction, 11–17 veh/km and lane, about 20 % trucks |
 //! | `vehicle` | sizes, desired speeds, lognormal time headways | speed peaks near 23 m/s (trucks) and 33 m/s (cars); car IDM a 0.55 m/s², s0 3.4 m, T ≈ 1.5 s; sizes as in DLR-HT |
 //! | `idm` | car-following: IDM with constant-acceleration heuristic | as above |
 //! | `traffic` | correlated (Ornstein–Uhlenbeck) acceleration noise, lag, opening of the gap after a cut-in | noise sd 0.20–0.24 m/s², correlation 1.5 s |
-//! | `lane_change` | motives and gap acceptance | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
+//! | `lane_change` | motives (a faster lane, keeping right, letting a close follower pass) and gap acceptance; some drivers let a follower brake and accelerate | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
 //! | `lateral` | quintic lane changes with a mild asymmetry, wander in the lane | duration 2.9–7.3 s, profile close to a quintic |
-//! | `braking` | scheduled hard brakings of one or two phases, two kinds of exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's shares of failures of LVD |
+//! | `braking` | scheduled hard brakings of one or two phases with an exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's shares of failures of LVD |
 //! | `behaviour` | the numbers on which failures depend most, fitted by `examples/calibrate_generator.rs` | the paper's 36 shares of failures of S |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
@@ -31,18 +31,17 @@
 //!
 //! # The rate factor
 //! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published. The default
-//! of 3 multiplies the *rate* of lane changes and hard braking in view and the share of dense carriageways, so that 60
-//! recordings of four minutes have about as many kept cut-ins and LVDs as the paper, and half as many cut-outs. Rates
-//! rise slightly less than the factor, because lane changes obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
+//! of 3 multiplies the *rate* of lane changes and hard braking in view, so that the default recordings have about as many
+//! kept cut-ins and cut-outs as the paper, in less time. Rates rise slightly less than the factor, because lane changes
+//! obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
 //! A factor of 8 fits the published failures worse: so many lane changes disturb the traffic, and closing speeds and
 //! brakings become those of congestion.
 //!
 //! # Limits
 //! The data contains no row of highD and was fitted to published figures only. It says nothing about real
 //! traffic: do not quote exposure, risk or comparisons of driver models from it. Drivers are never distracted and
-//! never abort a lane change; some braking has no visible cause. Trucks change lanes 3.84
-//! times as often as cars with the same motive would; the factor is fitted, not measured. There are no ramps, curves, motorcycles,
-//! weather or measurement errors.
+//! never abort a lane change; some braking has no visible cause. There is no stop-and-go traffic other than behind hard
+//! brakings, and there are no ramps, curves, motorcycles, weather or measurement errors.
 //!
 //! # Reproducibility
 //! Random numbers are counter-based and named by (seed, recording, carriageway, purpose);

@@ -33,8 +33,8 @@ pub struct GeneratorOptions {
     pub truck_share: f64,
     /// Factor on the rates of lane changes and hard braking in the camera's view.
     /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives about
-    /// as many kept cut-ins and LVDs as the paper has and half as many cut-outs, in a quarter of highD's time. A larger one
-    /// disturbs the traffic: vehicles brake for lane changes of others.
+    /// as many kept cut-ins and cut-outs as the paper has in a third of highD's time, and more LVDs. A larger one disturbs
+    /// the traffic: vehicles brake for lane changes of others.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
     /// How scenarios arise.
@@ -45,7 +45,7 @@ impl Default for GeneratorOptions {
     fn default() -> Self {
         GeneratorOptions {
             seed: 20_240_901,
-            recordings: 60,
+            recordings: 84,
             duration_s: 245.0,
             frame_rate_hz: 25.0,
             window_m: 420.0,
