@@ -188,8 +188,7 @@ impl Outcome {
     fn loss(&self) -> f64 {
         let shares = self.shares();
         let square = |(_, ours, theirs): &(String, f64, f64)| {
-            ((ours - theirs) / (theirs / 6.0).max(2.0)).powi(2)
-                + Misfit::beyond_points(*ours, *theirs).powi(2)
+            ((ours - theirs) / (theirs / 6.0).max(2.0)).powi(2) + Misfit::beyond_points(*ours, *theirs).powi(2)
         };
         let squares: f64 = shares.iter().map(square).sum();
         let outside = |(_, ours, low, high): &(String, f64, f64, f64)| {

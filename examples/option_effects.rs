@@ -17,22 +17,19 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, f1, judge_claims};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
-use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::scenario::{Other, Scenario};
+use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
 
 /// Where an option stands, its key, and another value of it in TOML.
-const OPTIONS: [(&str, &str, &str); 63] = [
+const OPTIONS: [(&str, &str, &str); 60] = [
     ("frame", "dt_s", "0.01"),
     ("frame", "dt_s", "0.1"),
     ("frame", "time_cap_s", "60.0"),
     ("frame", "time_cap_s", "30.0"),
     ("frame", "time_cap_s", "20.0"),
-    ("frame", "run_on_s", "5.0"),
-    ("frame", "run_on_s", "15.0"),
-    ("frame", "run_on_s", "30.0"),
-    ("frame", "run_on_s", "60.0"),
+    ("frame", "time_cap_s", "300.0"),
     ("frame", "start_shift", "true"),
     ("frame", "end_when_settled", "false"),
     ("frame", "cut_out_target", "\"exposed\""),

@@ -90,14 +90,12 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
         horizon = steps_up(larger(duration, change) * recipe.inverse_dt);
     }
     let headway_gap = quantity(point, TIME_HEADWAY) * ego_speed;
-    // Added without overflow: the sum is at most NEVER.
-    let gone_from = horizon + min(recipe.run_on, NEVER - horizon);
-    var first = lane_other(principal, 0u, headway_gap, recipe.judged, gone_from);
+    var first = lane_other(principal, 0u, headway_gap, recipe.judged);
     var second = first;
     second.used = 0u;
     second.present_until = 0u;
     if recipe.pair != 0u {
-        second = lane_other(ahead, 1u, headway_gap + (recipe.principal_length + lead_gap), 1u, gone_from);
+        second = lane_other(ahead, 1u, headway_gap + (recipe.principal_length + lead_gap), 1u);
     }
     let steps = steps_seen(first.motion);
     for (var model = 0u; model < MODELS; model++) {
@@ -115,13 +113,13 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
     return lane;
 }
 
-fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32, gone_from: u32) -> LaneOther {
+fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneOther {
     var other: LaneOther;
     other.motion = motion;
     other.half_lengths = recipe.half_lengths[which];
     other.half_widths = recipe.half_widths[which];
     other.gap_offset = gap_offset;
-    other.present_until = gone_from;
+    other.present_until = NEVER;
     other.used = 1u;
     other.judged = judged;
     return other;

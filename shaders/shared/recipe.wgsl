@@ -56,7 +56,6 @@ struct Recipe {
     unlimited: u32,
     judged: u32,
     step_cap: u32,
-    run_on: u32,
     slots: array<u32, QUANTITIES>,
     columns: ReducedColumns,
     lower: array<f32, MAX_PARAMETERS>,

@@ -68,14 +68,11 @@ impl LaneCase<f64> {
         } else {
             attend(case, profile, &series, &mut others);
         }
-        let horizon = (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32;
-        let gone_from = horizon.saturating_add(profile.frame.run_on_steps());
-        others.iter_mut().for_each(|other| other.present_until = other.present_until.min(gone_from));
         LaneCase {
             others,
             ego_speed: case.ego_speed_mps,
             ego_width: case.ego_width_m,
-            horizon,
+            horizon: (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32,
             pair: u32::from(case.ahead.is_some()),
         }
     }

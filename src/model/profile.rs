@@ -46,10 +46,6 @@ pub struct FrameProfile {
     pub dt_s: f64,
     /// A run ends here at the latest, s.
     pub time_cap_s: f64,
-    /// The other vehicles are there until so long after the scenario's duration and its last parameter event, s; the run
-    /// then ends. Absent: until the run ends by another rule.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub run_on_s: Option<f64>,
     /// Positions are cumulative sums: index 0 is one step after the nominal start.
     pub start_shift: bool,
     /// Runs stop where nothing can happen any more; otherwise they go on to the cap.
@@ -70,11 +66,6 @@ impl FrameProfile {
     /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
     pub fn step_cap(&self) -> u32 {
         (self.time_cap_s / self.dt_s - 1e-9).ceil() as u32
-    }
-
-    /// Steps after a case's horizon from which the other vehicles are gone; `u32::MAX` where they stay.
-    pub(crate) fn run_on_steps(&self) -> u32 {
-        self.run_on_s.map_or(u32::MAX, |run_on_s| (run_on_s / self.dt_s - 1e-9).ceil().max(0.0) as u32)
     }
 }
 
@@ -198,8 +189,7 @@ impl Profile {
             ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::DECELERATION),
             ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::JERK),
         ];
-        let run_on = frame.run_on_s.map(|value| ("frame.run_on_s", value, Bound::TIME));
-        let own = own.into_iter().chain(run_on).map(|(key, value, bound)| (key.to_owned(), value, bound));
+        let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
         own.chain(self.driver_bounds()).collect()
     }
 

@@ -39,9 +39,6 @@ pub fn forms() -> Vec<Profile> {
     let mut shortest = paper.clone();
     shortest.frame.time_cap_s = 2.0 * paper.frame.dt_s;
     profiles.push(shortest);
-    let mut leaving = paper.clone();
-    leaving.frame.run_on_s = Some(2.0);
-    profiles.push(leaving);
     // Steps in which vehicles drive past one another, up to the longest: with every gate and rule of its own.
     let mut patient = paper.clone();
     (patient.reg157.reaction_time_s, patient.reg157.margin_s, patient.cchdm.delay_s) = (1.2, 0.5, 1.8);

@@ -101,34 +101,6 @@ fn a_mirrored_cut_in_gives_the_same_outcome_to_the_last_bit() {
     }
 }
 
-/// A run that ends so long after the scenario is the beginning of the one that goes on.
-#[test]
-fn a_run_that_ends_after_the_scenario_fails_only_what_the_whole_run_fails() {
-    let whole = paper();
-    let mut passes_more = 0;
-    for case in lvd_grid() {
-        for (model, thw) in ModelId::ALL.into_iter().flat_map(|model| headways().map(move |thw| (model, thw))) {
-            let to_the_end = run(&whole, &case, model, thw);
-            let mut before = whole.clone();
-            for run_on_s in [0.1, 4.0, 1000.0] {
-                before.frame.run_on_s = Some(run_on_s);
-                let lane = run(&before, &case, model, thw);
-                let last = ((case.horizon_s + run_on_s) / before.frame.dt_s).ceil() as u32 + 1;
-                assert!(lane.end_step <= last, "{run_on_s} s after {} s, but {}", case.horizon_s, lane.end_step);
-                for criterion in Criterion::ALL {
-                    let (failed, fails) = (lane.verdicts.failed(criterion), to_the_end.verdicts.failed(criterion));
-                    assert!(fails || !failed, "{} {thw} s, {run_on_s} s", model.name());
-                    passes_more += usize::from(fails && !failed);
-                }
-                if run_on_s > whole.frame.time_cap_s {
-                    assert_eq!(lane, to_the_end);
-                }
-            }
-        }
-    }
-    assert!(passes_more > 0, "no lane fails after its scenario");
-}
-
 #[test]
 fn a_longer_headway_never_turns_an_rss_lvd_pass_into_a_collision() {
     let profile = paper();

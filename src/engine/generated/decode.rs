@@ -1,6 +1,7 @@
 //! Point → validity and case. Twin: `shaders/shared/decode.wgsl`, with the same names and order.
 
 use crate::engine::lane_case::{LaneCase, LaneOther};
+use crate::model::driver::NEVER;
 use crate::model::scalar::Real;
 use crate::scenario::parameterization::Variable;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
@@ -97,7 +98,7 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
         half_widths: number(recipe.half_widths[which]),
         gap_offset,
         present_from: 0,
-        present_until: horizon.saturating_add(recipe.run_on),
+        present_until: NEVER,
         attend_from: [0; crate::model::driver::MODELS],
         used: 1,
         judged,

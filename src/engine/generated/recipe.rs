@@ -129,8 +129,6 @@ pub struct Recipe {
     pub judged: u32,
     /// Last step of every lane.
     pub step_cap: u32,
-    /// Steps after the horizon from which the other vehicles are gone.
-    pub run_on: u32,
     /// Index of the parameter that gives each [`Variable`], or [`NO_SLOT`].
     pub slots: [u32; Variable::ALL.len()],
     /// Columns of the reduction.
@@ -169,7 +167,7 @@ const _: () = assert!(size_of::<AttentionRule<f32>>() == 16);
 const _: () = assert!(size_of::<ReducedColumns>() == 36);
 const _: () = assert!(size_of::<ColumnBound>() == 16);
 const _: () =
-    assert!(size_of::<Recipe>() == 4 * (9 + 11 + 9 + 2 * MAX_PARAMETERS + 1 + 5 + 4 + 2) + 16 * (MAX_BOUNDS + MODELS));
+    assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 1 + 5 + 4 + 2) + 16 * (MAX_BOUNDS + MODELS));
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Recipe {}

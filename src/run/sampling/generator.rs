@@ -145,7 +145,6 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         unlimited: u32::from(unlimited),
         judged: u32::from(!(pair && frame.cut_out_judged == CutOutJudged::Ahead)),
         step_cap: profile.step_cap(),
-        run_on: profile.frame.run_on_steps(),
         slots: Variable::ALL.map(|variable| slot(space.dimension_of(variable))),
         columns: columns(space),
         lower,

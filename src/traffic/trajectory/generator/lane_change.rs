@@ -214,7 +214,7 @@ mod tests {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
         let accepts = |view| acceptance(25.0, view, Manner::Accelerating, &Behaviour::default());
         assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
-        assert_eq!(accepts(view(20.0, 34.0)), 0.0);
+        assert_eq!(accepts(view(15.0, 34.0)), 0.0);
         assert!(accepts(view(40.0, 25.0)) > 0.4);
         assert!(accepts(view(40.0, 31.0)) < accepts(view(40.0, 28.0)));
     }

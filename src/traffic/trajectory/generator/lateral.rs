@@ -113,8 +113,14 @@ mod tests {
     fn a_lane_change_starts_and_ends_at_rest_and_its_speed_is_its_slope() {
         let mut stream = TrafficRandom::new(3, 0, 0, Purpose::Decision);
         for _ in 0..200 {
-            let mut change =
-                LaneChangeMotion::draw((1, 0), (-5.6, -1.9), VehicleClass::Truck, true, &Behaviour::default(), &mut stream);
+            let mut change = LaneChangeMotion::draw(
+                (1, 0),
+                (-5.6, -1.9),
+                VehicleClass::Truck,
+                true,
+                &Behaviour::default(),
+                &mut stream,
+            );
             assert!((DURATION_S[0]..=DURATION_S[1]).contains(&change.duration_s));
             assert_eq!(change.position_and_speed(), (-5.6, 0.0));
             let dt = 1e-4;
