@@ -37,7 +37,7 @@ const RANGES: [(&str, f64, f64); 13] = [
     ("car_speed_factor", 0.8, 1.05),
     ("follower_braking_mps2", 0.002, 0.1),
     ("accelerating_share", 0.0, 0.2),
-    ("change_acceleration_mps2", 0.0, 3.5),
+    ("change_acceleration_mps2", 0.0, 2.8),
     ("accelerating_follower_braking_mps2", 0.5, 10.0),
     ("yielding", 0.0, 4.0),
     ("change_duration_s", 4.0, 7.2),

@@ -26,7 +26,7 @@ pub struct Behaviour {
     #[schemars(range(min = 0.001, max = 10.0))]
     pub accelerating_follower_braking_mps2: f64,
     /// Mean acceleration of such a driver during the change where there is room, m/s².
-    #[schemars(range(min = 0.0, max = 4.0))]
+    #[schemars(range(min = 0.0, max = 2.8))]
     pub change_acceleration_mps2: f64,
     /// Strength of the motive to let a close follower pass on the right even at a loss of speed, as a fraction of the
     /// full motive.
@@ -62,14 +62,14 @@ impl Default for Behaviour {
             car_speed_factor: 0.896,
             follower_braking_mps2: 0.00556,
             accelerating_share: 0.0464,
-            accelerating_follower_braking_mps2: 5.48,
+            accelerating_follower_braking_mps2: 9.0,
             change_acceleration_mps2: 2.35,
             yielding: 0.216,
             change_duration_s: 6.45,
-            truck_change_factor: 0.663,
+            truck_change_factor: 1.2,
             change_headway_share: 0.203,
-            brakings_per_s: 0.0000797,
-            braking_hold_s: 8.44,
+            brakings_per_s: 0.00009,
+            braking_hold_s: 9.0,
             braking_excess_mps2: 0.543,
             overreaction: 0.226,
         }
@@ -84,7 +84,7 @@ impl Behaviour {
             ("follower_braking_mps2", self.follower_braking_mps2, 0.001, 10.0),
             ("accelerating_share", self.accelerating_share, 0.0, 1.0),
             ("accelerating_follower_braking_mps2", self.accelerating_follower_braking_mps2, 0.001, 10.0),
-            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 4.0),
+            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 2.8),
             ("yielding", self.yielding, 0.0, 4.0),
             ("change_duration_s", self.change_duration_s, 2.9, 7.3),
             ("truck_change_factor", self.truck_change_factor, 0.0, 20.0),

@@ -19,6 +19,8 @@ const RAISED_BEFORE_M: f64 = 120.0;
 const LANE_CHANGES_PER_S: f64 = 0.175;
 /// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
+/// Minimum speed at which a lane change begins, m/s.
+const CHANGE_FROM_MPS: f64 = 5.0;
 /// Minimum speed at which braking is scheduled, m/s.
 const BRAKING_FROM_MPS: f64 = 22.0;
 /// A vehicle that already decelerates more than this does not start a scheduled braking, m/s².
@@ -60,7 +62,7 @@ impl Traffic {
     fn consider_lane_change(&mut self, place: usize, factor: f64) {
         let i = self.order[place];
         let own = &self.vehicles[i];
-        if own.settle_s > 0.0 || own.braking.is_some() {
+        if own.settle_s > 0.0 || own.braking.is_some() || own.speed_mps < CHANGE_FROM_MPS {
             return;
         }
         let lane = own.lane;

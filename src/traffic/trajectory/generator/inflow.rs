@@ -5,8 +5,11 @@ use super::random::TrafficRandom;
 use super::vehicle::Vehicle;
 use crate::traffic::trajectory::VehicleClass;
 
-/// Fraction of arrivals that follow the previous vehicle at their desired headway; the others arrive freely.
+/// Fraction of arrivals that follow the previous vehicle at their desired headway, at the published flow or more; the
+/// others arrive freely.
 const FOLLOWERS: f64 = 0.8;
+/// The published flow per direction, vehicles per hour.
+const PUBLISHED_FLOW_VEHPH: f64 = 3350.0;
 /// Largest braking with which an arrival approaches the vehicle ahead, m/s². Vehicles have driven behind each other before
 /// they arrive, so their speeds are much alike.
 const APPROACH_MPS2: f64 = 0.025;
@@ -21,6 +24,8 @@ const QUEUED: f64 = 1.035;
 pub(super) struct LaneDemand {
     /// Mean time between vehicles, s.
     mean_headway_s: f64,
+    /// Fraction of followers.
+    followers: f64,
     truck_share: f64,
     /// Mean desired speed of cars in this lane, m/s.
     car_speed_mps: f64,
@@ -50,6 +55,7 @@ pub(super) fn demand(
             let lane_vehph = total_vehph * flow[lane];
             LaneDemand {
                 mean_headway_s: 3600.0 / lane_vehph,
+                followers: FOLLOWERS * (options.flow_vehph / PUBLISHED_FLOW_VEHPH).min(1.0),
                 truck_share: (truck_share * trucks[lane] / flow[lane]).min(0.95),
                 car_speed_mps: speeds[lane] * speed_level * options.behaviour.car_speed_factor,
                 overreaction: options.behaviour.overreaction,
@@ -120,8 +126,12 @@ impl Inflow {
         let following_s = own_s(self.next.driver.time_headway_s, self.next.length_m);
         let share = self.demand.truck_share;
         let mean_following_s = (1.0 - share) * own_s(1.5, 4.6) + share * own_s(1.85, 12.0);
-        let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - FOLLOWERS);
-        if free_s <= 0.0 || stream.chance(FOLLOWERS) { following_s } else { following_s + stream.exponential(free_s) }
+        let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - self.demand.followers);
+        if free_s <= 0.0 || stream.chance(self.demand.followers) {
+            following_s
+        } else {
+            following_s + stream.exponential(free_s)
+        }
     }
 }
 

@@ -26,6 +26,8 @@ const NO_HURRY: f64 = 0.35;
 const MIN_TTC_S: f64 = 2.0;
 /// Minimum gap to the new neighbours at the start, m.
 const MIN_GAP_M: f64 = 4.0;
+/// Braking that nobody asks of the new follower, m/s².
+const MAX_FOLLOWER_BRAKING_MPS2: f64 = 4.0;
 /// Headway to the new leader at which half of the drivers accept, s.
 const LEAD_HALF_S: f64 = 0.55;
 /// Own braking behind the new leader that reduces acceptance by a factor e, m/s².
@@ -138,6 +140,9 @@ pub(super) fn acceptance(speed_mps: f64, there: LaneView, manner: Manner, behavi
         accepted *= NO_HURRY + (1.0 - NO_HURRY) * (1.0 - soft_step(lag_s, HURRY_S));
         if closing_mps > 0.0 {
             let braking = closing_mps * closing_mps / (2.0 * lag.gap_m);
+            if braking > MAX_FOLLOWER_BRAKING_MPS2 {
+                return 0.0;
+            }
             let tolerated_mps2 = match manner {
                 Manner::Considerate => behaviour.follower_braking_mps2,
                 Manner::Accelerating => behaviour.accelerating_follower_braking_mps2,
@@ -215,6 +220,7 @@ mod tests {
         let accepts = |view| acceptance(25.0, view, Manner::Accelerating, &Behaviour::default());
         assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
         assert_eq!(accepts(view(15.0, 34.0)), 0.0);
+        assert_eq!(accepts(view(60.0, 50.0)), 0.0);
         assert!(accepts(view(40.0, 25.0)) > 0.4);
         assert!(accepts(view(40.0, 31.0)) < accepts(view(40.0, 28.0)));
     }

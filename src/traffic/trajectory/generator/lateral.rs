@@ -12,6 +12,8 @@ const DURATION_SIGMA: f64 = 0.28;
 const TRUCK_DURATION: f64 = 1.2;
 /// Standard deviation of the acceleration of a driver who accelerates during a change, as a fraction of its mean.
 const ACCELERATION_SPREAD: f64 = 0.4;
+/// Its maximum, m/s²: what cars have at motorway speeds.
+const MAX_ACCELERATION_MPS2: f64 = 2.8;
 /// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
 /// duration earlier or later.
 const ASYMMETRY_SD: f64 = 0.7;
@@ -52,8 +54,8 @@ impl LaneChangeMotion {
         let duration_s = stream.lognormal_within(median_s, DURATION_SIGMA, DURATION_S[0], DURATION_S[1]);
         let asymmetry = stream.normal_within(0.0, ASYMMETRY_SD, -1.5, 1.5);
         let mean_mps2 = behaviour.change_acceleration_mps2;
-        let acceleration_mps2 =
-            accelerates.then(|| stream.normal_within(mean_mps2, ACCELERATION_SPREAD * mean_mps2, 0.0, 4.0));
+        let acceleration_mps2 = accelerates
+            .then(|| stream.normal_within(mean_mps2, ACCELERATION_SPREAD * mean_mps2, 0.0, MAX_ACCELERATION_MPS2));
         let ((from_lane, to_lane), (from_m, to_m)) = (lanes, way_m);
         LaneChangeMotion { from_lane, to_lane, elapsed_s: 0.0, duration_s, acceleration_mps2, from_m, to_m, asymmetry }
     }
