@@ -121,7 +121,7 @@ fn too_little_data_is_undecided_and_says_how_much_more_is_needed() {
 #[test]
 fn without_any_failure_nothing_is_concluded() {
     let data = recordings(1);
-    let found = dossier(&data, (Category::CutOut, "b"), ModelId::Rss, Criterion::Collision);
+    let found = dossier(&data, (Category::Lvd, "v"), ModelId::Rss, Criterion::Collision);
     assert_eq!(found.scored.counts.tp + found.scored.counts.fn_, 0);
     assert_eq!(found.conclusion, Conclusion::Undecided);
     assert!(found.hidden.is_empty() && found.example.is_none());
@@ -153,7 +153,7 @@ fn recall_under_the_regulation_stands_beside_that_of_another_profile_and_once_un
 /// Nine scenarios in which S fails have no interval, from however many headways; ten have one.
 #[test]
 fn least_failures_counts_scenarios_in_the_dossier_as_in_the_study_and_the_comparison() {
-    let data = recordings(3);
+    let data = recordings(5);
     let mut seen = [0, 0];
     for model in ModelId::ALL {
         for criterion in Criterion::ALL {

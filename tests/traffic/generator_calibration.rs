@@ -24,7 +24,7 @@ const PUBLISHED_CROSSINGS_PER_KM: f64 = 0.24;
 
 /// Some of the default recordings: each is the same whatever their number.
 fn some_of_the_default() -> GeneratorOptions {
-    GeneratorOptions { recordings: 24, ..GeneratorOptions::default() }
+    GeneratorOptions { recordings: 28, ..GeneratorOptions::default() }
 }
 
 /// A table that remembers which figures were outside their span, and what to say of them.
@@ -143,7 +143,7 @@ fn lane_changes_and_cut_ins_look_as_published() {
     table.row("THW at cut-in, mode, s", "0.8 – 1.0", mode(headways, 0.2), 0.75, 1.1);
     table.row("THW at cut-in, share below 0.5 s", "0.04", share(headways, |h| h < 0.5), 0.025, 0.055);
     table.row("THW at cut-in, share 0.5 – 2.5 s", "bulk", share(headways, |h| (0.5..2.5).contains(&h)), 0.65, 0.9);
-    table.finish_but(&["THW at cut-in, share below 0.5 s"]);
+    table.finish();
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
         let (found, kept) = (counted.found(category), counted.kept(category).count() as f64);
         let name = category.label();
         table.row(&format!("{name}: found (number)"), "", found, 300.0, 5000.0);
-        table.row(&format!("{name}: kept (number)"), "≥ 150", kept, 150.0, 400.0);
+        table.row(&format!("{name}: kept (number)"), "≥ 150", kept, 150.0, 600.0);
         // Rates rise a little less than the factor says, since lane changes get in each other's way.
         // Gentle decelerations are not raised: per data set they lie between once and `factor` times.
         let raised = if category == Category::Lvd { 1.0 / factor } else { 0.5 };
@@ -204,12 +204,10 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
     table.row("cut-in kept: speed over the ego's, 5 %", "< 0.95", quantile(&slower, 0.05), 0.75, 0.9);
     table.row("cut-in kept: speed over the ego's, median", "< 0.95", quantile(&slower, 0.5), 0.88, 0.945);
     table.finish_but(&[
-        "cut-in: kept per data set",
         "LVD: kept per data set",
         "LVD: kept among found",
         "LVD kept: mean excess of the peak over 2 m/s²",
         "LVD kept: share with a peak below 2.5 m/s²",
-        "LVD kept: peaks of 2.5–3 beside those of 2–2.5 m/s²",
         "cut-in kept: speed over the ego's, 5 %",
         "cut-in kept: speed over the ego's, median",
     ]);
@@ -250,7 +248,7 @@ fn recorded_motions_are_neither_straight_lines_nor_sinusoids() {
 }
 
 /// The shares of failures of S to which the generator is fitted, on a seed that the fit has not seen: all but
-/// four within 3 points or a factor 1.5 of the published one, whichever is more.
+/// one within 3 points or a factor 1.5 of the published one, whichever is more.
 #[test]
 fn failures_of_recorded_scenarios_are_near_the_published_ones_on_an_unseen_seed() {
     let options = GeneratorOptions { seed: 1, ..GeneratorOptions::default() };
@@ -271,7 +269,6 @@ fn failures_of_recorded_scenarios_are_near_the_published_ones_on_an_unseen_seed(
         }
     }
     assert_eq!(squares.len(), 36);
-    table.row("root mean square of the differences, points", "0", mean(&squares).sqrt(), 0.0, 10.0);
-    let known = ["cut-in, Reg157, TTC", "cut-in, FSM, Collision", "cut-in, FSM, BTN", "cut-out, CCHDM, TTC"];
-    table.finish_but(&known);
+    table.row("root mean square of the differences, points", "0", mean(&squares).sqrt(), 0.0, 5.0);
+    table.finish_but(&["cut-out, CCHDM, TTC"]);
 }

@@ -4,7 +4,7 @@
 
 use super::behaviour::Behaviour;
 use super::hazards::{DECISION_S, Hazards, SETTLE_S};
-use super::idm::{LeaderView, following_acceleration, free_acceleration};
+use super::idm::{HARDEST_BRAKING_MPS2, LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
 use super::random::{Purpose, TrafficRandom};
@@ -243,7 +243,7 @@ impl Traffic {
             own.headway_s = headway_s;
             own.perceived_mps2 = perceived;
             own.leader = leader;
-            own.command_mps2 = command + own.noise_mps2;
+            own.command_mps2 = (command + own.noise_mps2).max(-HARDEST_BRAKING_MPS2);
             for (lane, slot) in last_in.iter_mut().enumerate().take(self.lanes) {
                 if occupied & (1 << lane) != 0 {
                     *slot = Some(i);
