@@ -37,7 +37,7 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
                   lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
                   --sheet case.html\n  \
                   lanesweep check cases.csv --row 2\n  \
-                  lanesweep check scenarios.jsonl --scenario 01_cut_in_238_233_2854 --thw 1.2")]
+                  lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {
     /// TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
     #[arg(value_name = "FILE")]

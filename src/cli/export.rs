@@ -49,7 +49,7 @@ impl Export {
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
                   lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out worst\n  \
-                  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_238_233_2854/S/1.2s/RSS\n  \
+                  lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS\n  \
                   lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
 pub struct Xosc {

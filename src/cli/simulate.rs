@@ -32,8 +32,8 @@ use crate::{Error, Place, Result};
 #[command(after_help = "Examples:\n  \
                   lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 \\\n      \
                   --plot case.svg\n  \
-                  lanesweep simulate --from lanesweep-out --lane 01_cut_in_238_233_2854/2/1.2s/RSS --compare S\n  \
-                  lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_238_233_2854/S/1.2s/RSS")]
+                  lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
+                  lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS")]
 pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,

@@ -101,7 +101,7 @@ fn refused_draws_are_counted_by_the_bound_that_they_break() {
 fn a_recorded_scenario_that_starts_in_the_ego_s_lane_keeps_its_kernel() {
     let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
     // The lane change began before the ego's data set.
-    some[0].target.y.iter_mut().for_each(|y| *y = y.min(0.6));
+    some[0].target.y.iter_mut().for_each(|y| *y *= 0.1);
     let facts = DataFacts { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "7").unwrap();

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 /// SHA-256 of the first twelve default recordings' data as [`digest`] writes it. It changes when the generator does,
 /// and then on purpose: every published default result changes with it.
-const DEFAULT_DIGEST: &str = "d202663c80e8fbf93b17dde266a5d677ab7d91e48bb666eec22f2f591fc51792";
+const DEFAULT_DIGEST: &str = "e070e1fefac703b2c818b9e4919b5b2b06d73352db96732935e6f188b82739f8";
 
 /// The first twelve of the default recordings: each is the same whatever their number.
 fn default_recordings() -> Vec<Recording> {
@@ -131,7 +131,8 @@ fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
         let dt = recording.sample_time_s();
         for t in &recording.tracks {
             assert!(t.v_s_mps.iter().all(|v| (0.0..=60.0).contains(v)), "speed of {}/{}", recording.id, t.id);
-            assert!(t.a_s_mps2.iter().all(|a| (-8.5..=3.0).contains(a)), "acceleration of {}/{}", recording.id, t.id);
+            // 2.8 m/s² in a lane change, and the noise.
+            assert!(t.a_s_mps2.iter().all(|a| (-8.5..=3.5).contains(a)), "acceleration of {}/{}", recording.id, t.id);
             assert!(t.v_d_mps.iter().all(|v| v.abs() < 3.5), "lateral speed of {}/{}", recording.id, t.id);
             for k in 1..t.len() {
                 let along = t.s_m[k] - t.s_m[k - 1] - 0.5 * dt * (t.v_s_mps[k] + t.v_s_mps[k - 1]);
