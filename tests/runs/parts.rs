@@ -210,18 +210,18 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
         for file in ["part-00001-of-00002.json", "plan.json"] {
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
-            edit(&path, "\"engine\":3,", "\"engine\":4,");
-            refused(dir, &["merge", name], "of engine 4, this program has engine 3");
+            edit(&path, "\"engine\":4,", "\"engine\":5,");
+            refused(dir, &["merge", name], "of engine 5, this program has engine 4");
             if file != "plan.json" {
-                refused(dir, &shard("1/2"), "of engine 4, this program has engine 3");
+                refused(dir, &shard("1/2"), "of engine 5, this program has engine 4");
             } else {
                 let plan = format!("{name}/plan.json");
-                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], "of engine 4, this program has engine 3");
+                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], "of engine 5, this program has engine 4");
             }
             // As versions before engines wrote it, all in one line.
             let earlier = r#""version":1,"sha256":"00","content":"#;
             std::fs::write(&path, &whole).unwrap();
-            edit(&path, "\"version\":2,\"engine\":3,", earlier);
+            edit(&path, "\"version\":2,\"engine\":4,", earlier);
             refused(dir, &["merge", name], "its version is 1, this program reads 2");
             if file == "plan.json" {
                 let plan = format!("{name}/plan.json");
@@ -237,12 +237,12 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
         |name: &str| -> serde_json::Value { serde_json::from_slice(&std::fs::read(dir.join(name)).unwrap()).unwrap() };
     assert_eq!(
         (&record("study/run.json")["engine"], &record("sample/estimate.json")["engine"]),
-        (&3.into(), &3.into())
+        (&4.into(), &4.into())
     );
     let lane = ["simulate", "--from", "sample", "--lane", "#0/2/0.6s/FSM"];
     done(dir, &lane);
-    edit(&dir.join("sample/estimate.json"), "\"engine\": 3", "\"engine\": 4");
-    refused(dir, &lane, "of engine 4, this program has engine 3");
+    edit(&dir.join("sample/estimate.json"), "\"engine\": 4", "\"engine\": 5");
+    refused(dir, &lane, "of engine 5, this program has engine 4");
 }
 
 #[test]

@@ -217,11 +217,15 @@ mod tests {
     #[test]
     fn nobody_moves_into_a_vehicle_or_before_one_that_closes_fast() {
         let view = |gap_m, speed_mps| LaneView { behind: Some(Neighbour { gap_m, speed_mps }), ahead: None };
-        let accepts = |view| acceptance(25.0, view, Manner::Accelerating, &Behaviour::default());
-        assert_eq!(accepts(view(-2.0, 25.0)), 0.0);
-        assert_eq!(accepts(view(15.0, 34.0)), 0.0);
-        assert_eq!(accepts(view(60.0, 50.0)), 0.0);
-        assert!(accepts(view(40.0, 25.0)) > 0.4);
-        assert!(accepts(view(40.0, 31.0)) < accepts(view(40.0, 28.0)));
+        let accepts = |view, manner| acceptance(25.0, view, manner, &Behaviour::default());
+        for manner in [Manner::Considerate, Manner::Accelerating] {
+            assert_eq!(accepts(view(-2.0, 25.0), manner), 0.0);
+            assert_eq!(accepts(view(15.0, 34.0), manner), 0.0);
+            assert_eq!(accepts(view(60.0, 50.0), manner), 0.0);
+            assert!(accepts(view(40.0, 25.0), manner) > 0.4);
+        }
+        let of = |speed_mps| [Manner::Considerate, Manner::Accelerating].map(|m| accepts(view(40.0, speed_mps), m));
+        assert!(of(31.0)[0] < of(28.0)[0]);
+        assert!(of(31.0)[0] < of(31.0)[1], "who accelerates lets the follower brake");
     }
 }
