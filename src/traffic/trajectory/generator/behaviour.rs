@@ -25,13 +25,10 @@ pub struct Behaviour {
     /// The same braking of the new follower, for such a driver, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub accelerating_follower_braking_mps2: f64,
-    /// Mean acceleration of such a driver during the change where there is room, m/s².
+    /// Mean acceleration of such a driver during the change where there is room, before values outside of 0 to 2.8 m/s² are
+    /// drawn again, m/s².
     #[schemars(range(min = 0.0, max = 2.8))]
     pub change_acceleration_mps2: f64,
-    /// Strength of the motive to let a close follower pass on the right even at a loss of speed, as a fraction of the
-    /// full motive.
-    #[schemars(range(min = 0.0, max = 4.0))]
-    pub yielding: f64,
     /// Median duration of lane changes, before those outside of the published 2.9 to 7.3 s are left out, s.
     #[schemars(range(min = 2.9, max = 7.3))]
     pub change_duration_s: f64,
@@ -64,7 +61,6 @@ impl Default for Behaviour {
             accelerating_share: 0.0464,
             accelerating_follower_braking_mps2: 9.0,
             change_acceleration_mps2: 2.35,
-            yielding: 0.216,
             change_duration_s: 6.45,
             truck_change_factor: 1.2,
             change_headway_share: 0.203,
@@ -85,7 +81,6 @@ impl Behaviour {
             ("accelerating_share", self.accelerating_share, 0.0, 1.0),
             ("accelerating_follower_braking_mps2", self.accelerating_follower_braking_mps2, 0.001, 10.0),
             ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 2.8),
-            ("yielding", self.yielding, 0.0, 4.0),
             ("change_duration_s", self.change_duration_s, 2.9, 7.3),
             ("truck_change_factor", self.truck_change_factor, 0.0, 20.0),
             ("change_headway_share", self.change_headway_share, 0.0, 1.0),

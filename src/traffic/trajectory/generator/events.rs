@@ -14,8 +14,8 @@ use crate::traffic::trajectory::VehicleClass;
 
 /// Distance before the view at which the raised rates begin, so that changes are in progress at its edge.
 const RAISED_BEFORE_M: f64 = 120.0;
-/// Rate of lane changes with full motive and accepted gaps, 1/s. Calibrated to the published 0.24 line crossings per
-/// vehicle and kilometre at rate factor 1.
+/// Rate of lane changes with full motive and accepted gaps, 1/s. Set for the published 0.24 line crossings per vehicle
+/// and kilometre at rate factor 1; with the fitted behaviour there are 0.18.
 const LANE_CHANGES_PER_S: f64 = 0.175;
 /// Maximum headway of a follower for which a vehicle counts as leader, s.
 const FOLLOWER_WITHIN_S: f64 = 2.2;
@@ -81,7 +81,7 @@ impl Traffic {
             let there = self.view(place, to);
             let behaviour = &self.setting.behaviour;
             let of_class = if own.class == VehicleClass::Truck { behaviour.truck_change_factor } else { 1.0 };
-            let motive = motive(way, own.speed_mps, &own.driver, here, there.ahead, behaviour.yielding);
+            let motive = motive(way, own.speed_mps, &own.driver, here, there.ahead);
             let rate = LANE_CHANGES_PER_S * of_class * motive;
             let manner = Manner::draw(behaviour, &mut self.decisions);
             let accepted = acceptance(own.speed_mps, there, manner, behaviour);

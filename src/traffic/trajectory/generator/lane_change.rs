@@ -105,14 +105,12 @@ pub(super) fn motive(
     driver: &DriverParameters,
     here: LaneView,
     there: Option<Neighbour>,
-    yielding: f64,
 ) -> f64 {
     let gain = promised_speed(speed_mps, driver, there) - promised_speed(speed_mps, driver, here.ahead);
     let pressed = here.behind.is_some_and(|follower| follower.gap_m < PRESSING_S * follower.speed_mps);
     let share = match way {
         Way::Left => (gain / FULL_GAIN_MPS).clamp(0.0, 1.0),
-        Way::Right if pressed && gain > -YIELDING_LOSS_MPS => KEEP_RIGHT.max(yielding),
-        Way::Right if gain > -KEEP_RIGHT_LOSS_MPS => KEEP_RIGHT,
+        Way::Right if gain > -KEEP_RIGHT_LOSS_MPS || pressed && gain > -YIELDING_LOSS_MPS => KEEP_RIGHT,
         Way::Right => 0.0,
     };
     let no_reason = if gain < -GRAVE_LOSS_MPS { NO_REASON_AT_A_LOSS } else { NO_REASON };
@@ -187,9 +185,8 @@ mod tests {
     #[test]
     fn a_slow_leader_is_the_reason_to_pull_out_and_a_free_lane_the_one_to_return() {
         let truck = Some(Neighbour { gap_m: 35.0, speed_mps: 23.0 });
-        let of = |way, speed_mps, ahead, there| {
-            motive(way, speed_mps, &driver(), LaneView { ahead, behind: None }, there, 0.5)
-        };
+        let of =
+            |way, speed_mps, ahead, there| motive(way, speed_mps, &driver(), LaneView { ahead, behind: None }, there);
         assert!(of(Way::Left, 24.0, truck, None) > 5.0 * of(Way::Left, 24.0, None, None));
         assert!(of(Way::Right, 33.0, None, None) > 5.0 * of(Way::Right, 33.0, None, truck));
     }
@@ -199,7 +196,7 @@ mod tests {
         let slower = Some(Neighbour { gap_m: 50.0, speed_mps: 30.0 });
         let of = |gap_m| {
             let here = LaneView { ahead: None, behind: Some(Neighbour { gap_m, speed_mps: 33.0 }) };
-            motive(Way::Right, 33.0, &driver(), here, slower, 0.5)
+            motive(Way::Right, 33.0, &driver(), here, slower)
         };
         assert!(of(20.0) > 3.0 * of(80.0));
     }

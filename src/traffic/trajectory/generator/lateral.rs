@@ -12,7 +12,7 @@ const DURATION_SIGMA: f64 = 0.28;
 const TRUCK_DURATION: f64 = 1.2;
 /// Standard deviation of the acceleration of a driver who accelerates during a change, as a fraction of its mean.
 const ACCELERATION_SPREAD: f64 = 0.4;
-/// Its maximum, m/s²: what cars have at motorway speeds.
+/// Its maximum, m/s²; more than most vehicles have at motorway speeds.
 const MAX_ACCELERATION_MPS2: f64 = 2.8;
 /// Standard deviation of the asymmetry. 0 is the symmetric quintic; at ±1.5 the crossing is about a tenth of the
 /// duration earlier or later.

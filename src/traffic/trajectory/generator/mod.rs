@@ -30,19 +30,20 @@
 //! have another seed than the default ones. Some shares are not reached: `docs/src/validation.md` lists them.
 //!
 //! # The rate factor
-//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published. The default
-//! of 3 multiplies the *rate* of lane changes and hard braking in view, so that the default recordings have about as many
-//! kept cut-ins and cut-outs as the paper, in less time. Rates rise slightly less than the factor, because lane changes
+//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published, but kept LVDs
+//! twice as frequent. The default
+//! of 3 multiplies the *rate* of lane changes and hard braking in view, so that the default recordings have as many
+//! kept cut-outs as the paper, a third more cut-ins and three times as many LVDs, in a third of the time. Rates rise slightly less than the factor, because lane changes
 //! obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
-//! A factor of 8 fits the published failures worse: so many lane changes disturb the traffic, and closing speeds and
-//! brakings become those of congestion.
+//! The numbers are fitted at this factor; 1 and 8 fit the published failures worse. With 8, so many lane changes disturb
+//! the traffic that closing speeds and brakings become those of congestion.
 //!
 //! # Limits
 //! The data contains no row of highD and was fitted to published figures only. It says nothing about real
 //! traffic: do not quote exposure, risk or comparisons of driver models from it. Drivers are never distracted and
-//! never abort a lane change; some braking has no visible cause. Cars that accelerate in a lane change do so with up to
-//! 2.8 m/s² and up to 1.5 times their desired speed, more than most cars can. There is no stop-and-go traffic other
-//! than behind hard brakings, and there are no ramps, curves, motorcycles, weather or measurement errors.
+//! never abort a lane change; some braking has no visible cause. Vehicles that accelerate in a lane change do so with up
+//! to 2.8 m/s², cars up to 1.5 times their desired speed: more than most can. There is no stop-and-go traffic other than
+//! behind hard brakings, and there are no ramps, curves, motorcycles, weather or measurement errors.
 //!
 //! # Reproducibility
 //! Random numbers are counter-based and named by (seed, recording, carriageway, purpose);

@@ -32,9 +32,9 @@ pub struct GeneratorOptions {
     #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_share: f64,
     /// Factor on the rates of lane changes and hard braking in the camera's view.
-    /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives about
-    /// as many kept cut-ins and cut-outs as the paper has in a third of highD's time, and more LVDs. A larger one disturbs
-    /// the traffic: vehicles brake for lane changes of others.
+    /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives as
+    /// many kept cut-outs as the paper has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the
+    /// traffic: vehicles brake for lane changes of others.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
     /// How scenarios arise.
