@@ -125,14 +125,17 @@ fn no_two_vehicles_overlap() {
 
 #[test]
 fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
+    let (mut samples, mut above) = (0, 0);
     // Half of the last written digit of a position, of a speed over one step, and the same again.
     let digits = 0.005;
     for recording in default_recordings() {
         let dt = recording.sample_time_s();
         for t in &recording.tracks {
             assert!(t.v_s_mps.iter().all(|v| (0.0..=60.0).contains(v)), "speed of {}/{}", recording.id, t.id);
-            // 2.8 m/s² in a lane change, and the noise.
+            // Known to be wrong: noise lifts some cars in a lane change above 3.0 m/s². The fraction is bounded below.
             assert!(t.a_s_mps2.iter().all(|a| (-8.5..=3.5).contains(a)), "acceleration of {}/{}", recording.id, t.id);
+            samples += t.len();
+            above += t.a_s_mps2.iter().filter(|a| **a > 3.0).count();
             assert!(t.v_d_mps.iter().all(|v| v.abs() < 3.5), "lateral speed of {}/{}", recording.id, t.id);
             for k in 1..t.len() {
                 let along = t.s_m[k] - t.s_m[k - 1] - 0.5 * dt * (t.v_s_mps[k] + t.v_s_mps[k - 1]);
@@ -148,6 +151,7 @@ fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
             assert!((way - integral).abs() < 0.05, "{}/{}: {way} against {integral}", recording.id, t.id);
         }
     }
+    assert!(above * 5000 < samples, "{above} of {samples} samples above 3.0 m/s²");
 }
 
 #[test]

@@ -7,9 +7,9 @@ use crate::support::error::{Error, Place, Result};
 
 /// How drivers change lanes and brake. Rates and shares are those at rate factor 1.
 ///
-/// All defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
-/// (`examples/calibrate_generator.rs`, which also prints what other numbers give). The fit never saw an F1, a claim of the
-/// paper or the seed of the default recordings.
+/// The defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
+/// (`examples/calibrate_generator.rs`, which also prints what other numbers give); four were then moved by hand. The fit
+/// never saw an F1, a claim of the paper or the seed of the default recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Behaviour {
