@@ -64,8 +64,12 @@
 //! # }
 //! ```
 
+// The rooms have crate-wide items that only the command line uses.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+
 #[macro_use]
 pub mod model;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod engine;
 pub mod interop;

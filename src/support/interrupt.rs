@@ -74,7 +74,7 @@ fn deadline() -> Option<Instant> {
 /// program's start: a library user keeps the signals to itself by not calling it. Without Unix signals it does
 /// nothing, and the system's own way to end a process stays.
 pub fn install() {
-    #[cfg(unix)]
+    #[cfg(all(unix, feature = "cli"))]
     {
         static ONCE: std::sync::Once = std::sync::Once::new();
         ONCE.call_once(|| {
@@ -91,7 +91,7 @@ pub fn install() {
     }
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn receive() -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
@@ -112,7 +112,7 @@ fn receive() -> std::io::Result<()> {
 }
 
 /// Ends the process if the run has not ended by itself by then. A run that is not asked to end any more runs on.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn give_up_after(wait: Duration) {
     let give_up = move || {
         std::thread::sleep(wait);
@@ -126,26 +126,26 @@ fn give_up_after(wait: Duration) {
 }
 
 /// Is a signal ignored, or is that unknown? The system's mask of ignored signals begins with signal 1.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
     mask.is_none_or(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn say(line: &str) {
     use std::io::Write;
     // Where stderr is gone there is nobody to tell.
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn end_at_once(signal: i32) -> ! {
     end_with(128 + signal)
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn end_with(status: i32) -> ! {
     // Nobody begins another file until the end.
     let _live = crate::support::live_files::remove_live();

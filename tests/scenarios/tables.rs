@@ -121,6 +121,16 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
 }
 
 #[test]
+fn what_only_has_the_name_of_a_parquet_file_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("density.parquet"), "{\"parameterization\": 2}\n").unwrap();
+    let (code, text) = said(dir.path(), &["study", "--scenarios", "density.parquet"]);
+    assert_eq!(code, 3);
+    assert!(text.contains("density.parquet: not a Parquet file that can be read: it does not end as a Parquet"), "{text}");
+    assert!(text.contains("help: write the file again, or use JSON Lines or CSV"), "{text}");
+}
+
+#[test]
 fn sampled_rows_are_the_same_in_every_format() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
