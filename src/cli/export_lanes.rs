@@ -4,20 +4,17 @@ use std::path::Path;
 
 use super::case_flags::CaseFlags;
 use super::export_worst::{worst_of_sample, worst_of_study};
-use super::simulate_lanes::{Run, find, find_run, model, refuse_void};
 use super::source::scenarios_of;
-use crate::engine::{EndReason, Headway, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, Trace, check_time_step};
-use crate::interop::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
+use crate::engine::{EndReason, LaneCase, LaneKey, LanePlan, LaneRunner, NO_STEP, Trace, check_time_step};
+use crate::interop::openscenario::{Concrete, EgoMotion, PlayedVehicle, paths, reopen, sizes_of_case};
 use crate::model::criterion::Criterion;
 use crate::model::driver::{ModelId, NEVER};
 use crate::model::profile::{CutOutTarget, Profile};
 use crate::model::scalar::Real;
-use crate::run::study::{StudyOptions, plan_study};
+use crate::run::reopen::Reopened;
 use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Category, LATERAL_SAMPLED, SPEED_SAMPLED, Scenario, Side, Tables};
-use crate::stats::density::DensityModel;
 use crate::support::plausibility::Implausible;
-use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// What the flags say beside the lanes.
@@ -77,84 +74,36 @@ pub(super) fn of_run(
     scenarios: Option<&Path>,
     extras: &Extras,
 ) -> Result<Exported> {
-    let first = source.keys.first().map_or("", String::as_str);
-    match find_run(dir, first)? {
-        Run::Study(study) => {
-            let (whole, facts) = (study.plan(), &study.facts());
-            let mined = scenarios.map(|path| scenarios_of(path, extras.implausible)).transpose()?.unwrap_or_default();
-            let (mined, incomplete) = mined;
-            let keys = match worst {
-                Some((count, variants)) => worst_of_study(
-                    study.cases(),
-                    facts.reference,
-                    count,
-                    criterion.unwrap_or(Criterion::Collision),
-                    variants,
-                    source.models.as_deref(),
-                )?,
-                None => named(whole, source)?,
-            };
-            let units = keys.iter().map(|key| whole.blocks[key.block].first_unit + key.unit);
-            let span = units.clone().min().unwrap_or(0)..units.max().map_or(0, |last| last + 1);
-            let plan = &study.cases().window(span)?;
-            let about = About {
-                data: &facts.data,
-                is_synthetic: facts.synthetic || mined.iter().any(|scenario| scenario.synthetic),
-                mined: &mined,
-                density: None,
-                are_alike: false,
-                incomplete,
-            };
-            if facts.reference {
-                lanes::<f64>(plan, &keys, &about, extras)
-            } else {
-                lanes::<f32>(plan, &keys, &about, extras)
-            }
+    let reopened = reopen(dir, source.keys.first().map_or("", String::as_str))?;
+    let (models, has_variants) = (source.models.as_deref(), worst.is_some_and(|(_, variants)| !variants.is_empty()));
+    let Some(study) = reopened.as_study() else {
+        if reopened.has_one_size() && (scenarios.is_some() || has_variants) {
+            let problem = "a run of distributions has neither scenarios nor variants";
+            return Err(Error::usage(Place::item("--scenarios, --variant"), problem, "leave them out"));
         }
-        Run::Distribution(plan, data) => {
-            if scenarios.is_some() || worst.is_some_and(|(_, variants)| !variants.is_empty()) {
-                let problem = "a run of distributions has neither scenarios nor variants";
-                return Err(Error::usage(Place::item("--scenarios, --variant"), problem, "leave them out"));
-            }
-            let keys = match worst {
-                Some((count, _)) => worst_of_sample(dir, &plan, count, criterion, source.models.as_deref())?,
-                None => named(&plan, source)?,
-            };
-            let about = About {
-                data: &data,
-                is_synthetic: false,
-                mined: &[],
-                density: None,
-                are_alike: true,
-                incomplete: false,
-            };
-            lanes::<f32>(&plan, &keys, &about, extras)
+        if scenarios.is_some() {
+            let problem = "sampled lanes have the mean sizes of their density";
+            return Err(Error::usage(Place::item("--scenarios"), problem, "leave it out"));
         }
-        Run::Sample(plan, density) => {
-            if scenarios.is_some() {
-                let problem = "sampled lanes have the mean sizes of their density";
-                return Err(Error::usage(Place::item("--scenarios"), problem, "leave it out"));
-            }
-            let keys = match worst {
-                Some((_, variants)) if !variants.is_empty() => {
-                    let problem = "a sampling run has one variant";
-                    return Err(Error::usage(Place::item("--variant"), problem, "leave it out"));
-                }
-                Some((count, _)) => worst_of_sample(dir, &plan, count, criterion, source.models.as_deref())?,
-                None => named(&plan, source)?,
-            };
-            let provenance = &density.provenance;
-            let about = About {
-                data: &provenance.data,
-                is_synthetic: provenance.synthetic,
-                mined: &[],
-                density: Some(density.as_ref()),
-                are_alike: false,
-                incomplete: false,
-            };
-            lanes::<f32>(&plan, &keys, &about, extras)
+        if has_variants {
+            return Err(Error::usage(Place::item("--variant"), "a sampling run has one variant", "leave it out"));
         }
-    }
+        let keys = match worst {
+            Some((count, _)) => worst_of_sample(dir, &reopened, count, criterion, models)?,
+            None => reopened.named(source.keys, models)?,
+        };
+        return lanes(&reopened, &keys, &[], false, extras);
+    };
+    let mined = scenarios.map(|path| scenarios_of(path, extras.implausible)).transpose()?.unwrap_or_default();
+    let (mined, incomplete) = mined;
+    let keys = match worst {
+        Some((count, variants)) => {
+            let criterion = criterion.unwrap_or(Criterion::Collision);
+            worst_of_study(study, &reopened, count, criterion, variants, models)?
+        }
+        None => reopened.named(source.keys, models)?,
+    };
+    lanes(&reopened, &keys, &mined, incomplete, extras)
 }
 
 /// Lanes of a scenario file, in f64; a scenario that the filters dropped too, and any headway.
@@ -163,27 +112,9 @@ pub(super) fn of_run(
 /// As [`scenarios_of`]; [`Error::Usage`] for a lane that the file does not have.
 pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extras: &Extras) -> Result<Exported> {
     let (mut mined, incomplete) = scenarios_of(path, extras.implausible)?;
-    let mut options = StudyOptions::default();
-    let mut headways = Vec::new();
-    for key in source.keys {
-        let id = key.rsplitn(4, '/').last().unwrap_or(key);
-        if let Some(wanted) = mined.iter_mut().find(|s| s.id == id) {
-            wanted.kept = true;
-        }
-        if let Some(headway) = key.rsplit('/').nth(1).and_then(Headway::parse)
-            && !headways.contains(&headway)
-        {
-            headways.push(headway);
-        }
-    }
-    if !headways.is_empty() {
-        options.headways = headways;
-    }
-    let plan = plan_study(&mined, profile, &options)?.plan;
-    let is_synthetic = mined.iter().any(|scenario| scenario.synthetic);
     let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
-    let about = About { data: &data, is_synthetic, mined: &mined, density: None, are_alike: false, incomplete };
-    lanes::<f64>(&plan, &named(&plan, source)?, &about, extras)
+    let reopened = Reopened::scenarios(&mut mined, source.keys, profile, data)?;
+    lanes(&reopened, &reopened.named(source.keys, source.models.as_deref())?, &mined, incomplete, extras)
 }
 
 /// One case of flags, with each of its models, in f64.
@@ -222,46 +153,40 @@ pub(super) fn of_case(flags: &CaseFlags, profile: &Profile, extras: &Extras) -> 
     Ok(Exported { scenarios, notes: Vec::new(), incomplete: false })
 }
 
-fn named(plan: &LanePlan, source: &Source) -> Result<Vec<LaneKey>> {
-    let mut keys = Vec::new();
-    for text in source.keys {
-        let key = find(plan, text)?;
-        refuse_void(plan, &key)?;
-        match &source.models {
-            None => keys.push(key),
-            Some(models) => {
-                for id in models {
-                    keys.push(LaneKey { model: model(plan, *id)?, ..key });
-                }
-            }
-        }
-    }
-    refuse_repeats(|| Place::item("--lane"), keys.iter().map(|key| (*key, plan.key_text(key))))?;
-    Ok(keys)
-}
-
-/// What is known of a run's lanes.
-struct About<'a> {
-    data: &'a str,
-    is_synthetic: bool,
-    mined: &'a [Scenario],
-    density: Option<&'a DensityModel>,
-    /// Every vehicle has the same size.
-    are_alike: bool,
-    /// Other scenarios of the file were left out.
+fn lanes(
+    reopened: &Reopened,
+    keys: &[LaneKey],
+    mined: &[Scenario],
     incomplete: bool,
+    extras: &Extras,
+) -> Result<Exported> {
+    let (scenarios, are_lengths_told) = reopened.with_cases(keys, |plan| match reopened.is_reference {
+        true => concrete_lanes::<f64>(plan, keys, reopened, mined, extras),
+        false => concrete_lanes::<f32>(plan, keys, reopened, mined, extras),
+    })?;
+    let note = "a study's plan has only the sum of two lengths: the ego gets the profile's \
+                length, the others the remainder; gaps and contacts do not change (--scenarios FILE has the lengths)";
+    let notes = if are_lengths_told { Vec::new() } else { vec![note.to_owned()] };
+    Ok(Exported { scenarios, notes, incomplete })
 }
 
-fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Extras) -> Result<Exported> {
+/// The lanes, and whether the lengths of all of their vehicles are known.
+fn concrete_lanes<R: Real>(
+    plan: &LanePlan,
+    keys: &[LaneKey],
+    reopened: &Reopened,
+    mined: &[Scenario],
+    extras: &Extras,
+) -> Result<(Vec<Concrete>, bool)> {
     let runner = LaneRunner::<R>::new(plan);
-    let arithmetic = if std::mem::size_of::<R>() == 4 { "binary32" } else { "binary64" };
+    let is_synthetic = reopened.is_synthetic || mined.iter().any(|scenario| scenario.synthetic);
     let (mut scenarios, mut are_lengths_told) = (Vec::new(), true);
     for key in keys {
         let text = plan.key_text(key);
         let (case, tables) = runner.case(key.block, key.unit, key.variant);
         let id = plan.blocks[key.block].units.name(key.unit);
-        let scenario = about.mined.iter().find(|s| s.id == id);
-        let drawn = match (plan.generator(), about.density) {
+        let scenario = mined.iter().find(|s| s.id == id);
+        let drawn = match (plan.generator(), reopened.density()) {
             (Some(generator), Some(density)) => {
                 let values = generator.draw(key.unit).values;
                 let shortest = |v: &f32| v.to_string().parse::<f64>().unwrap_or(f64::from(*v));
@@ -276,25 +201,22 @@ fn lanes<R: Real>(plan: &LanePlan, keys: &[LaneKey], about: &About, extras: &Ext
         };
         let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
         let alike = || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size) };
-        let told = about.density.map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
-        let sizes = told.or_else(|| about.are_alike.then(alike));
+        let told = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
+        let sizes = told.or_else(|| reopened.has_one_size().then(alike));
         are_lengths_told &= sizes.is_some();
         let known = Known {
             key: &text,
             profile: &plan.profile,
             sizes,
             scenario,
-            data: about.data,
-            arithmetic,
-            is_synthetic: about.is_synthetic,
+            data: &reopened.data,
+            arithmetic: if reopened.is_reference { "binary64" } else { "binary32" },
+            is_synthetic,
             drawn,
         };
         scenarios.push(concrete(&runner.trace(key), (&case, &tables), &wide, &known, extras)?);
     }
-    let note = "a study's plan has only the sum of two lengths: the ego gets the profile's \
-                length, the others the remainder; gaps and contacts do not change (--scenarios FILE has the lengths)";
-    let notes = if are_lengths_told { Vec::new() } else { vec![note.to_owned()] };
-    Ok(Exported { scenarios, notes, incomplete: about.incomplete })
+    Ok((scenarios, are_lengths_told))
 }
 
 /// The same numbers in f64.

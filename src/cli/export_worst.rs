@@ -4,13 +4,12 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::rerun::worst_sha256;
-use super::simulate_lanes::{find, model};
-use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
+use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
+use crate::run::reopen::{Reopened, SampleRecord};
 use crate::run::sampling::limit_state;
-use crate::run::study::{StudyCases, WINDOW};
+use crate::run::study::{Study, WINDOW};
 use crate::support::hex::hex;
 use crate::support::input_file;
 use crate::support::repeats::refuse_repeats;
@@ -27,15 +26,15 @@ const MAX_LANES: usize = 10_000;
 /// # Errors
 /// [`Error::Usage`] for variants or models that the run does not have, and for too many lanes.
 pub(super) fn worst_of_study(
-    study: &StudyCases,
-    is_reference: bool,
+    study: &Study,
+    reopened: &Reopened,
     count: usize,
     criterion: Criterion,
     variants: &[String],
     models: Option<&[ModelId]>,
 ) -> Result<Vec<LaneKey>> {
-    let plan = study.outline();
-    let models = wanted_models(plan, models, count)?;
+    let plan = study.plan();
+    let models = wanted_models(reopened, models, count)?;
     refuse_repeats(|| Place::item("--variant"), variants.iter().map(|name| (name.trim(), name.trim())))?;
     for name in variants {
         if !plan.blocks.iter().any(|b| b.variants.iter().any(|v| v == name.trim())) {
@@ -47,7 +46,7 @@ pub(super) fn worst_of_study(
         }
     }
     let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
-    let backend: &dyn Backend = if is_reference { &wide } else { &narrow };
+    let backend: &dyn Backend = if reopened.is_reference { &wide } else { &narrow };
     let mut worst: Vec<Vec<(f64, u64)>> = vec![Vec::new(); plan.models.len()];
     let mut each = |chunk: Chunk| {
         // The unit whose lanes are looked at, and its worst lane so far, per model.
@@ -73,7 +72,7 @@ pub(super) fn worst_of_study(
         keep(&mut worst, &mut of_unit, count);
         Ok(())
     };
-    study.in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
+    study.cases().in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
         Executor::new(backend).sweep(plan, units, Wanted::Outcomes, &mut each).map(drop)
     })?;
     let lanes = models.iter().flat_map(|model| worst[*model].iter());
@@ -101,19 +100,19 @@ fn keep(worst: &mut [Vec<(f64, u64)>], of_unit: &mut [Option<(f64, u64)>], count
 /// for another criterion than the table's.
 pub(super) fn worst_of_sample(
     dir: &Path,
-    plan: &LanePlan,
+    reopened: &Reopened,
     count: usize,
     criterion: Option<Criterion>,
     models: Option<&[ModelId]>,
 ) -> Result<Vec<LaneKey>> {
-    let models = wanted_models(plan, models, count)?;
+    let models = wanted_models(reopened, models, count)?;
     let path = dir.join("worst.csv");
     if !path.exists() {
         let help = "run `lanesweep sample` with --worst above 0, or name lanes with --lane";
         return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
     }
     let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
-    if worst_sha256(dir)?.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
+    if SampleRecord::read(dir)?.worst_sha256.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
         let problem = "checksum mismatch with estimate.json: the table was changed or damaged";
         return Err(Error::input(
             Place::file(&path),
@@ -130,7 +129,7 @@ pub(super) fn worst_of_sample(
     let column =
         header.iter().position(|name| name == "lane").ok_or_else(|| wrong(1, "no column `lane`".to_owned()))?;
     let by = header.iter().position(|name| name == "criterion");
-    let mut per_model: Vec<Vec<LaneKey>> = vec![Vec::new(); plan.models.len()];
+    let mut per_model: Vec<Vec<LaneKey>> = vec![Vec::new(); reopened.plan().models.len()];
     for (at, record) in reader.records().enumerate() {
         let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
         let ranked_by = by.and_then(|by| record.get(by)).unwrap_or_default();
@@ -139,7 +138,7 @@ pub(super) fn worst_of_sample(
             let help = format!("leave it out, or run `lanesweep sample --criterion {}`", asked.key());
             return Err(Error::usage(Place::item("--criterion"), problem, help));
         }
-        let key = find(plan, text_of_cell(record.get(column).unwrap_or("")))?;
+        let key = reopened.find(text_of_cell(record.get(column).unwrap_or("")))?;
         if per_model[key.model].len() < count {
             per_model[key.model].push(key);
         }
@@ -151,10 +150,10 @@ pub(super) fn worst_of_sample(
     Ok(models.iter().flat_map(|model| per_model[*model].clone()).collect())
 }
 
-fn wanted_models(plan: &LanePlan, models: Option<&[ModelId]>, count: usize) -> Result<Vec<usize>> {
+fn wanted_models(reopened: &Reopened, models: Option<&[ModelId]>, count: usize) -> Result<Vec<usize>> {
     let all = match models {
-        None => (0..plan.models.len()).collect(),
-        Some(list) => list.iter().map(|id| model(plan, *id)).collect::<Result<Vec<_>>>()?,
+        None => (0..reopened.plan().models.len()).collect(),
+        Some(list) => list.iter().map(|id| reopened.model(*id)).collect::<Result<Vec<_>>>()?,
     };
     if all.len().saturating_mul(count) > MAX_LANES {
         let problem = format!("{count} lanes of {} models are too many files", all.len());
