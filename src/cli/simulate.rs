@@ -9,14 +9,12 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, ProfileFlags};
-use crate::engine::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
+use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
 use crate::interop::openscenario::reopen;
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
 use crate::report::records;
 use crate::report::trace::{self, TraceFigure, TraceSeries};
 use crate::run::reopen::{Reopened, TracedLane};
-use crate::scenario::Tables;
 use crate::support::files::{make_folder, write_atomically};
 use crate::support::readable::value;
 use crate::support::run_dir::is_listed;
@@ -140,19 +138,11 @@ impl Simulate {
     /// One case from flags or files, in f64.
     fn lanes_of_flags(&self) -> Result<Lanes> {
         let profile = self.profile.load()?;
-        let flags = self.flags()?;
-        let mut tables = Tables::default();
-        let case = LaneCase::encode(&flags.case(&profile, self.plausibility.policy())?, &profile, &mut tables);
-        profile.check_time_step(&flags.models()?)?;
-        check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
-        let (category, headway) = (flags.category()?, flags.headway()?);
-        let traced = |model: ModelId| TracedLane {
-            key: model.name().to_owned(),
-            name: model.name().to_owned(),
-            trace: Trace::record(&profile, category, &case, &tables, headway, model),
-            reference: None,
-        };
-        let traced = flags.models()?.into_iter().map(traced).collect();
+        let traced = self.flags()?.traced(&profile, self.plausibility.policy())?.traces.into_iter().map(|trace| {
+            let name = trace.model.name().to_owned();
+            TracedLane { key: name.clone(), name, trace, reference: None }
+        });
+        let traced = traced.collect();
         let origin = format!("profile {}, f64, a case of flags", profile.name);
         Ok(Lanes { traced, origin, synthetic: false, incomplete: false })
     }

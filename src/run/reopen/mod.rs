@@ -9,7 +9,7 @@ mod traced;
 use std::path::Path;
 
 pub use record::SampleRecord;
-pub use traced::TracedLane;
+pub use traced::{TracedCase, TracedLane};
 
 use crate::engine::{Headway, LaneKey, LanePlan};
 use crate::model::driver::ModelId;

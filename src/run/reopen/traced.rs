@@ -1,9 +1,12 @@
-//! A reopened lane with every step, beside other variants and models of its scenario.
+//! Lanes with every step: a reopened one beside other variants and models of its scenario, or those of one case.
 
 use super::Reopened;
-use crate::engine::{LaneKey, LanePlan, LaneRunner, Outcome, Trace};
+use crate::engine::{Headway, LaneCase, LaneKey, LanePlan, LaneRunner, Outcome, Trace, check_time_step};
 use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::model::scalar::Real;
+use crate::scenario::parameterization::{Sizes, VehicleSize};
+use crate::scenario::{Case, Tables};
 use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -17,6 +20,42 @@ pub struct TracedLane {
     pub trace: Trace,
     /// The same lane in f64, where the trace is in the lane arithmetic.
     pub reference: Option<Outcome<f64>>,
+}
+
+/// One concrete case with every step of each model, in f64.
+pub struct TracedCase {
+    /// The case as lanes have it.
+    pub case: LaneCase<f64>,
+    /// The series that it points into.
+    pub tables: Tables<f64>,
+    /// Where the ego starts.
+    pub headway: Headway,
+    /// Sizes of its vehicles.
+    pub sizes: Sizes,
+    /// One per model.
+    pub traces: Vec<Trace>,
+}
+
+impl TracedCase {
+    /// Runs a case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a time step that is too long for a model or the case.
+    pub fn run(case: &Case, headway: Headway, profile: &Profile, models: &[ModelId]) -> Result<TracedCase> {
+        let size = |length_m, width_m| VehicleSize { length_m, width_m };
+        let sizes = Sizes {
+            ego: size(case.ego_length_m, case.ego_width_m),
+            target: size(case.principal.length_m, case.principal.width_m),
+            lead: case.ahead.as_ref().map(|a| size(a.vehicle.length_m, a.vehicle.width_m)),
+        };
+        let (category, mut tables) = (case.category, Tables::default());
+        let case = LaneCase::encode(case, profile, &mut tables);
+        profile.check_time_step(models)?;
+        check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
+        let trace = |model: &ModelId| Trace::record(profile, category, &case, &tables, headway, *model);
+        let traces = models.iter().map(trace).collect();
+        Ok(TracedCase { case, tables, headway, sizes, traces })
+    }
 }
 
 impl Reopened {
