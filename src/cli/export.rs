@@ -1,23 +1,19 @@
 //! `lanesweep export`: scenarios for other programs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::case_flags::{CaseFlags, from_toml};
-use super::export_worst::{worst_of_sample, worst_of_study};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{Exit, ProfileFlags};
-use crate::engine::LaneKey;
 use crate::interop::openscenario::{
     Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
 };
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
 use crate::report::records::document;
-use crate::run::reopen::Reopened;
+use crate::run::reopen::{Reopened, WorstOptions};
 use crate::scenario::Side;
 use crate::support::files::check_folder;
 use crate::support::readable::counted;
@@ -163,7 +159,11 @@ impl Xosc {
                 self.refuse_for(&reopened)?;
                 let (mined, incomplete) = scenarios.as_ref().map(read).transpose()?.unwrap_or_default();
                 let keys = match self.worst {
-                    Some(count) => self.worst(dir, &reopened, count, models)?,
+                    Some(count) => {
+                        let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
+                        let variants = &self.variant;
+                        reopened.worst(dir, &WorstOptions { count, criterion, variants, models })?
+                    }
                     None => reopened.named(&self.lane, models)?,
                 };
                 (reopened, keys, mined, incomplete)
@@ -216,17 +216,6 @@ impl Xosc {
             return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");
         }
         wrong("--variant", "a sampling run has one variant", "leave it out")
-    }
-
-    fn worst(&self, dir: &Path, reopened: &Reopened, count: usize, models: Option<&[ModelId]>) -> Result<Vec<LaneKey>> {
-        let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
-        match reopened.as_study() {
-            Some(study) => {
-                let criterion = criterion.unwrap_or(Criterion::Collision);
-                worst_of_study(study, reopened, count, criterion, &self.variant, models)
-            }
-            None => worst_of_sample(dir, reopened, count, criterion, models),
-        }
     }
 
     fn play_options(&self) -> Result<PlayOptions> {

@@ -16,7 +16,6 @@ mod devices;
 mod dry_run;
 mod exit;
 mod export;
-mod export_worst;
 mod fit;
 mod format;
 mod help;

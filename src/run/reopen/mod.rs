@@ -5,11 +5,13 @@
 
 mod record;
 mod traced;
+mod worst;
 
 use std::path::Path;
 
 pub use record::SampleRecord;
 pub use traced::{TracedCase, TracedLane};
+pub use worst::WorstOptions;
 
 use crate::engine::{Headway, LaneKey, LanePlan};
 use crate::model::driver::ModelId;
