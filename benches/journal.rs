@@ -22,8 +22,9 @@ use lanesweep::run::sampling::{
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{BinomialInterval, StopRule};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -164,7 +165,7 @@ fn plan_file(folder: &Path, study: &StudyCases) {
 
 fn density() -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;

@@ -19,8 +19,9 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{BinomialInterval, StopRule};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -66,7 +67,7 @@ fn main() {
 
 fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
 }

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, CaseParameters, Category, ParameterRows, PlainCase, RowPlace};
+use crate::run::reopen::TracedCase;
+use crate::scenario::{CaseParameters, ParameterRows, PlainCase, RowPlace};
 use crate::support::plausibility::{Doubts, Implausible, Quantity};
 use crate::support::readable::value;
 use crate::support::table::{TableFormat, TableReader};
@@ -98,10 +99,6 @@ impl CaseFlags {
         }
     }
 
-    pub(super) fn category(&self) -> Result<Category> {
-        self.located(self.parameters().category())
-    }
-
     /// An error about a value of a table says where it stands.
     fn located<T>(&self, result: Result<T>) -> Result<T> {
         result.map_err(|error| match &self.row {
@@ -131,7 +128,7 @@ impl CaseFlags {
     }
 
     /// The models, in the order given; all where none is named.
-    pub(super) fn models(&self) -> Result<Vec<ModelId>> {
+    fn models(&self) -> Result<Vec<ModelId>> {
         let names = self.models.iter().flat_map(|list| list.split(','));
         self.located(super::lists::models(names, "models"))
     }
@@ -148,9 +145,10 @@ impl CaseFlags {
         })
     }
 
-    /// The case; what is doubtful of it is told.
-    pub(super) fn case(&self, profile: &Profile, implausible: Implausible) -> Result<Case> {
-        self.located(self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s))
+    /// Runs the case with each of its models; what is doubtful of it is told.
+    pub(super) fn traced(&self, profile: &Profile, implausible: Implausible) -> Result<TracedCase> {
+        let case = self.located(self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s))?;
+        TracedCase::run(&case, self.headway()?, profile, &self.models()?)
     }
 
     /// Its numbers; what is doubtful of them is told.

@@ -10,9 +10,8 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
-use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, fit, lists};
+use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
+use super::{Exit, ProfileFlags, lists};
 use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::report::compare::{CompareFile, rates};
@@ -24,7 +23,7 @@ use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
-use crate::traffic::mining::counts_text;
+use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
@@ -97,18 +96,13 @@ impl Compare {
         self.check_samples()?;
         let typed = self.exposure.driven()?;
         let profile = self.profile.load()?;
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
-        };
+        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = fit::facts(&source, &collection, typed)?;
+        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
+        let facts = DataProvenance::of(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"

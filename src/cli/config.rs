@@ -8,7 +8,7 @@ use serde_json::json;
 use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::synth::GeneratorFlags;
+use super::source::GeneratorFlags;
 use super::{Exit, ProfileFlags, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,

@@ -5,13 +5,15 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::case_flags::{CaseFlags, from_toml};
-use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::PlausibilityFlag;
+use super::source::{PlausibilityFlag, scenarios_of};
 use super::{Exit, ProfileFlags};
-use crate::interop::openscenario::{EgoMotion, export_folder};
+use crate::interop::openscenario::{
+    Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
+};
 use crate::report::records::document;
+use crate::run::reopen::{Reopened, WorstOptions};
 use crate::scenario::Side;
 use crate::support::files::check_folder;
 use crate::support::readable::counted;
@@ -123,10 +125,9 @@ enum SideFlag {
 
 impl Xosc {
     fn run(&self) -> Result<Exit> {
-        let extras = self.extras()?;
+        let options = self.play_options()?;
         check_folder(&self.out)?;
-        let Exported { scenarios, notes, incomplete } = self.lanes(&extras)?;
-        notes.iter().for_each(|note| tracing::warn!("{note}"));
+        let (scenarios, incomplete) = self.scenarios(&options)?;
         let rows = export_folder(&self.out, &scenarios)?;
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
         let list = || {
@@ -138,7 +139,8 @@ impl Xosc {
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    fn lanes(&self, extras: &Extras) -> Result<Exported> {
+    /// The scenarios, and whether others of the file were left out.
+    fn scenarios(&self, options: &PlayOptions) -> Result<(Vec<Concrete>, bool)> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
         if is_lane && self.case.says_a_case() {
@@ -146,33 +148,77 @@ impl Xosc {
             return wrong("--lane", "a lane is a complete case: the other flags would be ignored", help);
         }
         let models = self.case.named_models()?;
-        let source = Source { keys: &self.lane, models };
-        match (&self.from, &self.scenarios) {
+        let (implausible, models) = (self.plausibility.policy(), models.as_deref());
+        let read = |path: &PathBuf| scenarios_of(path, implausible);
+        let (reopened, keys, mined, incomplete) = match (&self.from, &self.scenarios) {
+            (Some(_), _) if self.lane.is_empty() && self.worst.is_none() => {
+                return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
+            }
             (Some(dir), scenarios) => {
-                if self.lane.is_empty() && self.worst.is_none() {
-                    return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
-                }
-                let worst = self.worst.map(|count| (count, &self.variant[..]));
-                let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
-                of_run(dir, &source, worst, criterion, scenarios.as_deref(), extras)
+                let reopened = reopen(dir, self.lane.first().map_or("", String::as_str))?;
+                self.refuse_for(&reopened)?;
+                let (mined, incomplete) = scenarios.as_ref().map(read).transpose()?.unwrap_or_default();
+                let keys = match self.worst {
+                    Some(count) => {
+                        let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
+                        let variants = &self.variant;
+                        reopened.worst(dir, &WorstOptions { count, criterion, variants, models })?
+                    }
+                    None => reopened.named(&self.lane, models)?,
+                };
+                (reopened, keys, mined, incomplete)
             }
             (None, Some(path)) if self.lane.is_empty() => {
                 let problem = format!("{} has many lanes", path.display());
-                wrong("--scenarios", &problem, "add --lane SCENARIO/VARIANT/HEADWAY/MODEL")
+                return wrong("--scenarios", &problem, "add --lane SCENARIO/VARIANT/HEADWAY/MODEL");
             }
-            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &source, extras),
+            (None, Some(path)) => {
+                let profile = self.profile.load()?;
+                let (mut mined, incomplete) = read(path)?;
+                let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
+                let reopened = Reopened::scenarios(&mut mined, &self.lane, &profile, data)?;
+                let keys = reopened.named(&self.lane, models)?;
+                (reopened, keys, mined, incomplete)
+            }
             (None, None) if !self.lane.is_empty() => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                wrong("--lane", "a key alone does not identify a lane", help)
+                return wrong("--lane", "a key alone does not identify a lane", help);
             }
             (None, None) => {
                 let file = self.case_file.as_deref().map(from_toml).transpose()?.unwrap_or_default();
-                of_case(&self.case.over(file), &self.profile.load()?, extras)
+                let profile = self.profile.load()?;
+                let traced = self.case.over(file).traced(&profile, implausible)?;
+                return Ok((concrete_case(&traced, &profile, options)?, false));
             }
+        };
+        let (scenarios, are_lengths_known) = concrete_lanes(&reopened, &keys, &mined, options)?;
+        if !are_lengths_known {
+            tracing::warn!(
+                "a study's plan has only the sum of two lengths: the ego gets the profile's length, the others the \
+                 remainder; gaps and contacts do not change (--scenarios FILE has the lengths)"
+            );
         }
+        Ok((scenarios, incomplete))
     }
 
-    fn extras(&self) -> Result<Extras> {
+    /// Refuses flags that only a study has.
+    fn refuse_for(&self, reopened: &Reopened) -> Result<()> {
+        let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
+        let (has_scenarios, has_variants) = (self.scenarios.is_some(), !self.variant.is_empty());
+        if reopened.as_study().is_some() || !(has_scenarios || has_variants) {
+            return Ok(());
+        }
+        if reopened.density().is_none() {
+            let problem = "a run of distributions has neither scenarios nor variants";
+            return wrong("--scenarios, --variant", problem, "leave them out");
+        }
+        if has_scenarios {
+            return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");
+        }
+        wrong("--variant", "a sampling run has one variant", "leave it out")
+    }
+
+    fn play_options(&self) -> Result<PlayOptions> {
         let ego = match self.ego {
             EgoFlag::Model => EgoMotion::Model,
             EgoFlag::External => EgoMotion::External,
@@ -200,7 +246,6 @@ impl Xosc {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,
         });
-        let implausible = self.plausibility.policy();
-        Ok(Extras { ego, duration_s: self.duration, side, lane_width_m: self.lane_width, implausible })
+        Ok(PlayOptions { ego, duration_s: self.duration, side, lane_width_m: self.lane_width })
     }
 }

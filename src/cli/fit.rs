@@ -1,30 +1,25 @@
 //! `lanesweep fit`: scenarios in, densities of their parameters out.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use sha2::{Digest, Sha256};
 
 use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
+use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
 use crate::scenario::parameterization::Parameterization;
-use crate::scenario::write_scenarios_to;
-use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use crate::stats::density::{BandwidthRule, DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder};
-use crate::support::input_file;
 use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
-use crate::traffic::mining::{Collection, counts_text};
+use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// Draws for P_valid at most, as in the configuration.
@@ -105,16 +100,11 @@ impl Fit {
                 "give 100000, for instance",
             ));
         }
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
-        };
+        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         let files = self.files(&ids, configured)?;
         tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = facts(&source, &collection, typed)?;
+        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
+        let facts = DataProvenance::of(&source, &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
@@ -180,7 +170,7 @@ impl Fit {
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
         let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        inputs.extend(self.scenarios.as_deref().map(ExposureFile::path_of));
+        inputs.extend(self.scenarios.as_deref().map(DataProvenance::path_of));
         for file in &files {
             source::refuse_overwriting(file, &inputs, "--out")?;
             check_folder_of(file)?;
@@ -211,40 +201,7 @@ fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&OutputDir>) -> Resu
     results.publish_each()
 }
 
-/// Label, checksum and exposure of the data.
-pub(super) fn facts(source: &Source, collection: &Collection, typed: Driven) -> Result<DataFacts> {
-    let scenarios_sha256 = match source {
-        Source::Scenarios(path) => input_file::sha256(path)?,
-        Source::Folder(_) | Source::Generated(_) => {
-            // That of the file that `mine` would write: the same scenarios have the same checksum.
-            let mut digest = Hashing(Sha256::new());
-            write_scenarios_to(&mut digest, &collection.scenarios)?;
-            crate::support::hex::hex(&digest.0.finalize())
-        }
-    };
-    let mut facts = DataFacts {
-        data: source.describe(collection.synthetic),
-        synthetic: collection.synthetic,
-        scenarios_sha256,
-        driven: Driven::of(collection),
-    };
-    if let Source::Scenarios(path) = source
-        && let Some(beside) = ExposureFile::read_beside(path, &facts.scenarios_sha256)?
-    {
-        facts.driven = Some(beside.driven);
-        if beside.synthetic {
-            facts.synthetic = true;
-            facts.data = beside.data;
-        }
-    }
-    if typed.hours.is_some() || typed.kilometres.is_some() {
-        // What was typed counts; hours typed for one set do not mix with kilometres of another.
-        facts.driven = Some(typed);
-    }
-    Ok(facts)
-}
-
-fn text(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> String {
+fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
     let mut text = format!("{}\n\n", facts.data);
     for (path, model) in fitted {
         text.push_str(&density::text(model));
@@ -260,7 +217,7 @@ fn text(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> String {
     text
 }
 
-fn document(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> Result<String> {
+fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> Result<String> {
     let densities = fitted.iter().map(|(path, model)| {
         let mut record = density::record(model);
         record["file"] = path.display().to_string().into();
@@ -273,18 +230,4 @@ fn document(facts: &DataFacts, fitted: &[(PathBuf, DensityModel)]) -> Result<Str
         "driven": facts.driven,
         "densities": densities.collect::<Vec<_>>(),
     }))
-}
-
-/// A writer that keeps nothing but a checksum.
-struct Hashing(Sha256);
-
-impl Write for Hashing {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.update(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
 }

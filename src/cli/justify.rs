@@ -9,9 +9,8 @@ use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::format::FormatFlag;
-use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, fit, lists};
+use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
+use super::{Exit, ProfileFlags, lists};
 use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
@@ -21,11 +20,10 @@ use crate::run::justify::{JustifyOptions, justify};
 use crate::run::study::StudyOptions;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::Driven;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{DOSSIER_RECORD, OutputDir};
-use crate::traffic::mining::counts_text;
+use crate::traffic::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
 /// Is a parameterization appropriate for this driver model, scenario type and criterion?
@@ -91,11 +89,7 @@ impl Justify {
         let criterion = self.criterion.get()?;
         let headways = lists::paper_or_headways(&self.thw)?;
         let profile = self.profile.load()?;
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
-        };
+        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         for name in ["report.html", DOSSIER_RECORD, "hidden.csv", "hidden.svg"] {
             source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
@@ -103,9 +97,8 @@ impl Justify {
         check_folder(&self.out)?;
         let opened = self.backend.open()?;
         tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = fit::facts(&source, &collection, Driven { hours: None, kilometres: None })?;
+        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
+        let facts = DataProvenance::of(&source, &collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {
             compare: CompareOptions {
                 study: StudyOptions {

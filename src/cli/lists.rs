@@ -9,8 +9,8 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::Driven;
 use crate::support::repeats::refuse_repeats;
+use crate::traffic::Driven;
 use crate::{Error, Place, Result};
 
 /// A whole number as the configuration writes it too: `10000`, `10_000` or `1e4`.

@@ -6,16 +6,15 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::Verbosity;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::{self, PlausibilityFlag};
 use super::{Exit, console};
 use crate::Result;
 use crate::scenario::{check_scenario_file, write_scenarios, write_scenarios_to};
-use crate::stats::density::{Driven, ExposureFile};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::counted;
-use crate::traffic::mining::counts_text;
+use crate::traffic::{DataProvenance, Driven, Source};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
@@ -55,21 +54,22 @@ impl Mine {
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
         let from = Source::Folder(self.dir.clone());
-        let mut collection = from.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
+        let mut collection = source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }
         match &self.out {
             Some(path) => {
                 // What was driven is that of this file: the former goes first, the new one comes last.
-                ExposureFile::remove_beside(path)?;
+                DataProvenance::remove_beside(path)?;
                 write_scenarios(path, &collection.scenarios)?;
-                if let Some(driven) = Driven::of(&collection) {
-                    let scenarios_sha256 = input_file::sha256(path)?;
-                    let (data, synthetic) = (from.describe(collection.synthetic), collection.synthetic);
-                    ExposureFile { scenarios_sha256, data, synthetic, driven }.write_beside(path)?;
+                DataProvenance {
+                    data: from.describe(collection.synthetic),
+                    synthetic: collection.synthetic,
+                    scenarios_sha256: input_file::sha256(path)?,
+                    driven: Driven::of(&collection),
                 }
+                .write_beside(path)?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
             }
             None => {

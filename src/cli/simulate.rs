@@ -7,15 +7,14 @@ use clap::Args;
 use super::case_flags::{CaseFlags, from_table, from_toml};
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
-use super::source::{PlausibilityFlag, refuse_overwriting};
+use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, ProfileFlags};
-use crate::engine::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
+use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
+use crate::interop::openscenario::reopen;
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
 use crate::report::records;
 use crate::report::trace::{self, TraceFigure, TraceSeries};
-use crate::scenario::Tables;
+use crate::run::reopen::{Reopened, TracedLane};
 use crate::support::files::{make_folder, write_atomically};
 use crate::support::readable::value;
 use crate::support::run_dir::is_listed;
@@ -78,6 +77,16 @@ pub struct Simulate {
     profile: ProfileFlags,
 }
 
+/// Lanes that have been run, and what a reader should know of all of them.
+struct Lanes {
+    traced: Vec<TracedLane>,
+    /// What they are of, in a few words.
+    origin: String,
+    synthetic: bool,
+    /// Other scenarios of the file were left out.
+    incomplete: bool,
+}
+
 impl Simulate {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
@@ -106,33 +115,34 @@ impl Simulate {
                 "leave out the case's flags, or --lane with its --scenarios or --from",
             ));
         }
-        let asked = Asked { key, models: self.case.named_models()?, compare: &self.compare };
-        match (&self.from, &self.scenarios) {
-            (Some(dir), _) => of_run(dir, &asked),
-            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &asked, self.plausibility.policy()),
+        let (reopened, incomplete) = match (&self.from, &self.scenarios) {
+            (Some(dir), _) => (reopen(dir, key)?, false),
+            (None, Some(path)) => {
+                let profile = self.profile.load()?;
+                let (mut scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
+                let data = format!("scenarios of {}", path.display());
+                (Reopened::scenarios(&mut scenarios, std::slice::from_ref(key), &profile, data)?, incomplete)
+            }
             (None, None) => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
-                Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help))
+                return Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help));
             }
-        }
+        };
+        let traced = reopened.traced(key, self.case.named_models()?.as_deref(), &self.compare)?;
+        let arithmetic = if reopened.is_reference { "f64" } else { "f32" };
+        let data = if reopened.density().is_some() { "sampled" } else { &*reopened.data };
+        let origin = format!("profile {}, {arithmetic}, {data}", reopened.plan().profile.name);
+        Ok(Lanes { traced, origin, synthetic: reopened.is_synthetic, incomplete })
     }
 
     /// One case from flags or files, in f64.
     fn lanes_of_flags(&self) -> Result<Lanes> {
         let profile = self.profile.load()?;
-        let flags = self.flags()?;
-        let mut tables = Tables::default();
-        let case = LaneCase::encode(&flags.case(&profile, self.plausibility.policy())?, &profile, &mut tables);
-        profile.check_time_step(&flags.models()?)?;
-        check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
-        let (category, headway) = (flags.category()?, flags.headway()?);
-        let traced = |model: ModelId| Traced {
-            key: model.name().to_owned(),
-            name: model.name().to_owned(),
-            trace: Trace::record(&profile, category, &case, &tables, headway, model),
-            reference: None,
-        };
-        let traced = flags.models()?.into_iter().map(traced).collect();
+        let traced = self.flags()?.traced(&profile, self.plausibility.policy())?.traces.into_iter().map(|trace| {
+            let name = trace.model.name().to_owned();
+            TracedLane { key: name.clone(), name, trace, reference: None }
+        });
+        let traced = traced.collect();
         let origin = format!("profile {}, f64, a case of flags", profile.name);
         Ok(Lanes { traced, origin, synthetic: false, incomplete: false })
     }
@@ -217,8 +227,8 @@ fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
 }
 
 /// How a lane ended, in words.
-fn summary(lane: &Traced, is_one_of_many: bool) -> String {
-    let Traced { key, trace, reference, .. } = lane;
+fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
+    let TracedLane { key, trace, reference, .. } = lane;
     let time = |step: u32| match step {
         NO_STEP => "never".to_owned(),
         step => format!("{} s", value(trace.time_s(step))),

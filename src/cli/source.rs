@@ -4,81 +4,52 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::repeats::refuse_repeats;
-use crate::traffic::mining::{Collection, MiningOptions, mine_folder, mine_generated};
+use crate::traffic::Source;
+use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::traffic::trajectory::generator::GeneratorOptions;
-use crate::traffic::trajectory::highd::{self, made_up};
+use crate::traffic::trajectory::highd;
 use crate::{Error, Place, Result};
 
-/// What the scenarios of a run are.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Source {
-    /// A folder of highD-format recordings.
-    Folder(PathBuf),
-    /// A scenario file.
-    Scenarios(PathBuf),
-    /// Recordings that the program generates.
-    Generated(GeneratorOptions),
+/// The source that the flags of a verb name.
+///
+/// # Errors
+/// As [`GeneratorFlags::options`].
+pub fn source_of(
+    dir: Option<&PathBuf>,
+    scenarios: Option<&PathBuf>,
+    generator: &GeneratorFlags,
+    configured: &Configured,
+) -> Result<Source> {
+    Ok(match (dir, scenarios) {
+        (Some(dir), _) => Source::Folder(dir.clone()),
+        (None, Some(path)) => Source::Scenarios(path.clone()),
+        (None, None) => Source::Generated(generator.options(configured)?),
+    })
 }
 
-impl Source {
-    /// Where the scenarios are from, in one line, which says so where they are made up.
-    pub fn describe(&self, synthetic: bool) -> String {
-        let text = match self {
-            Source::Folder(dir) => made_up(dir).unwrap_or_else(|| format!("recordings in {}", dir.display())),
-            Source::Scenarios(path) => format!("scenarios of {}", path.display()),
-            Source::Generated(options) => format!(
-                "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates multiplied by {}",
-                options.recordings, options.duration_s, options.seed, options.event_rate_factor
-            ),
-        };
-        labelled(text, synthetic)
+/// Reads or generates, and mines, with a progress bar; tells what was left out and what was found.
+pub fn load(
+    source: &Source,
+    mining: &MiningOptions,
+    implausible: Implausible,
+    verbosity: Verbosity,
+) -> Result<Collection> {
+    let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
+    let bar = console::progress(verbosity, source.recordings(), what);
+    let collection = source.load(mining, implausible, || bar.inc(1))?;
+    bar.finish_and_clear();
+    complain_of(&collection.problems, &collection.notes);
+    let data = source.describe(collection.synthetic);
+    if data != source.describe(false) {
+        tracing::info!("{data}");
     }
-
-    /// Checks that the data can be read: all of a scenario file, the names of a folder's recordings.
-    ///
-    /// # Errors
-    /// As [`Source::load`].
-    pub fn check(&self, implausible: Implausible) -> Result<()> {
-        match self {
-            Source::Scenarios(path) => read_scenario_file(path, implausible).map(drop),
-            Source::Folder(dir) => highd::inventory(dir).map(drop),
-            Source::Generated(options) => options.validate(),
-        }
-    }
-
-    /// Reads or generates, and mines.
-    pub fn load(&self, mining: &MiningOptions, implausible: Implausible, verbosity: Verbosity) -> Result<Collection> {
-        let collection = match self {
-            Source::Scenarios(path) => {
-                let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
-                let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
-                Collection { scenarios, problems, notes, synthetic, ..Collection::default() }
-            }
-            Source::Folder(dir) => {
-                let length = highd::inventory(dir).map_or(0, |i| i.recordings.len() as u64);
-                let bar = console::progress(verbosity, length, "reading and mining");
-                let collection = mine_folder(dir, mining, implausible, || bar.inc(1))?;
-                bar.finish_and_clear();
-                collection
-            }
-            Source::Generated(options) => {
-                let bar = console::progress(verbosity, options.recordings as u64, "generating and mining");
-                let collection = mine_generated(options, mining, || bar.inc(1))?;
-                bar.finish_and_clear();
-                collection
-            }
-        };
-        complain_of(&collection.problems, &collection.notes);
-        let data = self.describe(collection.synthetic);
-        if data != self.describe(false) {
-            tracing::info!("{data}");
-        }
-        Ok(collection)
-    }
+    tracing::info!("{}", counts_text(&collection.scenarios));
+    Ok(collection)
 }
 
 /// What is told one by one of what was left out.
@@ -91,6 +62,34 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
         tracing::error!("{} more are left out", problems.len() - TOLD);
     }
     notes.iter().for_each(|note| tracing::warn!("{note}"));
+}
+
+/// Flags of the generator.
+#[derive(Debug, Clone, Args)]
+pub struct GeneratorFlags {
+    /// Seed of the generator
+    #[arg(long, hide = true, value_name = "N")]
+    pub synth_seed: u64,
+    /// Number of generated recordings
+    #[arg(long, value_name = "N")]
+    pub synth_recordings: usize,
+    /// Length of each generated recording
+    #[arg(long, hide = true, value_name = "s")]
+    pub synth_duration: f64,
+}
+
+impl GeneratorFlags {
+    /// The flags, over what is configured of the rest.
+    pub fn options(&self, configured: &Configured) -> Result<GeneratorOptions> {
+        let options = GeneratorOptions {
+            seed: self.synth_seed,
+            recordings: self.synth_recordings,
+            duration_s: self.synth_duration,
+            ..configured.settings.generator.clone()
+        };
+        options.validate()?;
+        Ok(options)
+    }
 }
 
 /// What is done about input that no road has.
@@ -130,11 +129,6 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     refuse_repeats(|| Place::item(flag), found.iter().zip(list.iter().map(|text| text.trim())))?;
     found.sort();
     Ok(found)
-}
-
-/// What data are, in words that say so where they are made up.
-pub fn labelled(data: String, synthetic: bool) -> String {
-    if synthetic && !data.starts_with("SYNTHETIC DATA") { format!("SYNTHETIC DATA: {data}") } else { data }
 }
 
 /// The file that a path stands for, however it is written.

@@ -11,9 +11,8 @@ use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
-use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
 use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
@@ -27,7 +26,7 @@ use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_dir::Results;
-use crate::traffic::mining::counts_text;
+use crate::traffic::Source;
 
 /// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
 const FORECAST_BYTES: u64 = 64 << 20;
@@ -186,11 +185,7 @@ impl Study {
             headways: lists::paper_or_headways(&self.thw)?,
             parameterization: configured.settings.parameterization.clone(),
         };
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
-        };
+        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         Ok((profile, options, source))
     }
 
@@ -205,10 +200,10 @@ impl Study {
             tracing::info!("{}", source.describe(false));
         }
         let mut timings = Timings::default();
-        let collection =
-            timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
+        let collection = timed(&mut timings.mine_s, || {
+            source::load(&source, &config.mining, self.plausibility.policy(), verbosity)
+        })?;
         let data = source.describe(collection.synthetic);
-        tracing::info!("{}", counts_text(&collection.scenarios));
         let builder = study::Study::builder(&collection, profile)
             .options(options)
             .mining(config.mining)

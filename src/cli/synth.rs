@@ -7,40 +7,13 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::source::Source;
+use super::source::GeneratorFlags;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
-use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use crate::traffic::Source;
+use crate::traffic::trajectory::generator::generate_one;
 use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
-
-/// Flags of the generator.
-#[derive(Debug, Clone, Args)]
-pub struct GeneratorFlags {
-    /// Seed of the generator
-    #[arg(long, hide = true, value_name = "N")]
-    pub synth_seed: u64,
-    /// Number of generated recordings
-    #[arg(long, value_name = "N")]
-    pub synth_recordings: usize,
-    /// Length of each generated recording
-    #[arg(long, hide = true, value_name = "s")]
-    pub synth_duration: f64,
-}
-
-impl GeneratorFlags {
-    /// The flags, over what is configured of the rest.
-    pub fn options(&self, configured: &Configured) -> Result<GeneratorOptions> {
-        let options = GeneratorOptions {
-            seed: self.synth_seed,
-            recordings: self.synth_recordings,
-            duration_s: self.synth_duration,
-            ..configured.settings.generator.clone()
-        };
-        options.validate()?;
-        Ok(options)
-    }
-}
 
 /// Write the synthetic recordings that `study` uses without data
 ///

@@ -10,8 +10,7 @@ use super::conformance::Conformance;
 use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
+use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
@@ -167,12 +166,8 @@ impl Verify {
     }
 
     fn study(&self, configured: &Configured, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
-        };
-        let collection = source.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
+        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
+        let collection = source::load(&source, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
         if plan.unit_count() == 0 {

@@ -34,6 +34,9 @@ pub enum Marks {
 pub struct Watch(pub [Marks; MODELS]);
 
 impl Watch {
+    /// No lane of any model.
+    pub const NOTHING: Watch = Watch([Marks::Nothing; MODELS]);
+
     /// The criteria by which lanes of a model run, so that their verdicts show which are marked.
     pub(super) fn criteria<R: Real>(&self, profile: &Profile, model: ModelId, criteria: Criteria<R>) -> Criteria<R> {
         let mut criteria = criteria;

@@ -16,9 +16,9 @@ use crate::run::sampling::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate,
 };
 use crate::run::score::f1;
-use crate::stats::density::Driven;
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
+use crate::traffic::Driven;
 use crate::{Error, Result};
 
 /// `compare.json`.

@@ -11,9 +11,10 @@ use crate::run::sampling::{
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{BandwidthRule, DataFacts, DensityModel, Exposure, FitOptions, Fitted};
+use crate::stats::density::{BandwidthRule, DensityModel, Exposure, FitOptions, Fitted};
 use crate::stats::estimate::Enough;
 use crate::support::error::push_once;
+use crate::traffic::DataProvenance;
 use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
@@ -41,7 +42,7 @@ pub struct CompareOptions {
 /// use lanesweep::run::study::StudyOptions;
 /// use lanesweep::scenario::Category;
 /// use lanesweep::scenario::parameterization::Parameterization;
-/// # use lanesweep::stats::density::DataFacts;
+/// # use lanesweep::traffic::DataProvenance;
 /// # use lanesweep::stats::estimate::Enough;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -49,7 +50,7 @@ pub struct CompareOptions {
 /// # fn main() -> lanesweep::Result<()> {
 /// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
 /// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
-/// # let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+/// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
 /// let options = CompareOptions {
 ///     study: StudyOptions { headways: vec![Headway::ThwS(0.6)], ..StudyOptions::default() },
 ///     parameterizations: Parameterization::find(Category::CutIn, "2").into_iter().collect(),
@@ -65,7 +66,7 @@ pub struct CompareOptions {
 /// ```
 pub struct Compare<'a> {
     scenarios: &'a [Scenario],
-    facts: &'a DataFacts,
+    facts: &'a DataProvenance,
     profile: Profile,
     options: CompareOptions,
     plan: LanePlan,
@@ -94,7 +95,7 @@ impl<'a> Compare<'a> {
     /// [`Error::Input`] where no scenario of these categories was kept; as [`plan_study`].
     pub fn plan(
         scenarios: &'a [Scenario],
-        facts: &'a DataFacts,
+        facts: &'a DataProvenance,
         profile: Profile,
         mut options: CompareOptions,
     ) -> Result<Compare<'a>> {

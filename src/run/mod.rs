@@ -3,6 +3,7 @@
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
 //! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
 //! [`close_following`] tells how many failures come from headways below 0.5 s.
+//! [`reopen`] runs single lanes of a finished run again.
 //! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
 
 pub mod check;
@@ -13,6 +14,7 @@ pub mod justify;
 pub mod parts;
 #[cfg(test)]
 mod plan_mutations;
+pub mod reopen;
 pub mod sampling;
 pub mod score;
 pub mod study;

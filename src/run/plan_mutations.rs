@@ -16,7 +16,8 @@ use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSou
 use crate::run::study::Study;
 use crate::scenario::parameterization::Parameterization;
 use crate::scenario::{Category, Scenario};
-use crate::stats::density::{DataFacts, DensityModel, FitOptions};
+use crate::stats::density::{DensityModel, FitOptions};
+use crate::traffic::DataProvenance;
 use crate::traffic::mining::{Collection, MiningOptions, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::{Error, Result};
@@ -32,7 +33,8 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let generator = GeneratorOptions { recordings: 2, duration_s: 240.0, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
     let profile = Profile::load("paper").unwrap();
-    let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts =
+        DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let density = DensityModel::fit(id, &scenarios, &facts, &options).unwrap().model;

@@ -1,7 +1,10 @@
 //! Traffic: recordings as read, and the scenarios found in them.
 //!
 //! [`trajectory`] reads recordings (highD's format) and makes synthetic ones; [`mining`] finds cut-ins, cut-outs and leader
-//! decelerations. Scenarios go to [`scenario`](crate::scenario).
+//! decelerations. A [`Source`] loads and mines either, or reads a scenario file. Scenarios go to [`scenario`](crate::scenario).
 
 pub mod mining;
+mod provenance;
 pub mod trajectory;
+
+pub use provenance::{DataProvenance, Driven, Source};

@@ -16,8 +16,9 @@ use lanesweep::run::sampling::{
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Mixture};
+use lanesweep::stats::density::{DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -35,7 +36,7 @@ fn density(id: Parameterization, with_thw: bool) -> DensityModel {
 
 fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..options };
     DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
 }

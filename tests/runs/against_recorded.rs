@@ -11,8 +11,9 @@ use lanesweep::run::parts::Shard;
 use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Verdict, Warning};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -26,7 +27,7 @@ fn scenarios() -> &'static [Scenario] {
 
 fn density(key: &str) -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, key).unwrap();
     DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
@@ -137,8 +138,12 @@ fn a_density_file_holds_its_scenarios_and_refuses_others() {
 #[test]
 fn no_rate_is_sound_that_is_compared_with_nothing() {
     let with_headway = |key: &str| {
-        let facts =
-            DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        let facts = DataProvenance {
+            data: "synthetic".to_owned(),
+            synthetic: true,
+            scenarios_sha256: String::new(),
+            driven: None,
+        };
         let options =
             FitOptions { representativeness: false, valid_draws: 1000, with_thw: true, ..FitOptions::default() };
         DensityModel::fit(Parameterization::find(Category::CutIn, key).unwrap(), scenarios(), &facts, &options)

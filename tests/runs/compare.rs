@@ -16,7 +16,8 @@ use lanesweep::run::sampling::{
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
 use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde};
+use lanesweep::stats::density::{DensityModel, FitOptions, Kde};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -166,8 +167,12 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
         .unwrap();
     for (category, key) in [(Category::CutIn, "2"), (Category::CutIn, "6"), (Category::Lvd, "i")] {
         let id = Parameterization::find(category, key).unwrap();
-        let facts =
-            DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        let facts = DataProvenance {
+            data: "synthetic".to_owned(),
+            synthetic: true,
+            scenarios_sha256: String::new(),
+            driven: None,
+        };
         let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
         let density = DensityModel::fit(id, &scenarios, &facts, &fit).unwrap().model;
         let kernels = kernel_scenarios(&density, &scenarios).unwrap();

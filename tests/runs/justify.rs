@@ -11,8 +11,9 @@ use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::Category;
 use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Clusters, Enough, RatioMethod, RatioVerdict, paired_ratio};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -41,7 +42,7 @@ fn dossier_under(
     model: ModelId,
     criterion: Criterion,
 ) -> Dossier {
-    let facts = DataFacts { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts = DataProvenance { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = JustifyOptions {
         compare: CompareOptions {
             study: study_options(category, model),
@@ -131,7 +132,7 @@ fn without_any_failure_nothing_is_concluded() {
 fn the_density_whose_coverage_is_told_is_the_one_that_was_sampled() {
     let data = recordings(4);
     let found = dossier(&data, (Category::Lvd, "i"), ModelId::Reg157, Criterion::Ttc);
-    let facts = DataFacts { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts = DataProvenance { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let id = Parameterization::find(Category::Lvd, "i").unwrap();
     let options = FitOptions { parameterization: StudyOptions::default().parameterization, ..FitOptions::default() };
     let fitted = DensityModel::fit(id, &data.scenarios, &facts, &options).unwrap().model;

@@ -16,7 +16,8 @@ use lanesweep::run::sampling::{
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -155,7 +156,7 @@ fn failures_from_headways_below_half_a_second_are_told_apart() {
 #[test]
 fn a_density_with_headways_draws_its_own_and_counts_those_below_half_a_second() {
     let data = recordings(4);
-    let facts = DataFacts { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts = DataProvenance { data: "test".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let fit = |with_thw| {
         let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };

@@ -14,7 +14,8 @@ use lanesweep::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, 
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -169,7 +170,7 @@ fn lanes_run_again_by_the_program_are_the_rows_of_the_studys_table() {
 fn sampled_lanes_are_the_runs_lanes_too() {
     let profile = Profile::load("paper").unwrap();
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let mut lanes = 0;
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {

@@ -17,8 +17,9 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, Kde, read_density, write_density};
+use lanesweep::stats::density::{DensityModel, FitOptions, Kde, read_density, write_density};
 use lanesweep::stats::estimate::{BinomialInterval, StopRule};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -32,7 +33,7 @@ fn scenarios() -> &'static [Scenario] {
 
 fn density(category: Category, key: &str) -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios(), &facts, &options).unwrap().model
 }

@@ -10,8 +10,9 @@ use std::path::Path;
 
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions, write_density};
+use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
 use lanesweep::support::plausibility::LIMITS;
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use made::{Read, read};
@@ -135,7 +136,7 @@ fn sampled_rows_are_the_same_in_every_format() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
     let lvd: Vec<Scenario> = synthetic().into_iter().filter(|s| s.category == Category::Lvd && s.kept).collect();
-    let facts = DataFacts { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts = DataProvenance { data: "made".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let options = FitOptions { representativeness: false, valid_draws: 200, ..FitOptions::default() };
     let id = Parameterization::find(Category::Lvd, "i").unwrap();
     write_density(&at.join("d.json"), &DensityModel::fit(id, &lvd, &facts, &options).unwrap().model).unwrap();

@@ -11,12 +11,13 @@ use lanesweep::scenario::parameterization::{
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
 use lanesweep::stats::density::{
-    Bandwidth, BandwidthRule, DataFacts, DensityModel, Driven, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
-    ValidShare, metric, normal_cdf, read_density, wasserstein, write_density,
+    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidShare,
+    metric, normal_cdf, read_density, wasserstein, write_density,
 };
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::traffic::{DataProvenance, Driven};
 use serde_json::Value;
 
 fn golden(name: &str) -> Value {
@@ -285,8 +286,8 @@ fn space(id: Parameterization, options: &ParameterizationOptions, with_thw: bool
     ParameterSpace::new(id, options, Some(&reduction), with_thw).unwrap()
 }
 
-fn facts() -> DataFacts {
-    DataFacts {
+fn facts() -> DataProvenance {
+    DataProvenance {
         data: "SYNTHETIC DATA".to_owned(),
         synthetic: true,
         scenarios_sha256: "0".repeat(64),

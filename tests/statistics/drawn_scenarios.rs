@@ -8,7 +8,8 @@ use lanesweep::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
 use lanesweep::scenario::{Category, Scenario, Side};
-use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -30,7 +31,7 @@ fn options(svd_lateral: SvdLateral) -> ParameterizationOptions {
 
 fn density(id: Parameterization, parameterization: ParameterizationOptions) -> DensityModel {
     let facts =
-        DataFacts { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let fit = FitOptions { parameterization, representativeness: false, valid_draws: 20_000, ..FitOptions::default() };
     DensityModel::fit(id, scenarios(), &facts, &fit).unwrap().model
 }
@@ -102,7 +103,7 @@ fn a_recorded_scenario_that_starts_in_the_ego_s_lane_keeps_its_kernel() {
     let mut some: Vec<Scenario> = kept(Category::CutIn).into_iter().cloned().collect();
     // The lane change began before the ego's data set.
     some[0].target.y.iter_mut().for_each(|y| *y *= 0.1);
-    let facts = DataFacts { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let facts = DataProvenance { data: String::new(), synthetic: true, scenarios_sha256: String::new(), driven: None };
     let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "7").unwrap();
     let fitted = DensityModel::fit(id, &some, &facts, &fit).unwrap();

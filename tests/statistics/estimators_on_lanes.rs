@@ -17,18 +17,20 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
+use lanesweep::stats::density::{BandwidthRule, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
     BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
     balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset, wilson,
 };
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 const LEVEL: f64 = 0.999;
 
 fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
-    let facts = DataFacts { data: "mined".to_owned(), synthetic: false, scenarios_sha256: String::new(), driven: None };
+    let facts =
+        DataProvenance { data: "mined".to_owned(), synthetic: false, scenarios_sha256: String::new(), driven: None };
     // P_valid must be known better than the probabilities: it is in no interval.
     let options = FitOptions { representativeness: false, valid_draws: 4_000_000, ..FitOptions::default() };
     DensityModel::fit(id, scenarios, &facts, &options).unwrap().model

@@ -1,17 +1,19 @@
 //! OpenSCENARIO: concrete scenarios out, distributions of parameters in.
 //!
 //! Here live what a played scenario holds ([`Concrete`]), its two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
-//! 1.7), and the readers of such a scenario and of `ParameterValueDistribution` files. Here lives nothing about how lanes are chosen or run.
-//! Traces come from [`crate::engine`]; what is read goes to [`crate::run::grid`] and [`crate::engine`].
+//! 1.7), how lanes become one, and the readers of such a scenario and of `ParameterValueDistribution` files. Lanes come
+//! from [`crate::run::reopen`]; what is read goes to [`crate::run::grid`] and [`crate::engine`].
 
 mod concrete;
 mod distribution;
 mod distribution_file;
 mod elements;
 mod folder;
+mod lanes;
 mod parameters;
 mod path;
 mod road;
+mod sampled_file;
 mod samples;
 mod scenario_file;
 mod scenario_reader;
@@ -26,9 +28,11 @@ pub use distribution_file::{
     Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
 };
 pub use folder::{IndexRow, export_folder};
+pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename};
 pub use path::{Vertex, paths};
 pub use road::{Road, road_file};
+pub use sampled_file::{SampledFile, reopen};
 pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
 pub use scenario_file::scenario_file;
 pub use scenario_reader::read_scenario;

@@ -22,7 +22,8 @@ use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{DataFacts, Fitted};
+use crate::stats::density::Fitted;
+use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// Profile whose recall stands beside that of the chosen one.
@@ -128,7 +129,7 @@ pub struct Dossier {
 /// cannot have; of the lanes.
 pub fn justify(
     scenarios: &[Scenario],
-    facts: &DataFacts,
+    facts: &DataProvenance,
     profile: &Profile,
     options: &JustifyOptions,
     executor: &Executor,

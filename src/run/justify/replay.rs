@@ -7,7 +7,7 @@ use crate::model::profile::Profile;
 use crate::run::compare::Compare;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::DataFacts;
+use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// The lanes of one model, with every verdict kept: which failures are hidden is a question of single lanes.
@@ -25,7 +25,7 @@ impl<'a> Replay<'a> {
     /// As [`Compare::plan`] and [`Executor::sweep`].
     pub fn run(
         scenarios: &'a [Scenario],
-        facts: &'a DataFacts,
+        facts: &'a DataProvenance,
         profile: &Profile,
         options: &JustifyOptions,
         executor: &Executor,

@@ -52,4 +52,5 @@ pub use sample_options::{Estimator, SampleOptions};
 pub use sample_result::{Levels, SampleResult};
 pub use sample_run::{EachChunk, SampleRun};
 pub use tally::{SampleTally, TallyOptions, WorstSample};
+pub(crate) use watch::marks_of;
 pub use weighted_tally::WeightedTally;

@@ -62,8 +62,8 @@ impl Risk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::density::Driven;
     use crate::stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
+    use crate::traffic::Driven;
 
     #[test]
     fn risk_without_failures_is_bounded_and_not_zero() {

@@ -25,14 +25,15 @@ use crate::{Error, Place, Result};
 /// use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 /// # use lanesweep::scenario::Category;
 /// # use lanesweep::scenario::parameterization::Parameterization;
-/// # use lanesweep::stats::density::{DataFacts, DensityModel, FitOptions};
+/// # use lanesweep::stats::density::{DensityModel, FitOptions};
+/// # use lanesweep::traffic::DataProvenance;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 ///
 /// # fn main() -> lanesweep::Result<()> {
 /// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
 /// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
-/// # let facts = DataFacts { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+/// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
 /// # let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
 /// # let id = Parameterization::find(Category::CutIn, "2").unwrap();
 /// # let density = DensityModel::fit(id, &scenarios, &facts, &options)?.model;

@@ -6,7 +6,7 @@ use super::limit_state::MAX_BTN;
 use super::tally::{SampleTally, TallyOptions};
 use crate::engine::{LanePlan, Marks, Wanted, Watch};
 use crate::model::criterion::Criterion;
-use crate::model::driver::MODELS;
+use crate::model::profile::Profile;
 
 /// The first samples are valued whole.
 const FIRST_SAMPLES: u64 = 4096;
@@ -26,38 +26,39 @@ pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
 /// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
 pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions) -> Wanted {
-    let mut marks = [Marks::Nothing; MODELS];
-    let mut share = 0.0;
+    let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
+    let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;
     for (at, model) in plan.models.iter().enumerate() {
-        let Some((of_model, marked)) = marks_of(plan, tally, options, at) else { return Wanted::Outcomes };
-        marks[model.index()] = of_model;
-        share += marked / plan.models.len() as f64;
+        let last = tally.worst[at].get(options.worst - 1);
+        let marks = last.and_then(|last| marks_of(&plan.profile, options.criterion, last.value));
+        let Some((of_model, failures_of)) = marks else { return Wanted::Outcomes };
+        watch.0[model.index()] = of_model;
+        if let Some(criterion) = failures_of {
+            let cells = tally.failures.chunks(Criterion::ALL.len()).skip(at).step_by(plan.models.len());
+            let failures: u64 = cells.map(|cell| cell[criterion.index()]).sum();
+            marked += failures as f64 / lanes_per_model / plan.models.len() as f64;
+        }
     }
-    if share * MARKED_ONE_IN > 1.0 { Wanted::Outcomes } else { Wanted::Watched(Watch(marks)) }
+    if marked * MARKED_ONE_IN > 1.0 { Wanted::Outcomes } else { Wanted::Watched(watch) }
 }
 
-/// The marks of one model, and the share of its lanes that have them, apart from the few that enter a list. `None`
-/// where every lane's value is needed.
-fn marks_of(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions, model: usize) -> Option<(Marks, f64)> {
-    let last = tally.worst[model].get(options.worst - 1)?.value;
-    let criteria = &plan.profile.criteria;
-    let share = |criterion: Criterion| {
-        let cells = tally.failures.chunks(Criterion::ALL.len()).skip(model).step_by(plan.models.len());
-        let failures: u64 = cells.map(|cell| cell[criterion.index()]).sum();
-        failures as f64 / (tally.valid() * plan.headways.len() as u64).max(1) as f64
-    };
+/// The marks of lanes with a smaller [limit state](super::limit_state()) than the last of a list, and the criterion whose
+/// failures all have them, where one's do; the few that enter the list have them in any case. `None` where every lane's
+/// value is needed.
+pub(crate) fn marks_of(profile: &Profile, criterion: Criterion, last: f64) -> Option<(Marks, Option<Criterion>)> {
+    let criteria = &profile.criteria;
     let below = |ttc_s: f64| {
         let is_rare = ttc_s > criteria.ttc_threshold_s;
-        (Marks::TtcBelow(ttc_s.max(criteria.ttc_threshold_s)), if is_rare { 0.0 } else { share(Criterion::Ttc) })
+        (Marks::TtcBelow(ttc_s.max(criteria.ttc_threshold_s)), (!is_rare).then_some(Criterion::Ttc))
     };
-    match options.criterion {
-        Criterion::Collision if last <= 0.0 => Some((Marks::Contacts(-last), 0.0)),
+    match criterion {
+        Criterion::Collision if last <= 0.0 => Some((Marks::Contacts(-last), None)),
         Criterion::Collision => Some(below(last)),
         // No value is smaller, and of equal ones the first lane is worse.
-        Criterion::Ttc if last <= -criteria.ttc_threshold_s => Some((Marks::Nothing, 0.0)),
-        Criterion::Btn if last <= criteria.btn_threshold - MAX_BTN => Some((Marks::Nothing, 0.0)),
+        Criterion::Ttc if last <= -criteria.ttc_threshold_s => Some((Marks::Nothing, None)),
+        Criterion::Btn if last <= criteria.btn_threshold - MAX_BTN => Some((Marks::Nothing, None)),
         Criterion::Ttc => Some(below(last + criteria.ttc_threshold_s)),
-        Criterion::Btn if last <= 0.0 => Some((Marks::BtnFailures, share(Criterion::Btn))),
+        Criterion::Btn if last <= 0.0 => Some((Marks::BtnFailures, Some(Criterion::Btn))),
         Criterion::Btn => None,
     }
 }

@@ -6,43 +6,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Gamma};
 
-use crate::traffic::mining::Collection;
-use crate::{Error, Place, Result};
-
-/// Driving time and distance in which scenarios were looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Driven {
-    /// Hours, > 0.
-    pub hours: Option<f64>,
-    /// Kilometres, > 0.
-    pub kilometres: Option<f64>,
-}
-
-impl Driven {
-    /// Over all ego data sets of the recordings that were used; `None` for scenarios without recordings.
-    pub fn of(collection: &Collection) -> Option<Driven> {
-        let hours = collection.recordings.iter().map(|r| r.driven_s).sum::<f64>() / 3600.0;
-        let kilometres = collection.recordings.iter().map(|r| r.driven_m).sum::<f64>() / 1000.0;
-        let positive = |v: f64| (v > 0.0).then_some(v);
-        let driven = Driven { hours: positive(hours), kilometres: positive(kilometres) };
-        (driven.hours.is_some() || driven.kilometres.is_some()).then_some(driven)
-    }
-
-    /// Checks the ranges.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] naming the option of a number that is not above 0 and finite.
-    pub fn validate(&self) -> Result<()> {
-        for (option, value) in [("hours", self.hours), ("km", self.kilometres)] {
-            if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-                let problem = format!("{value} cannot be driven");
-                return Err(Error::usage(Place::option(option), problem, "give a number above 0"));
-            }
-        }
-        Ok(())
-    }
-}
+use crate::traffic::Driven;
 
 /// λ̂ = events per unit, with intervals of 95 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

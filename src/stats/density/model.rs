@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bandwidth::BandwidthRule;
-use super::exposure::{Driven, Exposure};
+use super::exposure::Exposure;
 use super::kde::Kde;
 use super::mixture::Mixture;
 use super::parameters::ParameterSpace;
@@ -12,6 +12,7 @@ use super::representativeness::Representativeness;
 use super::valid::{VALID_SHARE_DRAWS, ValidShare};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
+use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// Where a density comes from.
@@ -64,19 +65,6 @@ impl Default for FitOptions {
     }
 }
 
-/// What is known of the data as a whole.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DataFacts {
-    /// The data in one line.
-    pub data: String,
-    /// Made by the program.
-    pub synthetic: bool,
-    /// SHA-256 of the scenario file.
-    pub scenarios_sha256: String,
-    /// Time and distance driven, where they are known.
-    pub driven: Option<Driven>,
-}
-
 /// A fitted density.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DensityModel {
@@ -117,7 +105,7 @@ impl DensityModel {
     pub fn fit(
         id: Parameterization,
         scenarios: &[Scenario],
-        facts: &DataFacts,
+        facts: &DataProvenance,
         options: &FitOptions,
     ) -> Result<Fitted> {
         let of_category = || scenarios.iter().filter(|s| s.category == id.category);

@@ -17,7 +17,8 @@ use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
-use lanesweep::stats::density::{DensityModel, Exposure, ExposureFile, read_density};
+use lanesweep::stats::density::{DensityModel, Exposure, read_density};
+use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::{Error, Place, Result};
 use serde_json::value::RawValue;
@@ -129,8 +130,8 @@ fn scenario_table(name: &str, bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bo
 
 fn exposure(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     file(bytes, dir, "s.exposure.json");
-    if let Some(read) = ExposureFile::read_beside(&dir.join("s.jsonl"), "00")? {
-        Exposure::new(3, read.driven);
+    if let Some(read) = DataProvenance::read_beside(&dir.join("s.jsonl"), "00")? {
+        Exposure::new(3, read.driven.unwrap());
     }
     Ok(())
 }

@@ -11,11 +11,12 @@ use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
-use lanesweep::stats::density::{DataFacts, DensityModel, Driven, ExposureFile, FitOptions, write_density};
+use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
 use lanesweep::stats::estimate::{BlockSums, WeightSums};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use lanesweep::traffic::{DataProvenance, Driven};
 
 use super::plans;
 use super::readers::{CRITERION, PART_UNITS, WEIGHTED_UNITS, small_plan};
@@ -125,7 +126,7 @@ impl Seeds {
         let few: Vec<Scenario> = Category::ALL.into_iter().flat_map(|c| first_of(&mined, c, 2)).collect();
         let profile = Profile::load("paper").unwrap();
         let fit = |category, key, n| {
-            let facts = DataFacts {
+            let facts = DataProvenance {
                 data: "synthetic".to_owned(),
                 synthetic: true,
                 scenarios_sha256: String::new(),
@@ -173,9 +174,9 @@ impl Seeds {
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
         let partial = Partial::from_chunk_keeping(&study, &plans::chunk(&study, 1..3, &lane, true), 20).unwrap();
-        let driven = Driven { hours: Some(1.5), kilometres: Some(90.0) };
+        let driven = Some(Driven { hours: Some(1.5), kilometres: Some(90.0) });
         let exposure =
-            ExposureFile { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
+            DataProvenance { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
         let texts = small::Texts::small();
         let golden = |name: &str| {
             std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)).unwrap()

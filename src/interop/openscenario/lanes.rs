@@ -1,0 +1,282 @@
+//! Lanes become concrete scenarios: run again in their own arithmetic, with the sizes, paths and numbers of their case.
+
+use super::{Concrete, EgoMotion, PlayedVehicle, paths, sizes_of_case};
+use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
+use crate::model::criterion::Criterion;
+use crate::model::driver::NEVER;
+use crate::model::profile::{CutOutTarget, Profile};
+use crate::model::scalar::Real;
+use crate::run::reopen::{Reopened, TracedCase};
+use crate::scenario::parameterization::{Sizes, VehicleSize};
+use crate::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
+use crate::{Error, Place, Result};
+
+/// How lanes are written.
+#[derive(Debug, Clone, Copy)]
+pub struct PlayOptions {
+    /// Who drives the ego.
+    pub ego: EgoMotion,
+    /// End of a scenario whose ego is the user's, s.
+    pub duration_s: Option<f64>,
+    /// Side of the others in place of the scenario's.
+    pub side: Option<Side>,
+    /// Width of the road's lanes in place of the scenario's, m.
+    pub lane_width_m: Option<f64>,
+}
+
+/// Width of a lane where nothing tells it, m.
+const LANE_WIDTH_M: f64 = 3.5;
+
+/// How long a scenario continues after the last event where the ego is the user's, s.
+const AFTERWARDS_S: f64 = 10.0;
+
+/// What is known of a lane beside its case.
+struct LaneFacts<'a> {
+    key: String,
+    profile: &'a Profile,
+    sizes: Option<Sizes>,
+    scenario: Option<&'a Scenario>,
+    data: &'a str,
+    arithmetic: &'static str,
+    is_synthetic: bool,
+    /// Parameters of a sampled point.
+    drawn: Vec<(String, f64)>,
+}
+
+/// These lanes; `scenarios` tell sizes, side and lane width. Also whether the lengths of all vehicles are known.
+///
+/// # Errors
+/// [`Error::Input`] for a lane that cannot be played, and for scenarios that are not the run's.
+pub fn concrete_lanes(
+    reopened: &Reopened,
+    keys: &[LaneKey],
+    scenarios: &[Scenario],
+    options: &PlayOptions,
+) -> Result<(Vec<Concrete>, bool)> {
+    reopened.with_cases(keys, |plan| match reopened.is_reference {
+        true => lanes::<f64>(plan, keys, reopened, scenarios, options),
+        false => lanes::<f32>(plan, keys, reopened, scenarios, options),
+    })
+}
+
+/// One case with each of its models, in f64.
+///
+/// # Errors
+/// As [`concrete_lanes`].
+pub fn concrete_case(traced: &TracedCase, profile: &Profile, options: &PlayOptions) -> Result<Vec<Concrete>> {
+    let one = |trace: &Trace| {
+        let facts = LaneFacts {
+            key: format!("{}/{}/{}", trace.category.key(), traced.headway, trace.model.name()),
+            profile,
+            sizes: Some(traced.sizes),
+            scenario: None,
+            data: "a case of flags",
+            arithmetic: "binary64",
+            is_synthetic: false,
+            drawn: Vec::new(),
+        };
+        concrete(trace, (&traced.case, &traced.tables), &traced.case, &facts, options)
+    };
+    traced.traces.iter().map(one).collect()
+}
+
+fn lanes<R: Real>(
+    plan: &LanePlan,
+    keys: &[LaneKey],
+    reopened: &Reopened,
+    scenarios: &[Scenario],
+    options: &PlayOptions,
+) -> Result<(Vec<Concrete>, bool)> {
+    let runner = LaneRunner::<R>::new(plan);
+    let is_synthetic = reopened.is_synthetic || scenarios.iter().any(|scenario| scenario.synthetic);
+    let (mut found, mut are_lengths_known) = (Vec::new(), true);
+    for key in keys {
+        let (case, tables) = runner.case(key.block, key.unit, key.variant);
+        let id = plan.blocks[key.block].units.name(key.unit);
+        let scenario = scenarios.iter().find(|s| s.id == id);
+        let drawn = match (plan.generator(), reopened.density()) {
+            (Some(generator), Some(density)) => {
+                let values = generator.draw(key.unit).values;
+                let shortest = |v: &f32| v.to_string().parse::<f64>().unwrap_or(f64::from(*v));
+                let names = density.space.parameters().iter().map(|p| p.name.clone());
+                names.zip(values.iter().map(shortest)).collect()
+            }
+            _ => Vec::new(),
+        };
+        let wide = match plan.generator() {
+            Some(_) => widened(&case),
+            None => plan.case(key.block, key.unit, key.variant),
+        };
+        let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
+        let alike = || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size) };
+        let told = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
+        let sizes = told.or_else(|| reopened.has_one_size().then(alike));
+        are_lengths_known &= sizes.is_some();
+        let facts = LaneFacts {
+            key: plan.key_text(key),
+            profile: &plan.profile,
+            sizes,
+            scenario,
+            data: &reopened.data,
+            arithmetic: if reopened.is_reference { "binary64" } else { "binary32" },
+            is_synthetic,
+            drawn,
+        };
+        found.push(concrete(&runner.trace(key), (&case, &tables), &wide, &facts, options)?);
+    }
+    Ok((found, are_lengths_known))
+}
+
+/// The same numbers in f64.
+fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
+    LaneCase {
+        others: case.others.map(|o| LaneOther {
+            motion: Motion::resting(),
+            half_lengths: o.half_lengths.to_f64(),
+            half_widths: o.half_widths.to_f64(),
+            gap_offset: o.gap_offset.to_f64(),
+            present_from: o.present_from,
+            present_until: o.present_until,
+            attend_from: o.attend_from,
+            used: o.used,
+            judged: o.judged,
+        }),
+        ego_speed: case.ego_speed.to_f64(),
+        ego_width: case.ego_width.to_f64(),
+        horizon: case.horizon,
+        pair: case.pair,
+    }
+}
+
+fn concrete<R: Real>(
+    trace: &Trace,
+    (case, tables): (&LaneCase<R>, &Tables<R>),
+    wide: &LaneCase<f64>,
+    facts: &LaneFacts,
+    options: &PlayOptions,
+) -> Result<Concrete> {
+    let profile = facts.profile;
+    let from = case.others[0].present_from;
+    let is_exposed = trace.category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed;
+    if is_exposed && from != NEVER {
+        let problem = "the cutting-out vehicle hits the one ahead, whose position the lane has only after that";
+        let help = "use a profile that judges every vehicle of a cut-out, such as paper";
+        return Err(Error::input(Place::item(format!("lane {}", facts.key)), problem, help));
+    }
+    let sizes = sizes_of_case(&facts.key, wide, facts.sizes.as_ref(), profile.frame.default_length_m)?;
+    let last_traced = trace.steps.last().map_or(0, |s| s.step);
+    let last = match options.ego {
+        EgoMotion::Model => last_traced,
+        EgoMotion::External => {
+            let steps = |seconds: f64| (seconds / trace.dt_s - 1e-9).ceil().max(0.0) as u32;
+            let otherwise = || last_traced.max(case.horizon.min(profile.step_cap())) + steps(AFTERWARDS_S);
+            options.duration_s.map_or_else(otherwise, steps)
+        }
+    };
+    // A trajectory has two vertices at least.
+    let mut all = paths(trace, case, tables, last.max(1)).into_iter();
+    let mut vehicle = |name, size: VehicleSize| PlayedVehicle {
+        name,
+        length_m: size.length_m,
+        width_m: size.width_m,
+        path: all.next().unwrap_or_default(),
+    };
+    let mut vehicles = vec![vehicle("Ego", sizes.sizes.ego), vehicle("Other", sizes.sizes.target)];
+    if let Some(lead) = sizes.sizes.lead.filter(|_| trace.vehicles == 2) {
+        vehicles.push(vehicle("Ahead", lead));
+    }
+    let scenario = facts.scenario;
+    Ok(Concrete {
+        key: facts.key.clone(),
+        category: trace.category,
+        ego: options.ego,
+        side: options.side.or(scenario.map(|s| s.side)).unwrap_or(Side::Left),
+        lane_width_m: options.lane_width_m.or(scenario.map(|s| s.lane_width)).unwrap_or(LANE_WIDTH_M).clamp(1.0, 20.0),
+        vehicles,
+        parameters: parameters(trace, wide, facts),
+        properties: properties(trace, facts, options, sizes.are_lengths_known),
+        is_synthetic: facts.is_synthetic,
+    })
+}
+
+/// The case's numbers by name; those of a sampled point as its density names them.
+fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(String, f64)> {
+    // A product with the time step is a decimal again where that is the same product; else every digit counts.
+    let decimal = |value: f64| {
+        let short = (value * 1e9).round() / 1e9;
+        if short * trace.dt_s == value * trace.dt_s { short } else { value }
+    };
+    let first = &trace.steps[0];
+    let mut list = vec![
+        ("ego_speed_mps", decimal(first.v_ego_mps)),
+        ("other_speed_mps", decimal(first.others[0].v_mps)),
+        ("gap_m", decimal(trace.initial_gap_m)),
+    ];
+    let motion = &case.others[0].motion;
+    if facts.drawn.is_empty() {
+        if motion.kind & SPEED_SAMPLED == 0 && motion.speed_per_step != 0.0 {
+            list.push(("other_acceleration_mps2", decimal(motion.speed_per_step / trace.dt_s)));
+            list.push(("end_speed_mps", decimal(motion.speed_end)));
+        }
+        if motion.kind & LATERAL_SAMPLED == 0 && motion.lateral_per_step != 0.0 {
+            list.push(("lateral_speed_mps", decimal(motion.lateral_per_step.abs() / trace.dt_s)));
+            list.push(("lateral_distance_m", decimal((motion.lateral_end - motion.lateral_initial).abs())));
+        }
+    }
+    if trace.vehicles == 2 {
+        list.push(("ahead_speed_mps", decimal(first.others[1].v_mps)));
+    }
+    let mut list: Vec<(String, f64)> = list.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    let drawn = facts.drawn.iter().filter(|(_, value)| value.is_finite());
+    list.extend(drawn.map(|(name, value)| (format!("sampled_{name}"), *value)));
+    list
+}
+
+/// What the lane is and how it ended. Times in s; what did not happen is empty.
+fn properties(
+    trace: &Trace,
+    facts: &LaneFacts,
+    options: &PlayOptions,
+    are_lengths_known: bool,
+) -> Vec<(String, String)> {
+    let outcome = &trace.outcome;
+    let time = |step: u32| if step == NO_STEP { String::new() } else { trace.time_s(step).to_string() };
+    let value = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
+    let at_contact = |v: f64| if outcome.contact_step == NO_STEP { String::new() } else { value(v) };
+    let verdict = |c: Criterion| if outcome.verdicts.failed(c) { "fail" } else { "pass" }.to_owned();
+    let end = match outcome.end {
+        EndReason::Contact => "contact",
+        EndReason::Settled => "settled",
+        EndReason::Standstill => "standstill",
+        EndReason::Cap => "time cap",
+        EndReason::Aborted => "aborted",
+    };
+    let ego = match options.ego {
+        EgoMotion::Model => "model",
+        EgoMotion::External => "external",
+    };
+    let list = [
+        ("lane", facts.key.clone()),
+        ("model", trace.model.name().to_owned()),
+        ("profile", facts.profile.name.clone()),
+        ("dt_s", trace.dt_s.to_string()),
+        ("arithmetic", facts.arithmetic.to_owned()),
+        ("data", facts.data.to_owned()),
+        ("ego", ego.to_owned()),
+        ("lengths", if are_lengths_known { "known" } else { "sums" }.to_owned()),
+        ("initial_gap_m", value(trace.initial_gap_m)),
+        ("collision", verdict(Criterion::Collision)),
+        ("ttc", verdict(Criterion::Ttc)),
+        ("btn", verdict(Criterion::Btn)),
+        ("min_ttc_s", value(outcome.min_ttc)),
+        ("max_btn", value(outcome.max_btn)),
+        ("min_gap_m", value(outcome.min_gap)),
+        ("reaction_s", time(outcome.reaction_step)),
+        ("contact_s", time(outcome.contact_step)),
+        ("impact_speed_mps", at_contact(outcome.impact_speed)),
+        ("impact_closing_speed_mps", at_contact(outcome.impact_closing_speed)),
+        ("end_s", time(outcome.end_step)),
+        ("end", end.to_owned()),
+    ];
+    list.into_iter().map(|(name, value)| (format!("lanesweep.{name}"), value)).collect()
+}

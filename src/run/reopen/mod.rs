@@ -1,0 +1,245 @@
+//! Lanes run again, one by one: of a finished study or sampling run by its folder, or of a scenario file.
+//!
+//! Every kind becomes a [`Reopened`], with its own arithmetic and what is known of its data. Its lanes are bit for bit
+//! those of the run.
+
+mod record;
+mod traced;
+mod worst;
+
+use std::path::Path;
+
+pub use record::SampleRecord;
+pub use traced::{TracedCase, TracedLane};
+pub use worst::WorstOptions;
+
+use crate::engine::{Headway, LaneKey, LanePlan};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::run::parts::{PLAN_FILE, kind_of};
+use crate::run::sampling::crude_plan::{self, CrudePlan};
+use crate::run::study::{Study, StudyOptions, plan_study};
+use crate::scenario::Scenario;
+use crate::stats::density::DensityModel;
+use crate::support::files::check_folder;
+use crate::support::repeats::refuse_repeats;
+use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
+use crate::{Error, Place, Result};
+
+/// Lanes that can be run again.
+pub struct Reopened {
+    lanes: Lanes,
+    /// What the lanes are of.
+    pub data: String,
+    /// The program generated the data, in whole or in part.
+    pub is_synthetic: bool,
+    /// The lanes are run in f64.
+    pub is_reference: bool,
+}
+
+/// Where the lanes come from. The cases of a study are made when they are needed.
+enum Lanes {
+    Study(Box<Study>),
+    Sample(Box<LanePlan>, Box<DensityModel>),
+    Distribution(Box<LanePlan>),
+    Scenarios(Box<LanePlan>),
+}
+
+/// The file of a sampling run of somebody's distributions: from it and the record its plan is made again.
+pub const DISTRIBUTION_FILE: &str = "distribution.json";
+
+impl Reopened {
+    /// The run of a folder. Where it holds a study's results and a sampling run's, the key tells: samples are numbered.
+    /// `of_distribution` plans a run with a [`DISTRIBUTION_FILE`] and says what it is of.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for a folder without a run's plan, or with another's.
+    pub fn run(
+        dir: &Path,
+        key: &str,
+        of_distribution: impl FnOnce(&Path, &SampleRecord) -> Result<(LanePlan, String)>,
+    ) -> Result<Reopened> {
+        check_folder(dir)?;
+        let has = |name: &str| dir.join(name).exists();
+        if has(STUDY_RECORD) && !(has(ESTIMATE_RECORD) && key.starts_with('#')) {
+            return Ok(Reopened::study(record::study_of(dir)?));
+        }
+        if has(ESTIMATE_RECORD) {
+            let record = SampleRecord::read(dir)?;
+            if !has(DISTRIBUTION_FILE) {
+                let (plan, density) = record.plan(dir)?;
+                return Ok(Reopened::sample(plan, density));
+            }
+            let (plan, data) = of_distribution(dir, &record)?;
+            let lanes = Lanes::Distribution(Box::new(plan));
+            return Ok(Reopened { lanes, data, is_synthetic: false, is_reference: false });
+        }
+        let plan = dir.join(PLAN_FILE);
+        if !plan.exists() {
+            let help = "give the folder (option `out`) of a `lanesweep study` or `lanesweep sample`";
+            return Err(Error::input(Place::file(dir), "there is no run here", help));
+        }
+        match kind_of(&plan)?.as_str() {
+            crude_plan::KIND => {
+                let CrudePlan { plan, density, .. } = CrudePlan::read(&plan)?.0;
+                Ok(Reopened::sample(plan, density))
+            }
+            // Its reader refuses every other kind.
+            _ => Ok(Reopened::study(Study::read(&plan, None)?)),
+        }
+    }
+
+    fn study(study: Study) -> Reopened {
+        let facts = study.facts();
+        let (data, is_synthetic, is_reference) = (facts.data.clone(), facts.synthetic, facts.reference);
+        Reopened { lanes: Lanes::Study(Box::new(study)), data, is_synthetic, is_reference }
+    }
+
+    fn sample(plan: LanePlan, density: DensityModel) -> Reopened {
+        let (data, is_synthetic) = (density.provenance.data.clone(), density.provenance.synthetic);
+        Reopened { lanes: Lanes::Sample(Box::new(plan), Box::new(density)), data, is_synthetic, is_reference: false }
+    }
+
+    /// The lanes of these keys of scenarios, in f64: a scenario that the filters dropped too, and any headway.
+    ///
+    /// # Errors
+    /// As [`plan_study`].
+    pub fn scenarios(scenarios: &mut [Scenario], keys: &[String], profile: &Profile, data: String) -> Result<Reopened> {
+        let (mut options, mut headways) = (StudyOptions::default(), Vec::new());
+        for key in keys {
+            let id = key.rsplitn(4, '/').last().unwrap_or(key);
+            if let Some(wanted) = scenarios.iter_mut().find(|s| s.id == id) {
+                wanted.kept = true;
+            }
+            if let Some(headway) = key.rsplit('/').nth(1).and_then(Headway::parse)
+                && !headways.contains(&headway)
+            {
+                headways.push(headway);
+            }
+        }
+        if !headways.is_empty() {
+            options.headways = headways;
+        }
+        let lanes = Lanes::Scenarios(Box::new(plan_study(scenarios, profile, &options)?.plan));
+        let is_synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
+        Ok(Reopened { lanes, data, is_synthetic, is_reference: true })
+    }
+
+    /// The plan; that of a study is without cases.
+    pub fn plan(&self) -> &LanePlan {
+        match &self.lanes {
+            Lanes::Study(study) => study.plan(),
+            Lanes::Sample(plan, _) | Lanes::Distribution(plan) | Lanes::Scenarios(plan) => plan,
+        }
+    }
+
+    /// The density of a sampling run.
+    pub fn density(&self) -> Option<&DensityModel> {
+        match &self.lanes {
+            Lanes::Sample(_, density) => Some(density),
+            _ => None,
+        }
+    }
+
+    /// The study, of one.
+    pub fn as_study(&self) -> Option<&Study> {
+        match &self.lanes {
+            Lanes::Study(study) => Some(study),
+            _ => None,
+        }
+    }
+
+    /// Every vehicle has the same size.
+    pub fn has_one_size(&self) -> bool {
+        matches!(self.lanes, Lanes::Distribution(_))
+    }
+
+    /// Gives the plan with the cases of these lanes.
+    ///
+    /// # Errors
+    /// Of `work`, and as [`StudyCases::window`](crate::run::study::StudyCases::window).
+    pub fn with_cases<T>(&self, keys: &[LaneKey], work: impl FnOnce(&LanePlan) -> Result<T>) -> Result<T> {
+        let Some(study) = self.as_study() else { return work(self.plan()) };
+        let units = keys.iter().map(|key| study.plan().blocks[key.block].first_unit + key.unit);
+        let span = units.clone().min().unwrap_or(0)..units.max().map_or(0, |last| last + 1);
+        work(&study.cases().window(span)?)
+    }
+
+    /// The lanes of these keys, or those of other models in their place.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a lane that is not there, is void or is named twice, and for a model that is not there.
+    pub fn named(&self, keys: &[String], models: Option<&[ModelId]>) -> Result<Vec<LaneKey>> {
+        let mut found = Vec::new();
+        for text in keys {
+            let key = self.find(text)?;
+            match models {
+                None => found.push(key),
+                Some(models) => {
+                    for id in models {
+                        found.push(LaneKey { model: self.model(*id)?, ..key });
+                    }
+                }
+            }
+        }
+        refuse_repeats(|| Place::option("lane"), found.iter().map(|key| (*key, self.plan().key_text(key))))?;
+        Ok(found)
+    }
+
+    /// The lane of a key.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a lane that is not there, and for a void sample, which has no case.
+    pub fn find(&self, text: &str) -> Result<LaneKey> {
+        let plan = self.plan();
+        let key = plan.parse_key(text).ok_or_else(|| {
+            let why = wrong_part(plan, text);
+            let example = plan.key(0).map_or(String::new(), |key| format!(", for instance {}", plan.key_text(&key)));
+            Error::usage(
+                Place::option("lane"),
+                format!("there is no lane `{text}`: {why}"),
+                format!("a key is scenario/variant/headway/model, as errors and tables print it{example}"),
+            )
+        })?;
+        if plan.generator().is_some_and(|generator| generator.draw(key.unit).is_void()) {
+            let help = "none of its draws was valid: use another sample";
+            return Err(Error::usage(Place::option("lane"), "this sample is void", help));
+        }
+        Ok(key)
+    }
+
+    /// Index of a model.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a model that is not there.
+    pub fn model(&self, id: ModelId) -> Result<usize> {
+        let models = &self.plan().models;
+        models.iter().position(|m| *m == id).ok_or_else(|| {
+            let names: Vec<&str> = models.iter().map(|m| m.name()).collect();
+            let problem = format!("{} is not a model of this run", id.name());
+            Error::usage(Place::option("models"), problem, format!("use {}", names.join(", ")))
+        })
+    }
+}
+
+/// What of a key is in no lane of the plan.
+fn wrong_part(plan: &LanePlan, key: &str) -> String {
+    let parts: Vec<&str> = key.rsplitn(4, '/').collect();
+    let [model, headway, variant, scenario] = parts[..] else {
+        return format!("it has {} of four parts", parts.len());
+    };
+    let models: Vec<&str> = plan.models.iter().map(|model| model.name()).collect();
+    if !ModelId::parse(model).is_some_and(|model| plan.models.contains(&model)) {
+        return format!("no model `{model}` in this run ({})", models.join(", "));
+    }
+    let headways: Vec<String> = plan.headways.iter().map(ToString::to_string).collect();
+    let is_there = headways.iter().any(|h| h == headway)
+        || Headway::parse(headway).is_some_and(|headway| plan.headways.contains(&headway));
+    if !is_there {
+        return format!("no headway `{headway}` in this run ({})", headways.join(", "));
+    }
+    match plan.blocks.iter().find(|block| block.units.find(scenario).is_some()) {
+        None => format!("no scenario `{scenario}` in this run"),
+        Some(block) => format!("no variant `{variant}` of this scenario ({})", block.variants.join(", ")),
+    }
+}

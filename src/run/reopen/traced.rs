@@ -1,0 +1,138 @@
+//! Lanes with every step: a reopened one beside other variants and models of its scenario, or those of one case.
+
+use super::Reopened;
+use crate::engine::{Headway, LaneCase, LaneKey, LanePlan, LaneRunner, Outcome, Trace, check_time_step};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::model::scalar::Real;
+use crate::scenario::parameterization::{Sizes, VehicleSize};
+use crate::scenario::{Case, Tables};
+use crate::support::repeats::refuse_repeats;
+use crate::{Error, Place, Result};
+
+/// A lane with every step.
+pub struct TracedLane {
+    /// The lane's key; without one what tells it from the others.
+    pub key: String,
+    /// Name on a sheet with others.
+    pub name: String,
+    /// The steps.
+    pub trace: Trace,
+    /// The same lane in f64, where the trace is in the lane arithmetic.
+    pub reference: Option<Outcome<f64>>,
+}
+
+/// One concrete case with every step of each model, in f64.
+pub struct TracedCase {
+    /// The case as lanes have it.
+    pub case: LaneCase<f64>,
+    /// The series that it points into.
+    pub tables: Tables<f64>,
+    /// Where the ego starts.
+    pub headway: Headway,
+    /// Sizes of its vehicles.
+    pub sizes: Sizes,
+    /// One per model.
+    pub traces: Vec<Trace>,
+}
+
+impl TracedCase {
+    /// Runs a case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a time step that is too long for a model or the case.
+    pub fn run(case: &Case, headway: Headway, profile: &Profile, models: &[ModelId]) -> Result<TracedCase> {
+        let size = |length_m, width_m| VehicleSize { length_m, width_m };
+        let sizes = Sizes {
+            ego: size(case.ego_length_m, case.ego_width_m),
+            target: size(case.principal.length_m, case.principal.width_m),
+            lead: case.ahead.as_ref().map(|a| size(a.vehicle.length_m, a.vehicle.width_m)),
+        };
+        let (category, mut tables) = (case.category, Tables::default());
+        let case = LaneCase::encode(case, profile, &mut tables);
+        profile.check_time_step(models)?;
+        check_time_step(&case, &tables, profile.frame.dt_s, || Place::item("the case"))?;
+        let trace = |model: &ModelId| Trace::record(profile, category, &case, &tables, headway, *model);
+        let traces = models.iter().map(trace).collect();
+        Ok(TracedCase { case, tables, headway, sizes, traces })
+    }
+}
+
+impl Reopened {
+    /// Runs a lane and those beside it: the variants `compare` (S, keys of parameterizations, or `all`) before its own, and
+    /// of each the models, where some are given in place of the key's own.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a lane, variant or model that is not there.
+    pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<Vec<TracedLane>> {
+        let key = self.find(key)?;
+        let variants = variants(self.plan(), &key, compare)?;
+        let models = match models {
+            None => vec![key.model],
+            Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<_>>()?,
+        };
+        self.with_cases(&[key], |plan| {
+            Ok(if self.is_reference {
+                traced::<f64>(plan, key, &variants, &models, None)
+            } else {
+                traced::<f32>(plan, key, &variants, &models, Some(LaneRunner::new(plan)))
+            })
+        })
+    }
+}
+
+fn traced<R: Real>(
+    plan: &LanePlan,
+    key: LaneKey,
+    variants: &[usize],
+    models: &[usize],
+    reference: Option<LaneRunner<'_, f64>>,
+) -> Vec<TracedLane> {
+    let runner = LaneRunner::<R>::new(plan);
+    let mut all = Vec::new();
+    for &variant in variants {
+        for &model in models {
+            let key = LaneKey { variant, model, ..key };
+            let (of, by) = (&plan.blocks[key.block].variants[variant], plan.models[model].name());
+            let name = match (variants.len() > 1, models.len() > 1) {
+                (true, true) => format!("{of}, {by}"),
+                (true, false) => of.clone(),
+                _ => by.to_owned(),
+            };
+            let reference = reference.as_ref().map(|runner| runner.run(&key));
+            all.push(TracedLane { key: plan.key_text(&key), name, trace: runner.trace(&key), reference });
+        }
+    }
+    all
+}
+
+/// Those to compare with, in the plan's order of variants, then the lane's own.
+fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
+    let names = &plan.blocks[key.block].variants;
+    let mut variants = Vec::new();
+    refuse_repeats(|| Place::option("compare"), compare.iter().map(|name| (name.trim(), name.trim())))?;
+    for name in compare.iter().map(|name| name.trim()) {
+        match names.iter().position(|n| n == name) {
+            Some(at) => variants.push(at),
+            None if name == "all" => variants.extend(0..names.len()),
+            None => {
+                let problem = format!("this lane's scenario has no variant `{name}`");
+                let help = format!("use {} or `all`", names.join(", "));
+                return Err(Error::usage(Place::option("compare"), problem, help));
+            }
+        }
+    }
+    variants.sort_unstable();
+    variants.dedup();
+    variants.retain(|variant| *variant != key.variant);
+    if variants.is_empty() && !compare.is_empty() {
+        let problem = "this is the lane itself, so there is nothing to compare";
+        let others = names.iter().enumerate().filter(|(at, _)| *at != key.variant).map(|(_, name)| name.as_str());
+        let help = format!("name other variants: {}", others.collect::<Vec<_>>().join(", "));
+        return Err(Error::usage(Place::option("compare"), problem, help));
+    }
+    // S first, wherever it comes from: the others are read against it.
+    variants.push(key.variant);
+    variants.sort_by_key(|variant| *variant != 0);
+    Ok(variants)
+}

@@ -1,0 +1,240 @@
+//! The worst lanes of a reopened run: of a study by its lanes, of a sampling run by its table.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use super::{Reopened, SampleRecord};
+use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted, Watch};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::run::sampling::{limit_state, marks_of};
+use crate::run::study::{Study, WINDOW};
+use crate::support::hex::hex;
+use crate::support::input_file;
+use crate::support::repeats::refuse_repeats;
+use crate::support::table::text_of_cell;
+use crate::{Error, Place, Result};
+
+/// Lanes that are returned at most.
+const MAX_LANES: usize = 10_000;
+
+/// The first scenarios are valued whole.
+const FIRST_UNITS: u64 = 64;
+
+/// Which of the worst lanes are wanted.
+pub struct WorstOptions<'a> {
+    /// So many of each model, at least 1.
+    pub count: usize,
+    /// What they are ranked by [default: collision, or that of the table].
+    pub criterion: Option<Criterion>,
+    /// Variants of a study; all where none is named.
+    pub variants: &'a [String],
+    /// Models [default: all].
+    pub models: Option<&'a [ModelId]>,
+}
+
+/// A lane by its [limit state](limit_state).
+type Ranked = (f64, u64);
+
+impl Reopened {
+    /// Of a study: per model the scenarios with the smallest [limit state](limit_state) of the criterion, each with its
+    /// worst lane over the variants and headways; smallest first, equal ones in the plan's order. Of a sampling run: the
+    /// first lanes of each model in the table `worst.csv` of its folder.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for variants, models or a criterion that the run does not have, and for too many lanes;
+    /// [`Error::Io`]; [`Error::Input`] for a sampling run without such a table.
+    pub fn worst(&self, dir: &Path, options: &WorstOptions) -> Result<Vec<LaneKey>> {
+        let models = match options.models {
+            None => (0..self.plan().models.len()).collect(),
+            Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<Vec<_>>>()?,
+        };
+        if models.len().saturating_mul(options.count) > MAX_LANES {
+            let problem = format!("{} lanes of {} models are too many files", options.count, models.len());
+            return Err(Error::usage(Place::option("worst"), problem, format!("write at most {MAX_LANES} at once")));
+        }
+        match self.as_study() {
+            Some(study) => worst_of_study(study, options, &models),
+            None => self.worst_of_table(dir, options, &models),
+        }
+    }
+
+    fn worst_of_table(&self, dir: &Path, options: &WorstOptions, models: &[usize]) -> Result<Vec<LaneKey>> {
+        let (path, count) = (dir.join("worst.csv"), options.count);
+        if !path.exists() {
+            let help = "run `lanesweep sample` with option `worst` above 0, or name lanes with option `lane`";
+            return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
+        }
+        let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
+        if SampleRecord::read(dir)?.worst_sha256.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
+            let problem = "checksum mismatch with estimate.json: the table was changed or damaged";
+            let help = "run `lanesweep sample` again, or name lanes with option `lane`";
+            return Err(Error::input(Place::file(&path), problem, help));
+        }
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let wrong = |row: u64, problem: String| {
+            let help = "give the folder of a `lanesweep sample` run by this version";
+            Error::input(Place::file(&path).row(row), problem, help)
+        };
+        let header = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
+        let column =
+            header.iter().position(|name| name == "lane").ok_or_else(|| wrong(1, "no column `lane`".to_owned()))?;
+        let by = header.iter().position(|name| name == "criterion");
+        let mut per_model: Vec<Vec<LaneKey>> = vec![Vec::new(); self.plan().models.len()];
+        for (at, record) in reader.records().enumerate() {
+            let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
+            let ranked_by = by.and_then(|by| record.get(by)).unwrap_or_default();
+            if let Some(asked) = options.criterion.filter(|asked| asked.key() != ranked_by) {
+                let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", asked.key());
+                let help = format!("leave it out, or run `lanesweep sample` with option `criterion = {}`", asked.key());
+                return Err(Error::usage(Place::option("criterion"), problem, help));
+            }
+            let key = self.find(text_of_cell(record.get(column).unwrap_or("")))?;
+            if per_model[key.model].len() < count {
+                per_model[key.model].push(key);
+            }
+        }
+        let short = models.iter().map(|model| per_model[*model].len()).min().unwrap_or(0);
+        if short < count {
+            let more = "`sample` lists more with option `worst`";
+            tracing::warn!("the run lists {short} worst lanes of a model, not {count}: {more}");
+        }
+        Ok(models.iter().flat_map(|model| per_model[*model].clone()).collect())
+    }
+}
+
+/// Runs the lanes again on the CPU; once lists are full, only those that may enter one are valued.
+fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Result<Vec<LaneKey>> {
+    let &WorstOptions { count, variants, .. } = options;
+    let (plan, criterion) = (study.plan(), options.criterion.unwrap_or(Criterion::Collision));
+    refuse_repeats(|| Place::option("variant"), variants.iter().map(|name| (name.trim(), name.trim())))?;
+    for name in variants {
+        if !plan.blocks.iter().any(|b| b.variants.iter().any(|v| v == name.trim())) {
+            let mut known: Vec<&str> = plan.blocks.iter().flat_map(|b| &b.variants).map(String::as_str).collect();
+            known.sort_unstable();
+            known.dedup();
+            let problem = format!("no lane of this run has the variant `{name}`");
+            return Err(Error::usage(Place::option("variant"), problem, format!("use {}", known.join(", "))));
+        }
+    }
+    let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
+    let backend: &dyn Backend = if study.facts().reference { &wide } else { &narrow };
+    let executor = Executor::new(backend).with_recheck(study.facts().score.seed);
+    let is_wanted = |key: &LaneKey| {
+        let variant = &plan.blocks[key.block].variants[key.variant];
+        models.contains(&key.model) && (variants.is_empty() || variants.iter().any(|v| v.trim() == variant))
+    };
+    let mut worst: Vec<Vec<Ranked>> = vec![Vec::new(); plan.models.len()];
+    study.cases().in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
+        let mut from = units.start;
+        while from < units.end {
+            // As many scenarios as all before: a list finds as many new lanes in one piece as in the next.
+            let to = units.end.min(FIRST_UNITS.max(2 * from));
+            let wanted = wanted(plan, &worst, options, criterion, models);
+            executor.sweep(plan, from..to, wanted, |chunk| {
+                add(plan, &chunk, criterion, &is_wanted, &mut worst, count);
+                Ok(())
+            })?;
+            from = to;
+        }
+        Ok(())
+    })?;
+    let lanes = models.iter().flat_map(|model| worst[*model].iter());
+    Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())
+}
+
+/// What further lanes must return, so that the lists become what they would be with all values.
+fn wanted(
+    plan: &LanePlan,
+    worst: &[Vec<Ranked>],
+    options: &WorstOptions,
+    criterion: Criterion,
+    models: &[usize],
+) -> Wanted {
+    let mut watch = Watch::NOTHING;
+    for &model in models {
+        let last = worst[model].get(options.count - 1).map(|(value, _)| *value);
+        // Failures are so common in a study that all lanes are valued where the criterion's own failures are marked.
+        match last.and_then(|last| marks_of(&plan.profile, criterion, last)) {
+            Some((marks, None)) => watch.0[plan.models[model].index()] = marks,
+            _ => return Wanted::Outcomes,
+        }
+    }
+    Wanted::Watched(watch)
+}
+
+/// Moves the worst lane of each of a chunk's units among those of the run.
+fn add(
+    plan: &LanePlan,
+    chunk: &Chunk,
+    criterion: Criterion,
+    is_wanted: &dyn Fn(&LaneKey) -> bool,
+    worst: &mut [Vec<Ranked>],
+    count: usize,
+) {
+    let valued = chunk.valued.iter().flatten().map(|(lane, outcome)| (*lane, outcome));
+    // The unit whose lanes are looked at, and its worst lane so far, per model.
+    let (mut unit, mut of_unit) = (None, vec![None; worst.len()]);
+    for (lane, outcome) in (chunk.first_lane..).zip(&chunk.outcomes).chain(valued) {
+        let Some(key) = plan.key(lane).filter(is_wanted) else { continue };
+        if unit != Some((key.block, key.unit)) {
+            unit = Some((key.block, key.unit));
+            keep(worst, &mut of_unit, count);
+        }
+        let found = (limit_state(&plan.profile, criterion, outcome), lane);
+        let so_far = &mut of_unit[key.model];
+        if so_far.is_none_or(|known| is_worse(&found, &known)) {
+            *so_far = Some(found);
+        }
+    }
+    keep(worst, &mut of_unit, count);
+}
+
+fn is_worse(a: &Ranked, b: &Ranked) -> bool {
+    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).is_lt()
+}
+
+fn keep(worst: &mut [Vec<Ranked>], of_unit: &mut [Option<Ranked>], count: usize) {
+    for (kept, found) in worst.iter_mut().zip(of_unit) {
+        let Some(found) = found.take() else { continue };
+        let at = kept.partition_point(|known| is_worse(known, &found));
+        kept.insert(at, found);
+        kept.truncate(count);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::profile::Profile;
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    #[test]
+    fn the_worst_lanes_of_a_study_are_those_that_all_values_give() {
+        let generated = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap();
+        let study = Study::builder(&mined, Profile::load("paper").unwrap()).plan().unwrap();
+        let plan = study.plan();
+        assert!(plan.unit_count() > 4 * FIRST_UNITS, "{} scenarios", plan.unit_count());
+        let (backend, every_model) = (CpuBackend::lane_arithmetic(), [0, 1, 2, 3]);
+        let mut is_watched = false;
+        for criterion in Criterion::ALL {
+            let mut every: Vec<Vec<Ranked>> = vec![Vec::new(); plan.models.len()];
+            let sweep = |every: &mut [Vec<Ranked>], count| {
+                let units = 0..plan.unit_count();
+                study.cases().sweep(units, Wanted::Outcomes, &Executor::new(&backend), |plan, chunk| {
+                    add(plan, &chunk, criterion, &|_| true, every, count);
+                    Ok(())
+                })
+            };
+            sweep(&mut every, 5).unwrap();
+            let options = WorstOptions { count: 5, criterion: Some(criterion), variants: &[], models: None };
+            let expected: Vec<LaneKey> = every.iter().flatten().filter_map(|(_, lane)| plan.key(*lane)).collect();
+            assert_eq!(worst_of_study(&study, &options, &every_model).unwrap(), expected, "{criterion:?}");
+            is_watched |= wanted(plan, &every, &options, criterion, &every_model) != Wanted::Outcomes;
+        }
+        assert!(is_watched, "no criterion leaves lanes without a value");
+    }
+}
