@@ -23,8 +23,7 @@ pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME")]
     category: Option<String>,
-    #[arg(long, alias = "model", value_name = "LIST", help = super::lists::models_help())]
-    #[serde(alias = "model")]
+    #[arg(long, value_name = "LIST", help = super::lists::models_help())]
     models: Option<String>,
     /// Initial speed of the ego
     #[arg(long, value_name = "m/s", value_parser = speed_mps)]

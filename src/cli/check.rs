@@ -53,7 +53,7 @@ pub struct Check {
     #[command(flatten)]
     case: CaseFlags,
     /// Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
-    #[arg(long, alias = "profile", value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     profiles: Vec<String>,
     /// Also write the sheet as a page to print
     #[arg(long, value_name = "FILE.html")]

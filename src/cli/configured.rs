@@ -23,19 +23,16 @@ pub(super) struct Configured {
 }
 
 /// A flag that sets a key: the verb (every one that has the flag where it is empty), the flag's id, the key.
-pub(super) const FLAGS: [(&str, &str, &str); 28] = [
+pub(super) const FLAGS: [(&str, &str, &str); 21] = [
     ("", "threads", "run.threads"),
     ("", "backend", "run.backend"),
     ("", "device", "run.device"),
     ("", "profile", "run.profile"),
     ("", "dt", "run.dt_s"),
-    ("", "synth_seed", "generator.seed"),
     ("", "synth_recordings", "generator.recordings"),
-    ("", "synth_duration", "generator.duration_s"),
     ("study", "seed", "score.seed"),
     ("fit", "bandwidth_rule", "fit.bandwidth_rule"),
     ("fit", "seed", "fit.seed"),
-    ("fit", "valid_draws", "fit.valid_draws"),
     ("sample", "estimator", "sample.estimator"),
     ("sample", "samples", "sample.samples"),
     ("sample", "criterion", "sample.criterion"),
@@ -45,10 +42,6 @@ pub(super) const FLAGS: [(&str, &str, &str); 28] = [
     ("sample", "half_width", "sample.half_width"),
     ("sample", "time_limit", "sample.time_limit_s"),
     ("sample", "worst", "sample.worst"),
-    ("sample", "pilot", "sample.pilot"),
-    ("sample", "elite_fraction", "sample.elite_fraction"),
-    ("sample", "broad_weight", "sample.broad_weight"),
-    ("sample", "defensive_weight", "sample.defensive_weight"),
     ("sample", "seed", "sample.seed"),
     ("compare", "samples", "compare.samples"),
     ("compare", "seed", "compare.seed"),
@@ -245,12 +238,7 @@ impl Configured {
 
 /// Verbs that neither take settings nor need the environment to be in order.
 fn reads_configuration(path: &[&str]) -> bool {
-    !matches!(
-        path,
-        ["completions" | "man" | "slurm", ..]
-            | ["cluster", "slurm"]
-            | ["config", "init" | "schema" | "check" | "completions" | "man"]
-    )
+    !matches!(path, ["cluster", "slurm"] | ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
 
 /// The verb, and the verb below it, with what `--config` was given before and after them, and the last one's matches.

@@ -34,7 +34,7 @@ pub struct Conformance {
     #[arg(long, value_name = "FILE", requires = "golden_lanes")]
     scenarios: Option<PathBuf>,
     /// Golden lanes of the paper profile (CSV)
-    #[arg(long, alias = "lanes", value_name = "FILE", requires = "scenarios")]
+    #[arg(long, value_name = "FILE", requires = "scenarios")]
     golden_lanes: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,

@@ -22,9 +22,6 @@ use crate::support::run_dir::OutputDir;
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
-/// Draws for P_valid at most, as in the configuration.
-const MAX_VALID_DRAWS: u64 = 1_000_000_000;
-
 /// How are the parameters of scenarios distributed?
 ///
 /// Fits a kernel density to the kept scenarios of each category under each parameterization, computes which fraction
@@ -57,8 +54,6 @@ pub struct Fit {
     bandwidth_rule: BandwidthInterval,
     #[arg(long, value_name = "N")]
     seed: u64,
-    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
-    valid_draws: u64,
     /// Do not compare drawn with unseen scenarios
     #[arg(long)]
     no_comparison: bool,
@@ -89,17 +84,10 @@ impl Fit {
                 BandwidthInterval::Reduction => BandwidthRule::Reduction,
                 BandwidthInterval::Wide => BandwidthRule::Wide,
             },
-            valid_draws: self.valid_draws,
+            valid_draws: config.fit.valid_draws,
             seed: self.seed,
             representativeness: !self.no_comparison,
         };
-        if !(1..=MAX_VALID_DRAWS).contains(&self.valid_draws) {
-            return Err(Error::usage(
-                Place::item("--valid-draws"),
-                format!("{} is out of range (1 to {MAX_VALID_DRAWS})", self.valid_draws),
-                "give 100000, for instance",
-            ));
-        }
         let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         let files = self.files(&ids, configured)?;
         tracing::info!("{}", source.describe(false));

@@ -42,7 +42,7 @@ const FLAGS: [Group; 5] = [
             "kept",
             "golden_lanes",
         ],
-        &["accept_implausible", "synth_recordings", "synth_seed", "synth_duration"],
+        &["accept_implausible", "synth_recordings"],
     ),
     (
         "Scenario",
@@ -108,12 +108,7 @@ const FLAGS: [Group; 5] = [
             "bandwidth_rule",
             "no_comparison",
             "without_scenarios",
-            "valid_draws",
             "published",
-            "pilot",
-            "elite_fraction",
-            "broad_weight",
-            "defensive_weight",
             "threshold_units",
         ],
     ),
@@ -148,7 +143,7 @@ const FLAGS: [Group; 5] = [
 
 /// Flags that are seldom used, but by this verb.
 const OFTEN: [(&str, &[&str]); 4] = [
-    ("synth", &["synth_recordings", "synth_seed", "synth_duration"]),
+    ("synth", &["synth_recordings"]),
     ("study", &["published", "reference"]),
     ("map", &["set", "rename"]),
     ("xosc", &["ego"]),
@@ -205,11 +200,8 @@ fn with_groups(mut command: Command, verb: &str) -> Command {
         for (order, id) in shown.iter().chain(seldom).enumerate() {
             if command.get_arguments().any(|arg| arg.get_id() == id) {
                 let is_seldom = (seldom.contains(id) || seldom_here.contains(id)) && !often.contains(id);
-                let is_hidden = |arg: &Arg| arg.is_hide_set() && !often.contains(id);
-                command = command.mut_arg(id, |arg| {
-                    let is_hidden = is_hidden(&arg);
-                    arg.help_heading(heading).display_order(order).hide_short_help(is_seldom).hide(is_hidden)
-                });
+                command = command
+                    .mut_arg(id, |arg| arg.help_heading(heading).display_order(order).hide_short_help(is_seldom));
             }
         }
     }

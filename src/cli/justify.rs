@@ -49,7 +49,7 @@ pub struct Justify {
     #[arg(long, value_name = "KEY")]
     parameterization: String,
     /// Driver model: Reg157, CCHDM, RSS, FSM
-    #[arg(long, alias = "model", value_name = "NAME")]
+    #[arg(long, value_name = "NAME")]
     models: String,
     #[command(flatten)]
     criterion: lists::CriterionFlag,

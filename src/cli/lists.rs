@@ -32,7 +32,7 @@ pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
 #[derive(Debug, Clone, Args)]
 pub struct CategoriesFlag {
     /// Kinds of scenario: cut-in, cut-out, lvd [default: all]
-    #[arg(long, alias = "category", value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     categories: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ pub struct ParameterizationsFlag {
     /// Parameterizations: 1…7, a…g, i…v [default: all]
     ///
     /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
-    #[arg(long, alias = "parameterization", value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     parameterizations: Vec<String>,
 }
 
@@ -69,7 +69,7 @@ impl ParameterizationsFlag {
 /// `--models`.
 #[derive(Debug, Clone, Args)]
 pub struct ModelsFlag {
-    #[arg(long, alias = "model", value_name = "LIST", value_delimiter = ',', help = models_help())]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help())]
     models: Vec<String>,
 }
 

@@ -28,7 +28,7 @@ pub struct Mine {
     #[arg(value_name = "DIR")]
     dir: PathBuf,
     /// File to write, .jsonl or .parquet [default: standard output, JSON Lines]
-    #[arg(long, short_alias = 'o', alias = "output", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Only scenarios that pass the paper's filters
     #[arg(long)]

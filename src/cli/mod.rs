@@ -114,19 +114,6 @@ enum Verb {
     Cluster(cluster::Cluster),
     Verify(Box<verify::Verify>),
     Config(config::Config),
-    // Where these stood in the release before.
-    #[command(hide = true)]
-    Merge(merge::Merge),
-    #[command(hide = true)]
-    Slurm(slurm::Slurm),
-    #[command(hide = true)]
-    Conformance(conformance::Conformance),
-    #[command(hide = true)]
-    Devices(devices::Devices),
-    #[command(hide = true)]
-    Completions(shell::Completions),
-    #[command(hide = true)]
-    Man(shell::Man),
 }
 
 /// Profile flags of every verb that simulates.
@@ -203,7 +190,6 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Merge(verb) => verb.run(),
         Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Justify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
@@ -212,13 +198,8 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Check(verb) => verb.run(cli.common.verbosity()),
         Verb::Export(verb) => verb.run(),
         Verb::Cluster(verb) => verb.run(),
-        Verb::Slurm(verb) => verb.run(),
-        Verb::Conformance(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Devices(verb) => verb.run(),
         Verb::Config(verb) => verb.run(configured),
-        Verb::Completions(verb) => verb.run(),
-        Verb::Man(verb) => verb.run(),
     }
 }
 

@@ -32,7 +32,7 @@ use crate::stats::density::DensityModel;
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "density" | "distribution" | "category" | "rename" | "set" | "estimator" | "samples" | "models" | "criterion" | "thw" | "points" | "interval" | "level" | "half_width"
-    | "time_limit" | "worst" | "map" | "pilot" | "elite_fraction" | "broad_weight" | "defensive_weight" | "given" | "proposal"
+    | "time_limit" | "worst" | "map" | "given" | "proposal"
     | "seed" | "profile" | "dt" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
@@ -96,7 +96,7 @@ pub struct Sample {
     /// Stop when half-width over estimate is at most this
     ///
     /// The interval is checked after 4096·2^k samples.
-    #[arg(long, alias = "until", value_name = "FRACTION")]
+    #[arg(long, value_name = "FRACTION")]
     pub(super) half_width: Option<f64>,
     /// Stop at the first check after this time: not reproducible
     #[arg(long, value_name = "s")]
@@ -109,14 +109,6 @@ pub struct Sample {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE")]
     pub(super) rows: Option<PathBuf>,
-    #[arg(long, hide = true, value_name = "N", value_parser = lists::whole::<u64>)]
-    pub(super) pilot: u64,
-    #[arg(long, alias = "worst-share", hide = true, value_name = "FRACTION")]
-    pub(super) elite_fraction: f64,
-    #[arg(long, alias = "broad", hide = true, value_name = "FRACTION")]
-    pub(super) broad_weight: f64,
-    #[arg(long, alias = "defence", hide = true, value_name = "FRACTION")]
-    pub(super) defensive_weight: f64,
     /// Draw given this value of a parameter (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given)]
     pub(super) given: Vec<(String, f64)>,

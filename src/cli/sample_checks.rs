@@ -23,18 +23,10 @@ pub(super) fn only_crude(flag: &str) -> Error {
 impl Sample {
     /// What no density is needed for.
     pub(super) fn check(&self) -> Result<()> {
-        let share = |name: &str, value: f64, from_zero: bool| {
-            let fits = value < 1.0 && (value > 0.0 || (from_zero && value == 0.0));
-            if fits {
-                return Ok(());
-            }
-            let range = if from_zero { "from 0 to below 1" } else { "between 0 and 1" };
-            Err(Error::usage(Place::item(name), format!("{value} is out of range"), format!("give a number {range}")))
-        };
-        share("--level", self.level, false)?;
-        share("--elite-fraction", self.elite_fraction, false)?;
-        share("--defensive-weight", self.defensive_weight, true)?;
-        share("--broad-weight", self.broad_weight, true)?;
+        if !(self.level > 0.0 && self.level < 1.0) {
+            let problem = format!("{} is out of range", self.level);
+            return Err(Error::usage(Place::item("--level"), problem, "give a number between 0 and 1"));
+        }
         if self.half_width.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
             return Err(Error::usage(
                 Place::item("--half-width"),
@@ -74,12 +66,10 @@ impl Sample {
             EstimatorFlag::Is if self.is_weighted() => {
                 least("--samples", self.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
             }
-            EstimatorFlag::Is => {
-                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?;
-                least("--pilot", self.pilot, 500, MAX_HELD)?;
-            }
             EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MAX_HELD)?,
-            EstimatorFlag::Ce => least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?,
+            EstimatorFlag::Is | EstimatorFlag::Ce => {
+                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
+            }
             _ => (),
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
+use crate::cli::settings::SampleSettings;
 use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Pilot, StopRule};
@@ -22,7 +23,7 @@ impl Sample {
     }
 
     /// Everything that a run over a density is asked for.
-    pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
+    pub(super) fn options(&self, density: &DensityModel, settings: &SampleSettings) -> Result<SampleOptions> {
         let samples = self.samples.unwrap_or(match self.estimator {
             EstimatorFlag::Subset => 2000,
             _ => 100_000,
@@ -48,7 +49,7 @@ impl Sample {
             given: self.given.clone(),
             worst: self.worst(),
             map: if self.is_crude() { self.map_axes(density)? } else { None },
-            ..SampleOptions::new(self.estimator(density)?, samples, headways)
+            ..SampleOptions::new(self.estimator(density, settings)?, samples, headways)
         })
     }
 
@@ -65,7 +66,7 @@ impl Sample {
         Ok(())
     }
 
-    fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
+    fn estimator(&self, density: &DensityModel, settings: &SampleSettings) -> Result<Estimator> {
         Ok(match self.estimator {
             EstimatorFlag::Mc => Estimator::Crude {
                 points: match self.points {
@@ -75,17 +76,17 @@ impl Sample {
                 interval: self.interval(),
             },
             EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
-                worst: self.elite_fraction,
-                broad: self.broad_weight,
-                defence: self.defensive_weight,
-                ..Pilot::guarded(self.pilot)
+                worst: settings.elite_fraction,
+                broad: settings.broad_weight,
+                defence: settings.defensive_weight,
+                ..Pilot::guarded(settings.pilot)
             }),
             EstimatorFlag::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
                 let proposals = self.proposal.iter().map(read).collect::<Result<_>>()?;
-                Estimator::Given { proposals, defence: self.defensive_weight }
+                Estimator::Given { proposals, defence: settings.defensive_weight }
             }
-            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: self.defensive_weight },
+            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: settings.defensive_weight },
             EstimatorFlag::Subset => Estimator::Subset,
         })
     }

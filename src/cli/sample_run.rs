@@ -46,7 +46,7 @@ impl Sample {
         if let Some(path) = &self.distribution {
             return sample_distribution::run(self, path, started, verbosity);
         }
-        let (sample, data) = self.planned()?;
+        let (sample, data) = self.planned(configured)?;
         let opened = self.backend.open()?;
         tracing::info!("{data}");
         self.run_sample(sample, &opened, started, verbosity)
@@ -56,7 +56,7 @@ impl Sample {
     ///
     /// # Errors
     /// Those that the run would end with.
-    pub(super) fn planned(&self) -> Result<(sampling::Sample, String)> {
+    pub(super) fn planned(&self, configured: &Configured) -> Result<(sampling::Sample, String)> {
         self.check()?;
         let Some(density) = &self.density else {
             return Err(Error::usage(
@@ -70,7 +70,7 @@ impl Sample {
             check_folder(&self.out)?;
         }
         let profile = self.load_profile()?;
-        let options = self.options(&density)?;
+        let options = self.options(&density, &configured.settings.sample)?;
         if let Some(rows) = &self.rows {
             guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }

@@ -67,7 +67,7 @@ pub struct Simulate {
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, alias = "until", value_name = "s", requires = "plot")]
+    #[arg(long, value_name = "s", requires = "plot")]
     plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,

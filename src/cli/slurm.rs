@@ -150,7 +150,7 @@ fn check_plan(array: &SlurmArray) -> Result<()> {
     let (cli, configured) = Configured::of(&matches, &words)?;
     match &cli.verb {
         Verb::Study(study) => study.check(&configured),
-        Verb::Sample(sample) => sample.planned().map(drop),
+        Verb::Sample(sample) => sample.planned(&configured).map(drop),
         _ => Err(Error::Internal(format!("`{}` cannot be split", run.verb()))),
     }
 }

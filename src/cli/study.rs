@@ -40,7 +40,7 @@ const FORECAST_BYTES: u64 = 64 << 20;
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
     | "profile" | "dt"
-    | "synth_seed" | "synth_recordings" | "synth_duration" => arg.conflicts_with("plan"),
+    | "synth_recordings" => arg.conflicts_with("plan"),
     "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
@@ -57,7 +57,7 @@ pub struct Study {
     #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
     out: PathBuf,
     /// Also write one row per lane: .csv, .jsonl or .parquet
-    #[arg(long, alias = "lanes", value_name = "FILE")]
+    #[arg(long, value_name = "FILE")]
     rows: Option<PathBuf>,
     /// Tables and page have the paper's published numbers (of highD) too
     #[arg(long)]

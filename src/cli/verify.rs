@@ -43,7 +43,7 @@ pub struct Verify {
     #[arg(long, value_name = "FILE")]
     scenarios: Option<PathBuf>,
     /// Random lanes per model and category
-    #[arg(long, alias = "lanes", value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>)]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>)]
     random_lanes: u64,
     /// Units of 12 lanes per model, threshold and category
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>)]

@@ -16,7 +16,7 @@ use crate::support::table::{Named, Row, TableReader};
 const COLUMNS: [(&str, &str); 17] = [
     ("id", ""),
     ("category", ""),
-    ("model", ""),
+    ("models", ""),
     ("ego_speed", "m/s"),
     ("speed", "m/s"),
     ("gap", "m"),

@@ -38,7 +38,7 @@ fn has_gpu() -> bool {
     lanesweep::engine::gpu::Adapters::enumerate().cards().iter().any(|card| card.is_real())
 }
 
-const SMALL: [&str; 4] = ["--synth-recordings", "1", "--synth-duration", "120"];
+const SMALL: [&str; 4] = ["--synth-recordings", "1", "--config", "generator.duration_s=120"];
 
 #[test]
 fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
@@ -150,7 +150,7 @@ fn contradicting_flags_are_answered_with_what_to_write() {
 #[test]
 fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
     let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "40", "--threshold-units", "1"];
-    let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--synth-duration", "1"]].concat());
+    let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--config", "generator.duration_s=1"]].concat());
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     assert!(stderr(&output).contains("no scenario to simulate"), "{}", stderr(&output));
 }

@@ -8,7 +8,7 @@ use lanesweep::engine::gpu::{choose, visible_here};
 /// The verb without what a cluster may have set, in a home of its own.
 fn devices(home: &tempfile::TempDir) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-    command.arg("devices").env("NO_COLOR", "1").env("XDG_RUNTIME_DIR", home.path());
+    command.args(["verify", "devices"]).env("NO_COLOR", "1").env("XDG_RUNTIME_DIR", home.path());
     for variable in ["CUDA_VISIBLE_DEVICES", "SLURM_STEP_GPUS", "SLURM_JOB_GPUS"] {
         command.env_remove(variable);
     }

@@ -47,10 +47,10 @@ fn whole_and_shards(counts: &[u64]) {
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
     let density = "densities/cut-in-2.json";
     let sample = ["sample", density, "--samples", "9000", "--thw", "0.4", "--models", "FSM,RSS"];
-    let pilot = ["--estimator", "is", "--pilot", "2000", "--backend", "cpu", "--out", "pilot"];
+    let pilot = ["--estimator", "is", "--config", "sample.pilot=2000", "--backend", "cpu", "--out", "pilot"];
     done(dir, &[&sample[..], &pilot].concat());
     let weighted = [&sample[..], &["--estimator", "is", "--proposal", "pilot/proposal-FSM.json"]].concat();
-    let study = ["study", "--synth-recordings", "2", "--synth-duration", "240"];
+    let study = ["study", "--synth-recordings", "2", "--config", "generator.duration_s=240"];
     for (name, run) in [("study", &study[..]), ("crude", &sample[..]), ("weighted", &weighted)] {
         let whole = done(dir, &[run, &["--backend", "cpu", "--out", name]].concat());
         for &count in counts {
@@ -67,7 +67,7 @@ fn whole_and_shards(counts: &[u64]) {
                 };
                 done(dir, &[&[run[0], "--plan", &plan, "--shard", &part, "--out", &out], backend].concat());
             }
-            assert_eq!(done(dir, &["merge", &out]), whole, "{out}");
+            assert_eq!(done(dir, &["cluster", "merge", &out]), whole, "{out}");
             let (merged, expected) = (results(&dir.join(&out)), results(&dir.join(name)));
             let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
             assert_eq!(names(&merged), names(&expected), "{out}");

@@ -9,7 +9,7 @@ fn a_device_asked_for_is_refused_with_the_name_of_the_feature() {
     // Says that the tests of the device are left out.
     assert!(software_device().is_none());
     for asked in [
-        &["devices"][..],
+        &["verify", "devices"][..],
         &["verify"],
         &["study", "--backend", "gpu", "--dry-run"],
         &["study", "--device", "0", "--dry-run"],

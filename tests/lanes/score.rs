@@ -245,7 +245,7 @@ fn a_part_that_was_changed_and_sealed_again_is_refused_by_merge() {
         unpack(&mut content["segments"][0]);
         change(&mut content["segments"][0]);
         std::fs::write(&path, lanesweep::run::parts::seal("part", &content).unwrap().0).unwrap();
-        let (code, err) = lanesweep(&["merge", "run"]);
+        let (code, err) = lanesweep(&["cluster", "merge", "run"]);
         assert_eq!(code, 3, "{err}");
         assert!(err.contains(said), "should say `{said}`: {err}");
     }

@@ -208,7 +208,7 @@ fn a_mined_scenario_is_checked_by_its_id() {
     let dir = tempfile::tempdir().unwrap();
     let scenarios = dir.path().join("scenarios.jsonl");
     let recordings = dir.path().join("recordings");
-    let made = ["-q", "synth", text(&recordings), "--synth-recordings", "1", "--synth-duration", "120"];
+    let made = ["-q", "synth", text(&recordings), "--synth-recordings", "1", "--config", "generator.duration_s=120"];
     for args in [&made[..], &["-q", "mine", text(&recordings), "--out", text(&scenarios)]] {
         let (code, _, error) = check(args);
         assert_eq!(code, 0, "{error}");

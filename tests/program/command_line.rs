@@ -28,12 +28,20 @@ fn text(path: &Path) -> &str {
 /// Two synthetic recordings in a folder of their own.
 fn recordings() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let made = lanesweep(&["-q", "synth", text(dir.path()), "--synth-recordings", "2", "--synth-duration", "120"]);
+    let made = lanesweep(&[
+        "-q",
+        "synth",
+        text(dir.path()),
+        "--synth-recordings",
+        "2",
+        "--config",
+        "generator.duration_s=120",
+    ]);
     assert_eq!(code(&made), 0, "{}", stderr(&made));
     dir
 }
 
-const SMALL: [&str; 4] = ["--synth-recordings", "2", "--synth-duration", "120"];
+const SMALL: [&str; 4] = ["--synth-recordings", "2", "--config", "generator.duration_s=120"];
 
 #[test]
 fn the_study_says_that_its_own_data_is_synthetic_in_every_output() {
@@ -145,12 +153,12 @@ fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
     let (toml, table) = (dir.path().join("case.toml"), dir.path().join("cases.csv"));
     std::fs::write(
         &toml,
-        "category = \"cut-in\"\nmodel = \"FSM\"\nego_speed = 30.0\nspeed = 20.0\nthw = 1.2\nlateral_speed = 1.0\n",
+        "category = \"cut-in\"\nmodels = \"FSM\"\nego_speed = 30.0\nspeed = 20.0\nthw = 1.2\nlateral_speed = 1.0\n",
     )
     .unwrap();
     std::fs::write(
         &table,
-        "category,model,ego_speed,speed,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n",
+        "category,models,ego_speed,speed,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n",
     )
     .unwrap();
     let flags = "simulate --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
@@ -166,13 +174,13 @@ fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
 #[test]
 fn conformance_passes_on_the_golden_tables_and_fails_with_code_5_on_a_wrong_one() {
     let (functions, lvd) = (common::golden("functions.csv"), common::golden("lvd.csv"));
-    let good = lanesweep(&["conformance", text(&functions), text(&lvd)]);
+    let good = lanesweep(&["verify", "conformance", text(&functions), text(&lvd)]);
     assert_eq!(code(&good), 0, "{}", stderr(&good));
     let dir = tempfile::tempdir().unwrap();
     let wrong = dir.path().join("functions.csv");
     let content = std::fs::read_to_string(&functions).unwrap().replace("PFS,0,0,1,,1", "PFS,0,0,1,,0");
     std::fs::write(&wrong, content).unwrap();
-    let bad = lanesweep(&["conformance", text(&wrong)]);
+    let bad = lanesweep(&["verify", "conformance", text(&wrong)]);
     assert_eq!(code(&bad), 5, "{}", stderr(&bad));
     assert!(stderr(&bad).contains("line 2"), "{}", stderr(&bad));
 }
@@ -246,8 +254,8 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
             "at least 0",
         ),
         (&["simulate", "--category", "lvd", "--ego-speed", "20", "--acceleration", "-6"], 2, "--thw"),
-        (&["conformance"], 2, "nothing to compare"),
-        (&["conformance", &no_table], 3, "no conformance table"),
+        (&["verify", "conformance"], 2, "nothing to compare"),
+        (&["verify", "conformance", &no_table], 3, "no conformance table"),
     ];
     for (args, expected, hint) in cases {
         let output = lanesweep(args);
@@ -278,7 +286,7 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
         (&["fit", "--parameterizations", "2,i,2"], "--parameterizations: `2` is given twice"),
         (&["compare", "--parameterizations", "all,2"], "--parameterizations: `2` repeats `all`"),
         (&["map", "lvd", "--preset", "r157", "--models", "RSS,RSS"], "--models: `RSS` is given twice"),
-        (&["conformance", "a.csv", "./a.csv"], "FILE: `./a.csv` repeats `a.csv`"),
+        (&["verify", "conformance", "a.csv", "./a.csv"], "FILE: `./a.csv` repeats `a.csv`"),
         (
             &["sample", "a.json", "--estimator", "is", "--proposal", "p.json", "--proposal", "p.json"],
             "--proposal: `p.json` is given twice",
@@ -515,9 +523,12 @@ fn threads_beyond_the_useful_number_are_not_started_and_said_once() {
     assert_eq!(stderr(&many).matches("--threads 4096: ").count(), 1, "{}", stderr(&many));
     let dir = tempfile::tempdir().unwrap();
     let fit =
-        ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--valid-draws"];
+        ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--config"];
     let density = dir.path().join("d.json");
-    assert_eq!(code(&lanesweep(&[&fit[..], &["1000", "--no-comparison", "--out", text(&density)]].concat())), 0);
+    assert_eq!(
+        code(&lanesweep(&[&fit[..], &["fit.valid_draws=1000", "--no-comparison", "--out", text(&density)]].concat())),
+        0
+    );
     let estimate = |threads: &str| {
         let out = dir.path().join(threads);
         let flags =

@@ -50,7 +50,7 @@ fn a_flag_wins_over_an_assignment_over_the_environment_over_a_file_over_the_defa
     let file = ["--config", "a.toml"];
     let environment = [("LANESWEEP_GENERATOR_SEED", "3"), ("LANESWEEP_RUN_DT_S", "0.3")];
     let assigned = ["--config", "a.toml", "--config", "generator.seed=4", "--config", "run.dt_s=0.4"];
-    let flags = [&assigned[..], &["--synth-seed", "5", "--dt", "0.5"]].concat();
+    let flags = [&assigned[..], &["--config", "generator.seed=5", "--dt", "0.5"]].concat();
     let seed = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "generator.seed");
     let dt = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "run.dt_s");
     let is = |value: Value, source: &str| (value, source.to_owned());
@@ -62,7 +62,7 @@ fn a_flag_wins_over_an_assignment_over_the_environment_over_a_file_over_the_defa
     assert_eq!(dt(&environment, &file), is(0.3.into(), "environment LANESWEEP_RUN_DT_S"));
     assert_eq!(seed(&environment, &assigned), is(4.into(), "flag --config"));
     assert_eq!(dt(&environment, &flags), is(0.5.into(), "flag --dt"));
-    assert_eq!(seed(&environment, &flags), is(5.into(), "flag --synth-seed"));
+    assert_eq!(seed(&environment, &flags), is(5.into(), "flag --config"));
     // The environment names the file where no flag does, and nothing after `=` is the default again.
     assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &[]), is(2.into(), "file a.toml, line 3"));
     std::fs::write(dir.join("b.toml"), "").unwrap();
@@ -117,7 +117,7 @@ fn mining_is_configured_alike_for_mine_and_study() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
-    good(dir, &[], &["-q", "synth", "data", "--synth-recordings", "2", "--synth-duration", "120"]);
+    good(dir, &[], &["-q", "synth", "data", "--synth-recordings", "2", "--config", "generator.duration_s=120"]);
     let kept = |variables: &[(&str, &str)], args: &[&str]| {
         let text = good(dir, variables, &[&["-q", "mine", "data", "--kept"], args].concat());
         text.lines().filter(|line| line.contains("_lvd_")).count()
@@ -175,7 +175,8 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
     assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);
     assert!(said.contains("--config score.seed=x: `x` cannot be used"), "{said}");
-    let said = refused(dir, &[], &["slurm", "--config", "a.toml", "--array", "2", "--out", "x", "--", "study"]);
+    let said =
+        refused(dir, &[], &["cluster", "slurm", "--config", "a.toml", "--array", "2", "--out", "x", "--", "study"]);
     assert!(said.contains("give it to the run"), "{said}");
     assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
 }

@@ -68,7 +68,7 @@ fn smaller(line: &str) -> String {
     }
     match words[1] {
         "compare" if !words.contains(&"--samples") => words.extend(["--samples", "50"]),
-        "fit" => words.extend(["--no-comparison", "--valid-draws", "1000"]),
+        "fit" => words.extend(["--no-comparison", "--config", "fit.valid_draws=1000"]),
         // One lane is little already.
         "verify" if !["--lane", "devices", "conformance"].iter().any(|word| words.contains(word)) => {
             words.retain(|word| !matches!(*word, "--random-lanes" | "20000"));

@@ -45,7 +45,7 @@ fn page(dir: &Path) -> String {
 
 /// Scenarios of the generator, as lines of a scenario file.
 fn scenarios(dir: &Path) -> Vec<String> {
-    lanesweep(dir, &["synth", "recordings", "--synth-recordings", "2", "--synth-duration", "240"]);
+    lanesweep(dir, &["synth", "recordings", "--synth-recordings", "2", "--config", "generator.duration_s=240"]);
     lanesweep(dir, &["mine", "recordings", "--out", "all.jsonl"]);
     let text = std::fs::read_to_string(dir.join("all.jsonl")).unwrap();
     let kept = text.lines().filter(|line| line.contains("\"kept\":true")).map(str::to_owned).collect::<Vec<_>>();
@@ -119,7 +119,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     for said in ["convergence.svg", "headways.csv", "map-FSM.svg", "SHA-256 of the density", "verdict"] {
         assert!(html.contains(said), "{said}");
     }
-    let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--pilot", "1000", "--out", "is"];
+    let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--config", "sample.pilot=1000", "--out", "is"];
     lanesweep(dir, &[&sample[..], &is].concat());
     assert!(page(&dir.join("is")).contains("effective sample size"));
     // The page of an earlier run does not stay beside the results of a later one.

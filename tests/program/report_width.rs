@@ -28,7 +28,7 @@ fn study(dir: &Path, columns: &str, args: &[&str]) -> (String, String) {
     (out, err)
 }
 
-const GENERATED: [&str; 4] = ["--synth-recordings", "2", "--synth-duration", "120"];
+const GENERATED: [&str; 4] = ["--synth-recordings", "2", "--config", "generator.duration_s=120"];
 
 #[test]
 fn seven_variants_with_intervals_and_large_counts_fit() {

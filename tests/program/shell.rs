@@ -30,7 +30,7 @@ fn completions_of_every_shell_know_every_verb_and_bash_can_read_its_own() {
     let dir = tempfile::tempdir().unwrap();
     let verbs = verbs(dir.path());
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        let script = text(&lanesweep(dir.path(), &["completions", shell]));
+        let script = text(&lanesweep(dir.path(), &["config", "completions", shell]));
         for verb in verbs.iter().filter(|verb| *verb != "help") {
             assert!(script.contains(verb.as_str()), "{shell}: {verb}");
         }
@@ -40,13 +40,13 @@ fn completions_of_every_shell_know_every_verb_and_bash_can_read_its_own() {
             assert!(Command::new("bash").arg("-n").arg(&path).status().unwrap().success());
         }
     }
-    assert_eq!(lanesweep(dir.path(), &["completions", "tcsh"]).status.code(), Some(2));
+    assert_eq!(lanesweep(dir.path(), &["config", "completions", "tcsh"]).status.code(), Some(2));
 }
 
 #[test]
 fn every_verb_has_a_manual_page() {
     let dir = tempfile::tempdir().unwrap();
-    text(&lanesweep(dir.path(), &["man", "man1"]));
+    text(&lanesweep(dir.path(), &["config", "man", "man1"]));
     for verb in verbs(dir.path()).iter().filter(|verb| *verb != "help") {
         let page = std::fs::read_to_string(dir.path().join(format!("man1/lanesweep-{verb}.1"))).unwrap();
         assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS") && page.contains(".SH RUN"), "{verb}");
@@ -69,7 +69,9 @@ fn the_help_of_every_verb_says_what_it_is_for_and_ends_with_an_example() {
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
     let dir = tempfile::tempdir().unwrap();
-    for args in [&["--help"][..], &["completions", "zsh"], &["study", "--synth-recordings", "1", "--backend", "cpu"]] {
+    for args in
+        [&["--help"][..], &["config", "completions", "zsh"], &["study", "--synth-recordings", "1", "--backend", "cpu"]]
+    {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
         let mut child =
             command.current_dir(dir.path()).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -110,31 +112,5 @@ fn the_short_help_of_every_verb_fits_on_one_screen_below_headings() {
         for pair in lines.windows(2).filter(|pair| !pair[1].starts_with("  lanesweep ")) {
             assert!(pair[0].ends_with(" \\"), "{verb}: `{}` goes on without a backslash", pair[0]);
         }
-    }
-}
-
-#[test]
-fn spellings_of_the_release_before_are_understood() {
-    let dir = tempfile::tempdir().unwrap();
-    // What stands before `--help` is read and nothing runs.
-    for line in [
-        "study --lanes lanes.csv --category lvd --model FSM",
-        "mine recordings -o s.jsonl",
-        "mine recordings --output s.jsonl",
-        "fit --category lvd --parameterization i --valid-draws 1000 --synth-seed 3 --synth-duration 60",
-        "compare --parameterization i",
-        "simulate --category lvd --model all --plot a.svg --until 3",
-        "export xosc --category lvd --model FSM",
-        "sample d.json --until 0.1 --pilot 500 --worst-share 0.1 --broad 0 --defence 0",
-        "verify --lanes 10",
-        "conformance --scenarios s.jsonl --lanes lanes.csv",
-        "merge result",
-        "slurm study.toml --array 2 --out result",
-        "devices --no-self-check",
-        "completions bash",
-        "man man1",
-    ] {
-        let words: Vec<&str> = line.split(' ').chain(["--help"]).collect();
-        text(&lanesweep(dir.path(), &words));
     }
 }

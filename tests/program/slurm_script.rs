@@ -35,8 +35,8 @@ fn density() -> &'static [u8] {
     static DENSITY: OnceLock<Vec<u8>> = OnceLock::new();
     DENSITY.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
-        let fit = "-q fit --synth-recordings 3 --synth-duration 300 --categories cut-in --parameterizations 2 \
-                   --no-comparison --valid-draws 1000 --out d.json";
+        let fit = "-q fit --synth-recordings 3 --config generator.duration_s=300 --categories cut-in --parameterizations 2 \
+                   --no-comparison --config fit.valid_draws=1000 --out d.json";
         let made = lanesweep(dir.path(), &fit.split_whitespace().collect::<Vec<_>>());
         assert!(made.status.success(), "{}", said(&made.stderr));
         std::fs::read(dir.path().join("d.json")).unwrap()
@@ -52,8 +52,10 @@ fn the_scripts_ask_slurm_for_what_was_asked() {
     let dir = tempfile::tempdir().unwrap();
     let flags =
         ["--time", "1-12", "--gpus", "1", "--cpus", "4", "--mem", "8G", "--partition", "gpu", "--account", "a1"];
-    let args =
-        [&["slurm", "study.toml", "--array", "20", "--out", "out", "--qos", "q", "--signal-before", "60"], &flags[..]];
+    let args = [
+        &["cluster", "slurm", "study.toml", "--array", "20", "--out", "out", "--qos", "q", "--signal-before", "60"],
+        &flags[..],
+    ];
     let [array, merge, submit] = scripts(dir.path(), "out", &args.concat()).map(|(_, text)| text);
     let out = dir.path().join("out").display().to_string();
     for line in
@@ -89,7 +91,7 @@ fn any_path_gives_valid_shell() {
         let run = ["--", "sample", "densities/cut in $1's.json", "--samples", "1000000000"];
         std::fs::create_dir_all(dir.path().join("densities")).unwrap();
         std::fs::write(dir.path().join(run[2]), density()).unwrap();
-        let args = [&["slurm", "--array", "3", "--program", &program, "--out", out], &run[..]].concat();
+        let args = [&["cluster", "slurm", "--array", "3", "--program", &program, "--out", out], &run[..]].concat();
         for (path, _) in scripts(dir.path(), out, &args) {
             let parsed = Command::new("bash").arg("-n").arg(&path).output().unwrap();
             assert!(parsed.status.success(), "{}", said(&parsed.stderr));
@@ -114,7 +116,7 @@ fn submit_gives_the_program_the_arguments_as_typed() {
     std::fs::set_permissions(&echo, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
     let run = ["--", "sample", "it's $HOME \"x\".json", "--samples=5", "--thw", "1.2,0.4"];
     std::fs::write(dir.path().join(run[2]), density()).unwrap();
-    let args = [&["slurm", "--array", "3", "--program", "./echo args", "--out", "o"], &run[..]].concat();
+    let args = [&["cluster", "slurm", "--array", "3", "--program", "./echo args", "--out", "o"], &run[..]].concat();
     let [_, _, (submit, _)] = scripts(dir.path(), "o", &args);
     let ended = Command::new("bash").arg(submit).current_dir("/").output().unwrap();
     // The plan failed: nothing is submitted, and the status is the program's.
@@ -141,7 +143,7 @@ fn task(program: &str, restarts: u32, signal: Option<&str>) -> (Option<i32>, Str
         std::fs::write(bin.join(name), text).unwrap();
         std::fs::set_permissions(bin.join(name), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
     }
-    let [(array, _), ..] = scripts(dir.path(), "o", &["slurm", "s.toml", "--array", "3", "--out", "o"]);
+    let [(array, _), ..] = scripts(dir.path(), "o", &["cluster", "slurm", "s.toml", "--array", "3", "--out", "o"]);
     let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
     let mut shell = Command::new("bash");
     shell.arg(array).env("PATH", path).env("SLURM_ARRAY_JOB_ID", "7").env("SLURM_ARRAY_TASK_ID", "2");
@@ -179,7 +181,7 @@ fn a_task_goes_back_to_the_queue_when_it_can_continue_and_only_then() {
 #[test]
 fn what_cannot_work_is_refused_and_nothing_is_written() {
     let dir = tempfile::tempdir().unwrap();
-    let start = ["slurm", "--array", "3", "--out", "o"];
+    let start = ["cluster", "slurm", "--array", "3", "--out", "o"];
     for (flags, told) in [
         (&["--", "sample", "a.json", "--shard", "0/3"][..], "--shard cannot be given after the `--`"),
         (&["--", "study", "--out=x"], "--out cannot be given"),
@@ -212,7 +214,10 @@ fn what_cannot_work_is_refused_and_nothing_is_written() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
     std::fs::write(dir.path().join("s.toml"), "").unwrap();
     for tasks in ["0", "100000"] {
-        assert_eq!(lanesweep(dir.path(), &["slurm", "s.toml", "--array", tasks, "--out", "o"]).status.code(), Some(2));
+        assert_eq!(
+            lanesweep(dir.path(), &["cluster", "slurm", "s.toml", "--array", tasks, "--out", "o"]).status.code(),
+            Some(2)
+        );
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
 }

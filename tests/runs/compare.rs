@@ -21,7 +21,7 @@ use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
-const SMALL: [&str; 4] = ["--synth-recordings", "3", "--synth-duration", "200"];
+const SMALL: [&str; 4] = ["--synth-recordings", "3", "--config", "generator.duration_s=200"];
 
 fn lanesweep(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));

@@ -212,7 +212,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
 fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
     let bench = Bench::new();
     let dir = bench.path();
-    done(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--synth-duration", "60"]);
+    done(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--config", "generator.duration_s=60"]);
     std::fs::write(dir.join("taken"), "mine").unwrap();
     let commands = [
         "study --scenarios scenarios.jsonl --out @",
@@ -224,8 +224,8 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "compare --scenarios scenarios.jsonl --samples 1000 --out @",
         "fit --scenarios scenarios.jsonl --out @",
         "synth @",
-        "slurm --array 2 --out @ -- study",
-        "merge @",
+        "cluster slurm --array 2 --out @ -- study",
+        "cluster merge @",
         "simulate --from @ --lane a/S/1.0s/FSM",
     ];
     for command in commands {
@@ -240,9 +240,9 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
     for command in [
         "study --scenarios scenarios.jsonl --out fresh --rows taken/lanes.csv",
         "sample density.json --samples 1000 --out fresh --rows taken/rows.csv",
-        "mine recordings -o taken/scenarios.jsonl",
+        "mine recordings --out taken/scenarios.jsonl",
         "fit --scenarios scenarios.jsonl --categories cut-in --parameterizations 2 --out taken/density.json",
-        "slurm --array 2 --out fresh --scripts taken/scripts -- study",
+        "cluster slurm --array 2 --out fresh --scripts taken/scripts -- study",
     ] {
         let args: Vec<&str> = command.split(' ').collect();
         let (code, said) = lanesweep(dir, &args);
@@ -252,7 +252,7 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
     for command in [
         "study --scenarios scenarios.jsonl --out fresh --rows recordings",
         "sample density.json --samples 1000 --out fresh --rows recordings",
-        "mine recordings -o .",
+        "mine recordings --out .",
     ] {
         let args: Vec<&str> = command.split(' ').collect();
         let (code, said) = lanesweep(dir, &args);

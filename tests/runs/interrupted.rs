@@ -58,8 +58,8 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
         command.current_dir(dir.path()).args(["-q", "--threads", "1"]).args(args).stdout(Stdio::null());
         command
     };
-    let fit = ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--valid-draws"];
-    let fit = [&fit[..], &["1000", "--no-comparison", "--out", "d.json"]].concat();
+    let fit = ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--config"];
+    let fit = [&fit[..], &["fit.valid_draws=1000", "--no-comparison", "--out", "d.json"]].concat();
     assert!(lanesweep(&fit).status().unwrap().success());
     let run = ["sample", "d.json", "--estimator", "is", "--models", "FSM,RSS", "--thw", "0.6", "--samples", "200000"];
     let run = |out| [&run[..], &["--backend", "cpu", "--out", out]].concat();
@@ -102,7 +102,17 @@ fn study_interrupted_by(signal: &str) -> Option<i32> {
     let lanes = dir.path().join("lanes.csv");
     std::fs::write(&lanes, "of an earlier run").unwrap();
     let mut study = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .args(["-q", "--threads", "1", "study", "--reference", "--synth-recordings", "2", "--synth-duration", "300"])
+        .args([
+            "-q",
+            "--threads",
+            "1",
+            "study",
+            "--reference",
+            "--synth-recordings",
+            "2",
+            "--config",
+            "generator.duration_s=300",
+        ])
         .args([Path::new("--out"), &dir.path().join("out"), Path::new("--rows"), &lanes])
         .stdout(Stdio::null())
         .spawn()

@@ -43,21 +43,23 @@ const VERBS: [Verb; 18] = [
     verb(
         "study",
         Some("run.json"),
-        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --rows out/lanes.csv --out out"),
+        Some(
+            "study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --rows out/lanes.csv --out out",
+        ),
         "study --plan plan/plan.json --threads 1 --out out",
     ),
     verb(
         "study --rows",
         Some("run.json"),
-        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
+        Some("study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --out out"),
         "study --synth-recordings 1 --categories cut-in --rows rows/lanes.csv --out out",
     ),
     verb("study --shard", None, None, "study --plan plan/plan.json --shard 0/2 --threads 1 --out out"),
     verb(
         "merge",
         Some("run.json"),
-        Some("study --synth-recordings 1 --synth-duration 120 --compare-reference --out out"),
-        "merge out",
+        Some("study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --out out"),
+        "cluster merge out",
     ),
     verb(
         "sample mc",
@@ -81,7 +83,7 @@ const VERBS: [Verb; 18] = [
         "sample is",
         Some("estimate.json"),
         Some(SAMPLE),
-        "sample d.json --estimator is --pilot 2000 --samples 10000 --thw 0.6 --models RSS,FSM --out out",
+        "sample d.json --estimator is --config sample.pilot=2000 --samples 10000 --thw 0.6 --models RSS,FSM --out out",
     ),
     verb(
         "sample ce",
@@ -125,11 +127,11 @@ const VERBS: [Verb; 18] = [
         "fit",
         None,
         Some(
-            "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --valid-draws 999 --out out",
+            "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --config fit.valid_draws=999 --out out",
         ),
-        "fit --synth-recordings 3 --categories cut-in --no-comparison --valid-draws 1000 --out out",
+        "fit --synth-recordings 3 --categories cut-in --no-comparison --config fit.valid_draws=1000 --out out",
     ),
-    verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --synth-duration 30"),
+    verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --config generator.duration_s=30"),
     verb(
         "export",
         Some("index.csv"),
@@ -141,8 +143,8 @@ const VERBS: [Verb; 18] = [
     verb(
         "slurm",
         Some("submit.sh"),
-        Some("slurm --array 3 --out result --scripts out -- study --synth-recordings 2"),
-        "slurm --array 2 --out result --scripts out -- sample d.json",
+        Some("cluster slurm --array 3 --out result --scripts out -- study --synth-recordings 2"),
+        "cluster slurm --array 2 --out result --scripts out -- sample d.json",
     ),
 ];
 
@@ -245,8 +247,11 @@ fn furnish(dir: &Path) {
     done(dir, &format!("{plan} --out parts"));
     done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
     done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
-    done(dir, "sample d.json --estimator is --pilot 2000 --samples 100 --out pilot --thw 0.6 --models RSS");
-    done(dir, "study --synth-recordings 1 --synth-duration 200 --categories cut-in --out old-study");
+    done(
+        dir,
+        "sample d.json --estimator is --config sample.pilot=2000 --samples 100 --out pilot --thw 0.6 --models RSS",
+    );
+    done(dir, "study --synth-recordings 1 --config generator.duration_s=200 --categories cut-in --out old-study");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples");
     std::fs::copy(examples.join("cut-in-stochastic.xosc"), dir.join("d.xosc")).unwrap();
 }
@@ -362,10 +367,15 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     for (data, seed) in [("a", 1), ("b", 2)] {
-        done(dir, &format!("synth {data} --synth-recordings 1 --synth-duration 60 --synth-seed {seed}"));
+        done(
+            dir,
+            &format!(
+                "synth {data} --synth-recordings 1 --config generator.duration_s=60 --config generator.seed={seed}"
+            ),
+        );
     }
     put(dir, None);
-    let mine = |data: &str| format!("mine {data} -o out/s.jsonl");
+    let mine = |data: &str| format!("mine {data} --out out/s.jsonl");
     let expected = ["a", "b"].map(|data| {
         done(dir, &mine(data));
         files(&dir.join("out"))

@@ -26,7 +26,15 @@ fn text(path: &Path) -> &str {
 fn an_output_never_replaces_an_input_or_another_result() {
     let dir = tempfile::tempdir().unwrap();
     let (recordings, out) = (dir.path().join("recordings"), dir.path().join("out"));
-    let made = lanesweep(&["-q", "synth", text(&recordings), "--synth-recordings", "1", "--synth-duration", "60"]);
+    let made = lanesweep(&[
+        "-q",
+        "synth",
+        text(&recordings),
+        "--synth-recordings",
+        "1",
+        "--config",
+        "generator.duration_s=60",
+    ]);
     assert!(made.status.success());
     let tracks = recordings.join("01_tracks.csv");
     let before = std::fs::read(&tracks).unwrap();
@@ -52,7 +60,7 @@ fn an_output_never_replaces_an_input_or_another_result() {
 fn a_study_on_written_synthetic_recordings_still_says_synthetic() {
     let dir = tempfile::tempdir().unwrap();
     let (recordings, out) = (dir.path().join("recordings"), dir.path().join("out"));
-    lanesweep(&["-q", "synth", text(&recordings), "--synth-recordings", "1", "--synth-duration", "120"]);
+    lanesweep(&["-q", "synth", text(&recordings), "--synth-recordings", "1", "--config", "generator.duration_s=120"]);
     let study = lanesweep(&["-q", "study", text(&recordings), "--out", text(&out)]);
     assert!(String::from_utf8_lossy(&study.stdout).contains("SYNTHETIC DATA"), "{study:?}");
 }
@@ -153,7 +161,8 @@ fn a_pilot_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
     assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&at("d.json"))]].concat()).status.success());
     let density = at("d.json");
-    let sample = ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000", "--pilot", "2000"];
+    let sample =
+        ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000", "--config", "sample.pilot=2000"];
     let out = at("out");
     let sample = [&sample[..], &["--models", "RSS", "--thw", "0.6", "--out", text(&out)]].concat();
     std::fs::create_dir(&out).unwrap();
@@ -217,7 +226,10 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
         (&part, &["run.lock", "part-00000-of-00001.lock", "part-00000-of-00001.journal"]),
         (&sample, &["run.lock", "estimate.json", "estimates.csv"]),
         (&map, &["run.lock", "map.json", "cells.csv"]),
-        (&["-q", "synth", "--synth-recordings", "1", "--synth-duration", "20"], &["run.lock", "01_tracksMeta.csv"]),
+        (
+            &["-q", "synth", "--synth-recordings", "1", "--config", "generator.duration_s=20"],
+            &["run.lock", "01_tracksMeta.csv"],
+        ),
     ];
     for (run, names) in links {
         for name in names {
@@ -299,7 +311,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
         output.stdout
     };
     let recordings = at("recordings");
-    ran(&["-q", "synth", text(&recordings), "--synth-recordings", "2", "--synth-duration", "150"]);
+    ran(&["-q", "synth", text(&recordings), "--synth-recordings", "2", "--config", "generator.duration_s=150"]);
     // Copied without the sentence beside them, as among recordings of other origin.
     std::fs::remove_file(recordings.join("SYNTHETIC.txt")).unwrap();
     let scenarios = at("s.jsonl");
@@ -331,7 +343,17 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
         }
     }
     let (file, density) = (text(&scenarios), at("i.json"));
-    let fit = ["fit", "--scenarios", file, "--categories", "lvd", "--parameterizations", "i", "--valid-draws", "1000"];
+    let fit = [
+        "fit",
+        "--scenarios",
+        file,
+        "--categories",
+        "lvd",
+        "--parameterizations",
+        "i",
+        "--config",
+        "fit.valid_draws=1000",
+    ];
     let fitted = ran(&[&["-q"], &fit[..], &["--no-comparison", "--format", "json", "--out", text(&density)]].concat());
     assert!(is_synthetic(&fitted));
     let sampled = ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--format", "json"];

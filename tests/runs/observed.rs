@@ -215,7 +215,7 @@ fn lanesweep(args: &[&str]) -> (Option<i32>, String, String) {
 fn every_verb_takes_observed_headways_and_says_how_many_failures_come_from_close_following() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
-    let small = ["--synth-recordings", "4", "--synth-duration", "300"];
+    let small = ["--synth-recordings", "4", "--config", "generator.duration_s=300"];
     let run = |args: &[&str]| {
         let (code, out, err) = lanesweep(args);
         assert_eq!(code, Some(0), "{args:?}: {err}");

@@ -77,7 +77,11 @@ pub const SAMPLE: [&str; 9] =
 
 /// Importance sampling that can be split: with a proposal of a run before.
 pub fn weighted(dir: &Path) -> Vec<&'static str> {
-    done(dir, &[&SAMPLE[..], &["--estimator", "is", "--pilot", "2000", "--models", "RSS", "--out", "pilot"]].concat());
+    done(
+        dir,
+        &[&SAMPLE[..], &["--estimator", "is", "--config", "sample.pilot=2000", "--models", "RSS", "--out", "pilot"]]
+            .concat(),
+    );
     [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal-RSS.json", "--models", "RSS,FSM"]].concat()
 }
 
@@ -90,14 +94,14 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     for shard in ["2/3", "0/3", "1/3"] {
         done(dir, &[&STUDY[..], &["--out", "three", "--shard", shard]].concat());
     }
-    assert_eq!(done(dir, &["-q", "merge", "three"]), whole);
+    assert_eq!(done(dir, &["-q", "cluster", "merge", "three"]), whole);
     same(&dir.join("whole"), &dir.join("three"));
     // A second merge changes nothing, and a finished part is left alone.
     let part = dir.join("three/part-00001-of-00003.json");
     let before = std::fs::metadata(&part).unwrap().modified().unwrap();
     done(dir, &[&STUDY[..], &["--out", "three", "--shard", "1/3"]].concat());
     assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
-    done(dir, &["-q", "merge", "three"]);
+    done(dir, &["-q", "cluster", "merge", "three"]);
     same(&dir.join("whole"), &dir.join("three"));
     // More shards than units, from one plan: the data are not read again.
     done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
@@ -110,7 +114,7 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
             &["-q", "study", "--plan", "plan/plan.json", "--out", "hundred", "--shard", &shard, "--backend", "cpu"],
         );
     }
-    assert_eq!(done(dir, &["-q", "merge", "hundred"]), whole);
+    assert_eq!(done(dir, &["-q", "cluster", "merge", "hundred"]), whole);
     same(&dir.join("whole"), &dir.join("hundred"));
     assert_eq!(done(dir, &["-q", "study", "--plan", "plan/plan.json", "--out", "planned", "--backend", "cpu"]), whole);
     same(&dir.join("whole"), &dir.join("planned"));
@@ -125,7 +129,7 @@ fn samples_in_shards_are_the_run_in_one_piece_with_its_convergence() {
     for shard in ["6/7", "0/7", "3/7", "1/7", "5/7", "2/7", "4/7"] {
         done(dir, &[&SAMPLE[..], &["--out", "seven", "--shard", shard]].concat());
     }
-    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
+    assert_eq!(done(dir, &["-q", "cluster", "merge", "seven"]), whole);
     same(&dir.join("whole"), &dir.join("seven"));
     assert!(results(&dir.join("seven")).iter().any(|(name, _)| name == "convergence.svg"));
 }
@@ -144,17 +148,21 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
         assert!(out.is_empty(), "{out}");
     };
     std::fs::create_dir(dir.join("empty")).unwrap();
-    refused(&["merge", "empty"], 3, &["plan.json is missing"]);
-    refused(&["merge", "nowhere"], 3, &["no such folder"]);
+    refused(&["cluster", "merge", "empty"], 3, &["plan.json is missing"]);
+    refused(&["cluster", "merge", "nowhere"], 3, &["no such folder"]);
     std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
-    refused(&["merge", "empty"], 3, &["an unsplit run"]);
+    refused(&["cluster", "merge", "empty"], 3, &["an unsplit run"]);
     let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
     shard("0/3", "p");
     shard("2/3", "p");
-    refused(&["merge", "p"], 3, &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"]);
+    refused(
+        &["cluster", "merge", "p"],
+        3,
+        &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"],
+    );
     shard("1/3", "p");
     shard("0/1", "p");
-    refused(&["merge", "p"], 3, &["doubled"]);
+    refused(&["cluster", "merge", "p"], 3, &["doubled"]);
     std::fs::remove_file(dir.join("p/part-00000-of-00001.json")).unwrap();
     // Damaged: one byte.
     let part = dir.join("p/part-00001-of-00003.json");
@@ -163,19 +171,19 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     std::fs::write(&part, &damaged).unwrap();
-    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
+    refused(&["cluster", "merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
     std::fs::write(&part, &whole[..middle]).unwrap();
-    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
+    refused(&["cluster", "merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
     // Foreign: the same interval of another run.
     let other = [&SAMPLE[..], &["--out", "q", "--seed", "8", "--shard", "1/3"]].concat();
     done(dir, &other);
     std::fs::copy(dir.join("q/part-00001-of-00003.json"), &part).unwrap();
-    refused(&["merge", "p"], 3, &["foreign"]);
+    refused(&["cluster", "merge", "p"], 3, &["foreign"]);
     // Under another part's name.
     std::fs::write(&part, std::fs::read(dir.join("p/part-00000-of-00003.json")).unwrap()).unwrap();
-    refused(&["merge", "p"], 3, &["its name stands for"]);
+    refused(&["cluster", "merge", "p"], 3, &["its name stands for"]);
     std::fs::write(&part, &whole).unwrap();
-    done(dir, &["-q", "merge", "p"]);
+    done(dir, &["-q", "cluster", "merge", "p"]);
     // Another run into the same folder.
     let other = [&SAMPLE[1..], &["--out", "p", "--seed", "8", "--shard", "1/3"]].concat();
     refused(&other, 3, &["holds the plan of another run"]);
@@ -183,7 +191,7 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     refused(&["study", "--plan", "p/plan.json", "--seed", "3"], 2, &["cannot be used with"]);
     refused(&["study", "--plan", "p/plan.json", "--out", "x"], 3, &["a `study plan` is needed"]);
     std::fs::write(dir.join("p/plan.json"), "{}").unwrap();
-    refused(&["merge", "p"], 3, &["no whole file of a run in parts"]);
+    refused(&["cluster", "merge", "p"], 3, &["no whole file of a run in parts"]);
 }
 
 /// Replaces the first occurrence of a text in a file.
@@ -211,7 +219,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
             edit(&path, "\"engine\":4,", "\"engine\":5,");
-            refused(dir, &["merge", name], "of engine 5, this program has engine 4");
+            refused(dir, &["cluster", "merge", name], "of engine 5, this program has engine 4");
             if file != "plan.json" {
                 refused(dir, &shard("1/2"), "of engine 5, this program has engine 4");
             } else {
@@ -222,7 +230,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             let earlier = r#""version":1,"sha256":"00","content":"#;
             std::fs::write(&path, &whole).unwrap();
             edit(&path, "\"version\":2,\"engine\":4,", earlier);
-            refused(dir, &["merge", name], "its version is 1, this program reads 2");
+            refused(dir, &["cluster", "merge", name], "its version is 1, this program reads 2");
             if file == "plan.json" {
                 let plan = format!("{name}/plan.json");
                 let said = format!("{plan}: its version is 1, this program reads 2");
@@ -230,7 +238,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             }
             std::fs::write(&path, &whole).unwrap();
         }
-        done(dir, &["-q", "merge", name]);
+        done(dir, &["-q", "cluster", "merge", name]);
     }
     // The records of whole runs say it too.
     let record =
@@ -283,12 +291,12 @@ fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
         change(&mut sealed["content"]["plan"]);
         let line = lanesweep::run::parts::seal("study plan", &sealed["content"]).unwrap().0;
         std::fs::write(&path, [&line, &whole[end + 1..]].concat()).unwrap();
-        refused(dir, &["merge", "p"], said);
+        refused(dir, &["cluster", "merge", "p"], said);
         refused(dir, &shard("1/3"), said);
     }
     std::fs::write(&path, &whole).unwrap();
     let _ = ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
-    done(dir, &["-q", "merge", "p"]);
+    done(dir, &["-q", "cluster", "merge", "p"]);
 }
 
 #[test]
@@ -393,7 +401,7 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
         }
         assert!(interruptions > 0, "the run is too short to be interrupted");
     }
-    done(dir, &["-q", "merge", "parts"]);
+    done(dir, &["-q", "cluster", "merge", "parts"]);
     same(&dir.join("whole"), &dir.join("run"));
     same(&dir.join("whole"), &dir.join("parts"));
 }
@@ -441,7 +449,7 @@ fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
         assert!(first.try_wait().unwrap().is_none(), "the first process has ended");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    let others = [&run[..], &["-q", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
+    let others = [&run[..], &["-q", "cluster", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
     let beside = lanesweep(dir, &[&shard("1/2")[..], &["--stop-after", "0.3"]].concat());
     first.kill().unwrap();
     first.wait().unwrap();

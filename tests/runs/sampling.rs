@@ -168,7 +168,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
     run(&[&base[..], &["--out", "whole", "--rows", "rows.csv"]].concat());
     run(&[&base[..], &["--out", "joined", "--shard", "1/2"]].concat());
     run(&[&base[..], &["--out", "joined", "--shard", "0/2"]].concat());
-    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "joined"]);
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "cluster", "merge", "joined"]);
     assert_eq!(code, 0, "{err}");
     let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
     let files = ["estimates.csv", "worst.csv", "map-FSM.csv", "map-Reg157.svg", "density.json", "convergence.csv"];
@@ -236,7 +236,7 @@ fn every_estimator_runs_and_its_proposal_can_be_sampled_again() {
     for shard in ["2/3", "0/3", "1/3"] {
         run(&[&given[..], &["--out", "g", "--shard", shard]].concat());
     }
-    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "g"]);
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "cluster", "merge", "g"]);
     assert_eq!(code, 0, "{err}");
     let read = |folder: &str| std::fs::read_to_string(dir.path().join(folder).join("estimates.csv")).unwrap();
     assert_eq!(read("g"), read("again"));
@@ -265,7 +265,7 @@ fn a_pilot_for_fewer_models_leaves_no_proposal_of_the_former_run() {
     let (dir, _) = folder();
     let proposals = |models: &str| {
         let base = ["-q", "sample", "density.json", "--estimator", "is", "--thw", "0.3", "--backend", "cpu"];
-        let more = ["--samples", "2000", "--pilot", "2000", "--out", "o", "--models", models];
+        let more = ["--samples", "2000", "--config", "sample.pilot=2000", "--out", "o", "--models", models];
         let (code, _, err) = lanesweep(dir.path(), &[&base[..], &more].concat());
         assert_eq!(code, 0, "{err}");
         let names = std::fs::read_dir(dir.path().join("o")).unwrap();

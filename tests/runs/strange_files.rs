@@ -84,9 +84,9 @@ fn readers() -> Vec<Vec<&'static str>> {
         "simulate --table @",
         "simulate --scenarios @ --lane a/S/1.0s/FSM",
         "simulate --profile @",
-        "conformance @",
-        "conformance --golden-lanes lanes.csv --scenarios @",
-        "conformance --golden-lanes @ --scenarios scenarios.jsonl",
+        "verify conformance @",
+        "verify conformance --golden-lanes lanes.csv --scenarios @",
+        "verify conformance --golden-lanes @ --scenarios scenarios.jsonl",
         "verify --backend cpu --scenarios @",
         "verify --backend cpu --profile @",
     ]
@@ -101,8 +101,10 @@ fn with(args: &[&'static str], file: &'static str) -> Vec<&'static str> {
 /// The good files that some verbs need beside the strange one.
 fn furnish(dir: &Path) {
     std::fs::copy(common::golden("paper_sumo_01_02_scenarios.jsonl"), dir.join("scenarios.jsonl")).unwrap();
-    let (code, said) =
-        lanesweep(dir, &["-q", "synth", "recordings", "--synth-recordings", "1", "--synth-duration", "60"]);
+    let (code, said) = lanesweep(
+        dir,
+        &["-q", "synth", "recordings", "--synth-recordings", "1", "--config", "generator.duration_s=60"],
+    );
     assert_eq!(code, 0, "{said}");
     std::fs::write(dir.join("lanes.csv"), "scenario,param,thw,model\n").unwrap();
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];
@@ -143,7 +145,7 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let names = [
-        ("merge", "plan.json", vec!["merge", "in"]),
+        ("merge", "plan.json", vec!["cluster", "merge", "in"]),
         ("rerun", "estimate.json", vec!["simulate", "--from", "in", "--lane", "a/S/1.0s/FSM"]),
     ];
     for (what, name, args) in names {
@@ -164,7 +166,8 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
     // The plan of a run in parts, where the program would leave its own.
     std::fs::create_dir(dir.join("out")).unwrap();
     pipe(&dir.join("out/plan.json"));
-    let study = ["study", "--synth-recordings", "1", "--synth-duration", "120", "--out", "out", "--plan-only"];
+    let study =
+        ["study", "--synth-recordings", "1", "--config", "generator.duration_s=120", "--out", "out", "--plan-only"];
     let (code, said) = lanesweep(dir, &study);
     assert_eq!(code, 3, "{said}");
     assert!(said.contains("out/plan.json") && said.contains("expected a regular file"), "{said}");
@@ -172,7 +175,8 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
 
 /// A recording whose file of tracks is damaged so.
 fn recording(dir: &Path, damage: impl FnOnce(&Path)) -> PathBuf {
-    let (code, said) = lanesweep(dir, &["-q", "synth", "in", "--synth-recordings", "1", "--synth-duration", "60"]);
+    let (code, said) =
+        lanesweep(dir, &["-q", "synth", "in", "--synth-recordings", "1", "--config", "generator.duration_s=60"]);
     assert_eq!(code, 0, "{said}");
     let tracks = dir.join("in/01_tracks.csv");
     damage(&tracks);
@@ -421,7 +425,8 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
         let mut reader = csv::Reader::from_path(dir.join("lanes.csv")).unwrap();
         assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
         // Our readers take the apostrophe away: of lanes, and of scenarios.
-        let (code, _, err) = raw(dir, &["conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
+        let (code, _, err) =
+            raw(dir, &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
         assert_eq!(code, 0, "{id}: {err}");
         let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
         std::fs::write(dir.join("cases.csv"), row).unwrap();
@@ -434,10 +439,10 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
 #[test]
 fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
     let dir = tempfile::tempdir().unwrap();
-    let part = ["-q", "study", "--synth-recordings", "1", "--synth-duration", "120", "--shard", "0/2"];
+    let part = ["-q", "study", "--synth-recordings", "1", "--config", "generator.duration_s=120", "--shard", "0/2"];
     let (code, _, err) = raw(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
     assert_eq!(code, 0, "{err}");
-    let (code, said) = lanesweep(dir.path(), &["merge", "it's; mine"]);
+    let (code, said) = lanesweep(dir.path(), &["cluster", "merge", "it's; mine"]);
     assert_eq!(code, 3, "{said}");
     assert!(said.contains(r"--plan 'it'\''s; mine/plan.json' --shard 1/2 --out 'it'\''s; mine'"), "{said}");
 }

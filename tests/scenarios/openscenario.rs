@@ -282,7 +282,7 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
             "fit",
             "--scenarios",
             "s.jsonl",
-            "--category",
+            "--categories",
             "cut-in",
             "--parameterizations",
             "2",

@@ -38,7 +38,7 @@ fn same_numbers(rows: &Value, csv: &Path) {
     }
 }
 
-const SMALL: [&str; 6] = ["--synth-recordings", "2", "--synth-duration", "200", "--backend", "cpu"];
+const SMALL: [&str; 6] = ["--synth-recordings", "2", "--config", "generator.duration_s=200", "--backend", "cpu"];
 
 #[test]
 fn a_study_prints_its_tables_and_a_merged_one_the_same() {
@@ -68,7 +68,7 @@ fn a_study_prints_its_tables_and_a_merged_one_the_same() {
         let args = study(&["--shard", shard, "--out", "parts"]);
         lanesweep(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>());
     }
-    let merged = json(dir.path(), &["merge", "parts"]);
+    let merged = json(dir.path(), &["cluster", "merge", "parts"]);
     for name in ["failures", "f1", "claims", "data", "plan_sha256", "lanes"] {
         assert_eq!(merged[name], whole[name], "{name}");
     }
@@ -133,6 +133,6 @@ fn maps_traces_and_checks_print_documents() {
         |set: &Value| set["tallies"].as_array().unwrap().iter().map(|t| t["lanes"].as_u64().unwrap()).sum::<u64>();
     assert_eq!(sets.iter().map(lanes).sum::<u64>(), printed["lanes"].as_u64().unwrap());
 
-    let devices = json(dir.path(), &["devices", "--no-self-check"]);
+    let devices = json(dir.path(), &["verify", "devices", "--no-self-check"]);
     assert!(devices["devices"].is_array());
 }

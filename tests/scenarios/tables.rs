@@ -223,7 +223,7 @@ fn an_ending_that_is_unknown_is_answered_with_the_known_ones_before_any_work() {
         (&["study", "--scenarios", "s.xml"], ".jsonl, .parquet or .csv"),
         (&["simulate", "--table", "cases.jsonl"], ".csv or .parquet"),
     ];
-    lanesweep(dir.path(), &["-q", "synth", "rec", "--synth-recordings", "1", "--synth-duration", "60"]);
+    lanesweep(dir.path(), &["-q", "synth", "rec", "--synth-recordings", "1", "--config", "generator.duration_s=60"]);
     for (args, expected) in cases {
         let (code, text) = said(dir.path(), args);
         assert!(code == 2 && text.contains(expected), "{args:?}: {code}, {text}");

@@ -140,7 +140,7 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
     assert!(of("s.csv", "").is_err() && of("s.csv", "id,category\n").is_err());
 }
 
-const CASES: &str = "id,category,model,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+const CASES: &str = "id,category,models,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
 ahead_speed_kmh,duration_s,rate_hz
 a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 ,lvd,RSS,108,30,,30,,-6,0,,,,10
@@ -345,7 +345,7 @@ fn simulate_takes_a_row_of_a_parquet_table() {
     let dir = tempfile::tempdir().unwrap();
     let columns = vec![
         ("category", texts(&["lvd", "cut-in"])),
-        ("model", texts(&["RSS", "FSM"])),
+        ("models", texts(&["RSS", "FSM"])),
         ("ego_speed", numbers(&[20.0, 30.0])),
         ("speed_kmh", numbers(&[72.0, 72.0])),
         ("thw", numbers(&[1.0, 1.2])),

@@ -27,7 +27,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-const SMALL: [&str; 4] = ["--synth-recordings", "3", "--synth-duration", "200"];
+const SMALL: [&str; 4] = ["--synth-recordings", "3", "--config", "generator.duration_s=200"];
 
 #[test]
 fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
@@ -154,8 +154,8 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let file = dir.path().join("one.json");
     let cases: [(&[&str], i32, &str); 11] = [
-        (&["fit", "--valid-draws", "0"], 2, "out of range (1 to 1000000000)"),
-        (&["fit", "--valid-draws", "1000000001"], 2, "out of range (1 to 1000000000)"),
+        (&["fit", "--config", "fit.valid_draws=0"], 2, "expected a whole number from 1 to 1000000000"),
+        (&["fit", "--config", "fit.valid_draws=1000000001"], 2, "expected a whole number from 1 to 1000000000"),
         (&["fit", "--parameterizations", "9"], 2, "there is no parameterization `9`"),
         (&["fit", "--parameterizations", "9"], 2, "LVD: i ii iii iv v"),
         (&["fit", "--categories", "cut-in", "--parameterizations", "ii"], 2, "of cut-in"),

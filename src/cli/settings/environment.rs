@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 
-use super::keys::{Key, RENAMED, nearest};
+use super::keys::{Key, nearest};
 use crate::{Error, Place, Result};
 
 /// Names the configuration file, where `--config` names none.
@@ -41,9 +41,7 @@ pub(super) fn read<'k>(variables: &[(OsString, OsString)], keys: &'k [Key]) -> R
             continue;
         }
         let place = || Place::item(format!("environment variable {name}"));
-        let old = || RENAMED.iter().find(|(old, _)| variable_of(old) == name).and_then(|(old, _)| Key::find(keys, old));
-        let key = known.iter().find(|(variable, _)| variable == name).map(|(_, key)| *key);
-        let Some(key) = key.or_else(old) else {
+        let Some(key) = known.iter().find(|(variable, _)| variable == name).map(|(_, key)| *key) else {
             let names = known.iter().map(|(variable, _)| variable.as_str()).chain([FILE_VARIABLE]);
             let help = nearest(name, names).map_or(String::new(), |near| format!("did you mean {near}? "));
             let help = format!("{help}Variables are LANESWEEP_ and a key of `lanesweep config show` in capitals");

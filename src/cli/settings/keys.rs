@@ -5,14 +5,6 @@ use serde_json::Value;
 use super::schema::settings_schema;
 use crate::support::near_name;
 
-/// Keys under their names of the release before, and now.
-pub(super) const RENAMED: [(&str, &str); 4] = [
-    ("sample.until", "sample.half_width"),
-    ("sample.worst_share", "sample.elite_fraction"),
-    ("sample.broad", "sample.broad_weight"),
-    ("sample.defence", "sample.defensive_weight"),
-];
-
 /// One key with what it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
@@ -63,9 +55,8 @@ impl Key {
         keys
     }
 
-    /// A key by its name, or by the one that it had in the release before.
+    /// A key by its name.
     pub fn find<'a>(keys: &'a [Key], name: &str) -> Option<&'a Key> {
-        let name = RENAMED.iter().find(|(old, _)| *old == name).map_or(name, |(_, new)| new);
         keys.iter().find(|key| key.name == name)
     }
 

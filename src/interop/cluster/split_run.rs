@@ -85,6 +85,6 @@ mod tests {
                 assert!(problem.contains(&format!("option `{option}` cannot be given")), "{words}: {problem}");
             }
         }
-        run("study --lanes x.csv --seed 3").unwrap();
+        run("study --rows x.csv --seed 3").unwrap();
     }
 }

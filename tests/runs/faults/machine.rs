@@ -59,7 +59,7 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 #[test]
 fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
     let bench = Bench::new();
-    let synth = ["-q", "synth", "--synth-recordings", "2", "--synth-duration", "20"];
+    let synth = ["-q", "synth", "--synth-recordings", "2", "--config", "generator.duration_s=20"];
     done(bench.path(), &[&synth[..], &["whole"]].concat());
     let size = |name: &str| std::fs::metadata(bench.path().join("whole").join(name)).unwrap().len();
     // The first fits, the second only to its half.
