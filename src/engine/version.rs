@@ -284,13 +284,12 @@ mod tests {
             let space = ParameterSpace::new(id, &options, reduction.as_ref(), false).unwrap();
             let d = space.dimensions();
             let mean = |k: usize| (0..d).map(|at| 1.0 + ((at * 5 + k * 3) % 7) as f64).collect::<Vec<f64>>();
-            let factor = (0..d * d).map(|at| match (at / d, at % d) {
-                (row, column) if row == column => 0.75,
-                (row, column) if row > column => 0.125,
-                _ => 0.0,
+            let factor = nalgebra::DMatrix::from_fn(d, d, |row, column| match row.cmp(&column) {
+                std::cmp::Ordering::Equal => 0.75,
+                std::cmp::Ordering::Greater => 0.125,
+                std::cmp::Ordering::Less => 0.0,
             });
-            let mixture =
-                Mixture::new(vec![1.0, 2.0, 5.0], (0..3).map(mean).collect(), vec![factor.collect()], vec![0; 3]);
+            let mixture = Mixture::new(vec![1.0, 2.0, 5.0], (0..3).map(mean).collect(), vec![factor], vec![0; 3]);
             let mixture = mixture.unwrap();
             let sizes = Sizes::of(&scenario(Category::CutOut, 0));
             for source in [SampleSource::Random, SampleSource::Sobol] {

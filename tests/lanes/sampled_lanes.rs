@@ -218,12 +218,8 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
         // A second mixture of another shape beside: weights and two factors.
         let mean = kernels.mean(0).to_vec();
         let d = mean.len();
-        let mut factor = vec![0.0; d * d];
-        for j in 0..d {
-            for k in 0..=j {
-                factor[j * d + k] = if j == k { 0.3 } else { 0.05 };
-            }
-        }
+        let mut factor = nalgebra::DMatrix::from_diagonal_element(d, d, 0.3);
+        factor.fill_lower_triangle(0.05, 1);
         let other = Mixture::new(vec![1.0], vec![mean], vec![factor], vec![0]).unwrap();
         let mixture = Mixture::join(&[(0.7, &kernels), (0.3, &other)]).unwrap();
         let options = SamplePlanOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };

@@ -1,5 +1,7 @@
 //! A density given the values of some parameters, as a mixture that lanes draw from.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::stats::density::{DensityModel, Mixture};
 use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -40,17 +42,13 @@ pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Co
     let constrained = density.kde.conditional(&places)?;
     let weights = constrained.component_probabilities().to_vec();
     let effective_scenarios = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
-    let d = density.space.dimensions();
     let mut means = density.kde.points().to_vec();
     let mut spread = density.kde.spread();
     for (at, value) in &places {
         means.iter_mut().for_each(|mean| mean[*at] = *value);
         spread[*at] *= NO_SPREAD;
     }
-    let mut factor = vec![0.0; d * d];
-    for (j, s) in spread.iter().enumerate() {
-        factor[j * d + j] = *s;
-    }
+    let factor = DMatrix::from_diagonal(&DVector::from_vec(spread));
     let n = means.len();
     Ok(Conditional { mixture: Mixture::new(weights, means, vec![factor], vec![0; n])?, effective_scenarios })
 }

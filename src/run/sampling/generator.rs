@@ -54,7 +54,7 @@ pub fn generator_of(
     };
     for component in 0..n {
         points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
-        let factor: Vec<f32> = mixture.factor(component).iter().map(|&v| v as f32).collect();
+        let factor: Vec<f32> = mixture.factor(component).transpose().iter().map(|&v| v as f32).collect();
         // Kernels share one factor.
         let known = points.factors.len() / (d * d);
         let last = known.checked_sub(1).filter(|&at| points.factors[at * d * d..] == factor);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
@@ -44,7 +45,7 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
         density_sha256: density.content_sha256()?,
         weights: proposal.weights().to_vec(),
         means: components.clone().map(|k| proposal.mean(k).to_vec()).collect(),
-        factors: components.map(|k| proposal.factor(k).to_vec()).collect(),
+        factors: components.map(|k| proposal.factor(k).transpose().as_slice().to_vec()).collect(),
     };
     serde_json::to_string_pretty(&file).map_err(|e| Error::Internal(format!("a proposal cannot be written: {e}")))
 }
@@ -88,6 +89,10 @@ pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) ->
             format!("it is over {}, the density over {}", file.parameters.join(", "), names(density).join(", "));
         return Err(wrong(problem));
     }
-    let n = file.means.len();
-    Mixture::new(file.weights, file.means, file.factors, (0..n).collect()).map_err(|e| wrong(e.to_string()))
+    let (n, d) = (file.means.len(), file.parameters.len());
+    if file.factors.iter().any(|factor| factor.len() != d * d) {
+        return Err(wrong(format!("a factor does not have {d} × {d} numbers")));
+    }
+    let factors = file.factors.iter().map(|factor| DMatrix::from_row_slice(d, d, factor)).collect();
+    Mixture::new(file.weights, file.means, factors, (0..n).collect()).map_err(|e| wrong(e.to_string()))
 }

@@ -2,7 +2,8 @@
 //! the values of some of them. Each kernel conditions as a Gaussian does; its weight is how well it fits b
 //! (arXiv 2107.05278).
 
-use super::covariance::{cholesky, whiten};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
+
 use super::kde::Kde;
 use super::normal::Draws;
 use crate::stats::random::Stream;
@@ -15,11 +16,11 @@ const MIN_PIVOT_FRACTION: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub struct ConstrainedKde<'a> {
     kde: &'a Kde,
-    /// m rows of d numbers.
-    rows: Vec<Vec<f64>>,
-    right: Vec<f64>,
-    /// Lower Cholesky factor of A S Aᵀ with S = diag((h s)²), row by row.
-    factor: Vec<f64>,
+    /// A, m × d.
+    rows: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Of A S Aᵀ with S = diag((h s)²).
+    factor: Cholesky<f64, Dyn>,
     /// Weights of the kernels, sum 1.
     probabilities: Vec<f64>,
     /// Parameters that are given: index and value. Set exactly in every draw.
@@ -44,28 +45,29 @@ impl Kde {
             return wrong("a number is not finite".to_owned(), "give finite numbers");
         }
         let spread = self.spread();
-        let covariance = |a: &[f64], b: &[f64]| -> f64 { (0..d).map(|j| a[j] * spread[j] * spread[j] * b[j]).sum() };
-        let m = rows.len();
-        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| covariance(a, b))).collect();
-        let is_regular = |factor: &Vec<f64>| {
-            (0..m).map(|i| i * m + i).all(|at| factor[at] * factor[at] > MIN_PIVOT_FRACTION * gram[at])
+        let rows = DMatrix::from_fn(rows.len(), d, |i, j| rows[i][j]);
+        let gram = DMatrix::from_fn(rows.nrows(), d, |i, j| rows[(i, j)] * spread[j] * spread[j]) * rows.transpose();
+        let is_regular = |factor: &Cholesky<f64, Dyn>| {
+            let (pivots, diagonal) = (factor.l_dirty().diagonal(), gram.diagonal());
+            pivots.iter().zip(&diagonal).all(|(pivot, all)| pivot * pivot > MIN_PIVOT_FRACTION * all)
         };
-        let Some(factor) = cholesky(&gram, m).filter(is_regular) else {
+        let Some(factor) = Cholesky::new(gram.clone()).filter(is_regular) else {
             return wrong("the equations depend on each other".to_owned(), "leave out those that follow from others");
         };
         let mut this = ConstrainedKde {
             kde: self,
-            rows: rows.to_vec(),
-            right: right.to_vec(),
+            rows,
+            right: DVector::from_column_slice(right),
             factor,
             probabilities: Vec::new(),
             given: Vec::new(),
         };
-        let exponents: Vec<f64> = self
-            .points()
-            .iter()
-            .map(|point| 0.5 * this.whitened_misfit(point).iter().map(|z| z * z).sum::<f64>())
-            .collect();
+        let exponent = |point: &Vec<f64>| {
+            let mut whitened = this.misfit(point);
+            this.factor.l_dirty().solve_lower_triangular_mut(&mut whitened);
+            0.5 * whitened.norm_squared()
+        };
+        let exponents: Vec<f64> = self.points().iter().map(exponent).collect();
         let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
         let weights: Vec<f64> = exponents.iter().map(|e| libm::exp(least - e)).collect();
         let total: f64 = weights.iter().sum();
@@ -118,36 +120,16 @@ impl ConstrainedKde<'_> {
         let point = &self.kde.points()[chosen];
         let free: Vec<f64> = point.iter().zip(&spread).map(|(p, s)| p + s * draws.normal()).collect();
         // x + S Aᵀ (A S Aᵀ)⁻¹ (b − A x) has the distribution of x given A x = b.
-        let multipliers = backward(&self.factor, &self.whitened_misfit(&free));
-        let mut x: Vec<f64> = (0..free.len())
-            .map(|j| {
-                let pull: f64 = self.rows.iter().zip(&multipliers).map(|(a, m)| a[j] * m).sum();
-                free[j] + spread[j] * spread[j] * pull
-            })
-            .collect();
+        let pull = self.rows.tr_mul(&self.factor.solve(&self.misfit(&free)));
+        let mut x: Vec<f64> = free.iter().zip(&spread).zip(&pull).map(|((x, s), pull)| x + s * s * pull).collect();
         for (index, value) in &self.given {
             x[*index] = *value;
         }
         x
     }
 
-    /// L⁻¹ (b − A x).
-    fn whitened_misfit(&self, x: &[f64]) -> Vec<f64> {
-        let product = |a: &Vec<f64>| a.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        let misfit: Vec<f64> = self.rows.iter().zip(&self.right).map(|(a, b)| b - product(a)).collect();
-        let mut z = vec![0.0; misfit.len()];
-        whiten(&self.factor, &misfit, &mut z);
-        z
+    /// b − A x.
+    fn misfit(&self, x: &[f64]) -> DVector<f64> {
+        &self.right - &self.rows * DVectorView::from_slice(x, x.len())
     }
-}
-
-/// L⁻ᵀ b.
-fn backward(l: &[f64], b: &[f64]) -> Vec<f64> {
-    let m = b.len();
-    let mut x = b.to_vec();
-    for i in (0..m).rev() {
-        let inner: f64 = (i + 1..m).map(|k| l[k * m + i] * x[k]).sum();
-        x[i] = (x[i] - inner) / l[i * m + i];
-    }
-    x
 }

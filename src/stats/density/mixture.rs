@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::covariance::{cholesky, colour, whiten};
+use nalgebra::{Cholesky, DMatrix, DVector};
+
 use super::normal::{normal, uniform};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
@@ -24,8 +25,8 @@ pub struct Mixture {
     weights: Vec<f64>,
     /// One per component: μ_k.
     means: Vec<Vec<f64>>,
-    /// Lower-triangular L, row by row, with zeros above the diagonal; the diagonal is > 0.
-    factors: Vec<Vec<f64>>,
+    /// Lower-triangular L with zeros above the diagonal; the diagonal is > 0.
+    factors: Vec<DMatrix<f64>>,
     /// Index into `factors`, one per component: kernels share one.
     factor_of: Vec<usize>,
     /// Σ of the weights up to and including each component; the last is 1.
@@ -47,7 +48,7 @@ impl Mixture {
     pub fn new(
         weights: Vec<f64>,
         means: Vec<Vec<f64>>,
-        factors: Vec<Vec<f64>>,
+        factors: Vec<DMatrix<f64>>,
         factor_of: Vec<usize>,
     ) -> Result<Mixture> {
         let wrong = |problem: String| {
@@ -73,8 +74,8 @@ impl Mixture {
             return wrong("a mean has another length or is not finite".to_owned());
         }
         for factor in &factors {
-            let is_square = factor.len() == dimensions * dimensions && factor.iter().all(|v| v.is_finite());
-            if !is_square || (0..dimensions).any(|j| factor[j * dimensions + j] <= 0.0) {
+            let is_square = factor.shape() == (dimensions, dimensions) && factor.iter().all(|v| v.is_finite());
+            if !is_square || factor.diagonal().iter().any(|spread| *spread <= 0.0) {
                 return wrong("a spread is not positive".to_owned());
             }
         }
@@ -92,7 +93,7 @@ impl Mixture {
         dimensions: usize,
         weights: Vec<f64>,
         means: Vec<Vec<f64>>,
-        factors: Vec<Vec<f64>>,
+        factors: Vec<DMatrix<f64>>,
         factor_of: Vec<usize>,
     ) -> Mixture {
         let n = weights.len();
@@ -108,13 +109,14 @@ impl Mixture {
         }
         let log_constant = -0.5 * dimensions as f64 * libm::log(2.0 * std::f64::consts::PI);
         let log_determinants: Vec<f64> =
-            factors.iter().map(|factor| (0..dimensions).map(|j| libm::log(factor[j * dimensions + j])).sum()).collect();
+            factors.iter().map(|factor| factor.diagonal().iter().map(|spread| libm::log(*spread)).sum()).collect();
         let mut whitened_means = vec![0.0; n * dimensions];
         let mut log_heights = Vec::with_capacity(n);
         let mut runs: Vec<Range<usize>> = Vec::new();
-        let mut z = vec![0.0; dimensions];
+        let mut z = DVector::zeros(dimensions);
         for k in 0..n {
-            whiten(&factors[factor_of[k]], &means[k], &mut z);
+            z.copy_from_slice(&means[k]);
+            factors[factor_of[k]].solve_lower_triangular_mut(&mut z);
             for (j, z) in z.iter().enumerate() {
                 whitened_means[j * n + k] = *z;
             }
@@ -149,11 +151,7 @@ impl Mixture {
     /// # Errors
     /// As [`Mixture::new`].
     pub fn of_kernels(points: Vec<Vec<f64>>, spread: &[f64]) -> Result<Mixture> {
-        let d = spread.len();
-        let mut factor = vec![0.0; d * d];
-        for (j, s) in spread.iter().enumerate() {
-            factor[j * d + j] = *s;
-        }
+        let factor = DMatrix::from_diagonal(&DVector::from_column_slice(spread));
         let n = points.len();
         Mixture::new(vec![1.0; n], points, vec![factor], vec![0; n])
     }
@@ -173,30 +171,24 @@ impl Mixture {
         &self.means[component]
     }
 
-    /// L of a component, row by row.
-    pub fn factor(&self, component: usize) -> &[f64] {
+    /// L of a component.
+    pub fn factor(&self, component: usize) -> &DMatrix<f64> {
         &self.factors[self.factor_of[component]]
     }
 
-    /// The same mixture with `covariance` (row by row) times `share` added to every component's: a copy that reaches
+    /// The same mixture with `covariance` times `share` added to every component's: a copy that reaches
     /// further wherever the component is narrower than that covariance.
     ///
     /// # Errors
     /// [`Error::Usage`] where the sum has no triangular factor.
-    pub fn widened(&self, covariance: &[f64], share: f64) -> Result<Mixture> {
-        let d = self.dimensions;
-        let widen = |factor: &Vec<f64>| {
-            let mut sum: Vec<f64> = covariance.iter().map(|c| share * c).collect();
-            for i in 0..d {
-                for j in 0..d {
-                    sum[i * d + j] += (0..=i.min(j)).map(|k| factor[i * d + k] * factor[j * d + k]).sum::<f64>();
-                }
-            }
-            cholesky(&sum, d)
+    pub fn widened(&self, covariance: &DMatrix<f64>, share: f64) -> Result<Mixture> {
+        let widen = |factor: &DMatrix<f64>| {
+            Cholesky::new(covariance * share + factor * factor.transpose()).map(Cholesky::unpack)
         };
-        let factors = self.factors.iter().map(widen).collect::<Option<Vec<_>>>().ok_or_else(|| {
-            Error::usage(Place::item("mixture"), "it cannot be widened", "give a covariance, d × d, row by row")
-        })?;
+        let factors =
+            self.factors.iter().map(widen).collect::<Option<Vec<_>>>().ok_or_else(|| {
+                Error::usage(Place::item("mixture"), "it cannot be widened", "give a covariance, d × d")
+            })?;
         Ok(Mixture::prepared(
             self.dimensions,
             self.weights.clone(),
@@ -239,9 +231,10 @@ impl Mixture {
             parts.fill(f64::NEG_INFINITY);
             return f64::NEG_INFINITY;
         }
-        let mut z = vec![0.0; d];
+        let mut z = DVector::zeros(d);
         for run in &self.runs {
-            whiten(&self.factors[self.factor_of[run.start]], point, &mut z);
+            z.copy_from_slice(point);
+            self.factors[self.factor_of[run.start]].solve_lower_triangular_mut(&mut z);
             let distances = &mut parts[run.clone()];
             for (j, z) in z.iter().enumerate() {
                 let means = &self.whitened_means[j * n + run.start..j * n + run.end];
@@ -269,10 +262,9 @@ impl Mixture {
             .collect();
         let choice = uniform(words[0]);
         let component = self.cumulative.partition_point(|c| *c < choice);
-        let z: Vec<f64> = words[1..=self.dimensions].iter().map(|word| normal(*word)).collect();
-        let mut point = colour(self.factor(component), &z);
-        point.iter_mut().zip(self.mean(component)).for_each(|(x, mean)| *x += mean);
-        point
+        let z = DVector::from_iterator(self.dimensions, words[1..=self.dimensions].iter().map(|word| normal(*word)));
+        let away = self.factor(component) * z;
+        self.mean(component).iter().zip(&away).map(|(mean, away)| away + mean).collect()
     }
 }
 
@@ -282,11 +274,15 @@ mod tests {
 
     const STREAM: Stream = Stream { seed: 7, purpose: 1 };
 
+    fn dmatrix(d: usize, rows: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(d, d, rows)
+    }
+
     fn two_humps() -> Mixture {
         Mixture::new(
             vec![3.0, 1.0],
             vec![vec![0.0, 1.0], vec![5.0, -2.0]],
-            vec![vec![1.0, 0.0, 0.5, 2.0], vec![0.5, 0.0, 0.0, 0.1]],
+            vec![dmatrix(2, &[1.0, 0.0, 0.5, 2.0]), dmatrix(2, &[0.5, 0.0, 0.0, 0.1])],
             vec![0, 1],
         )
         .expect("well formed")
@@ -294,7 +290,8 @@ mod tests {
 
     #[test]
     fn the_density_of_one_gaussian_is_the_textbook_s() {
-        let one = Mixture::new(vec![1.0], vec![vec![1.0, 2.0]], vec![vec![2.0, 0.0, 0.0, 3.0]], vec![0]).unwrap();
+        let one =
+            Mixture::new(vec![1.0], vec![vec![1.0, 2.0]], vec![dmatrix(2, &[2.0, 0.0, 0.0, 3.0])], vec![0]).unwrap();
         let expected = -0.5 * (0.25 + 4.0 / 9.0) - libm::log(2.0 * std::f64::consts::PI * 6.0);
         assert!((one.log_density(&[2.0, 4.0]) - expected).abs() < 1e-14);
         assert_eq!(one.log_density(&[f64::NAN, 0.0]), f64::NEG_INFINITY);
@@ -307,8 +304,8 @@ mod tests {
             let weights =
                 (0..n as u64).map(|i| libm::exp(((i * 2_654_435_761 + seed * 97) % 1000) as f64 / 90.0 - 8.0));
             let means: Vec<Vec<f64>> = (0..n).map(|i| vec![i as f64]).collect();
-            let one = Mixture::new(weights.collect(), means.clone(), vec![vec![1.0]], vec![0; n]).unwrap();
-            let again = Mixture::new(one.weights().to_vec(), means, vec![vec![1.0]], vec![0; n]).unwrap();
+            let one = Mixture::new(weights.collect(), means.clone(), vec![dmatrix(1, &[1.0])], vec![0; n]).unwrap();
+            let again = Mixture::new(one.weights().to_vec(), means, vec![dmatrix(1, &[1.0])], vec![0; n]).unwrap();
             assert_eq!(one, again, "{n} weights");
         }
     }
@@ -370,12 +367,12 @@ mod tests {
 
     #[test]
     fn a_widened_component_has_the_sum_of_the_covariances() {
-        let wide = two_humps().widened(&[2.0, 0.5, 0.5, 1.0], 0.5).unwrap();
+        let wide = two_humps().widened(&dmatrix(2, &[2.0, 0.5, 0.5, 1.0]), 0.5).unwrap();
         let l = wide.factor(0);
         // Own covariance: 1, 0.5; 0.5, 4.25.
-        assert!((l[0] * l[0] - 2.0).abs() < 1e-14 && (l[0] * l[2] - 0.75).abs() < 1e-14);
-        assert!((l[2] * l[2] + l[3] * l[3] - 4.75).abs() < 1e-14);
-        assert!(two_humps().widened(&[-9.0, 0.0, 0.0, -9.0], 1.0).is_err());
+        assert!((l[(0, 0)] * l[(0, 0)] - 2.0).abs() < 1e-14 && (l[(0, 0)] * l[(1, 0)] - 0.75).abs() < 1e-14);
+        assert!((l[(1, 0)] * l[(1, 0)] + l[(1, 1)] * l[(1, 1)] - 4.75).abs() < 1e-14);
+        assert!(two_humps().widened(&dmatrix(2, &[-9.0, 0.0, 0.0, -9.0]), 1.0).is_err());
     }
 
     #[test]

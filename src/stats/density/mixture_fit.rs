@@ -1,8 +1,10 @@
 //! Weighted maximum likelihood of a Gaussian mixture by expectation and maximisation (Dempster, Laird and Rubin
 //! 1977), for cross-entropy and for modelling points: few components, full covariances.
 
+use nalgebra::DMatrix;
+
 use super::Mixture;
-use super::covariance::{cholesky, moments};
+use super::covariance::{factor_or_diagonal, moments};
 use super::normal::uniform;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
@@ -82,7 +84,7 @@ impl Mixture {
 struct Weighted<'a> {
     points: Vec<(&'a [f64], f64)>,
     d: usize,
-    covariance: Vec<f64>,
+    covariance: DMatrix<f64>,
     effective: f64,
 }
 
@@ -92,33 +94,27 @@ impl<'a> Weighted<'a> {
         for j in 0..d {
             // A parameter that does not vary keeps a spread that is small beside its size.
             let least = (1e-9 * (1.0 + mean[j].abs())).powi(2);
-            covariance[j * d + j] = covariance[j * d + j] * (1.0 + JITTER) + least;
+            covariance[(j, j)] = covariance[(j, j)] * (1.0 + JITTER) + least;
         }
         let effective = 1.0 / points.iter().map(|(_, w)| w * w).sum::<f64>();
         Weighted { points, d, covariance, effective }
     }
 
-    /// L of (1 − λ) S + λ (covariance of all points); only its diagonal if that has no factor.
-    fn factor(&self, own: &[f64], effective: f64) -> Vec<f64> {
-        let d = self.d;
-        let pull = (d as f64 + 1.0) / (d as f64 + 1.0 + effective);
-        let mut matrix: Vec<f64> =
-            own.iter().zip(&self.covariance).map(|(s, all)| (1.0 - pull) * s + pull * all).collect();
-        for j in 0..d {
-            matrix[j * d + j] += JITTER * self.covariance[j * d + j];
+    /// L of (1 − λ) S + λ (covariance of all points).
+    fn factor(&self, own: DMatrix<f64>, effective: f64) -> DMatrix<f64> {
+        let pull = (self.d as f64 + 1.0) / (self.d as f64 + 1.0 + effective);
+        let mut matrix = own * (1.0 - pull) + &self.covariance * pull;
+        for j in 0..self.d {
+            matrix[(j, j)] += JITTER * self.covariance[(j, j)];
         }
-        cholesky(&matrix, d).unwrap_or_else(|| {
-            let mut diagonal = vec![0.0; d * d];
-            (0..d).for_each(|j| diagonal[j * d + j] = self.covariance[j * d + j].sqrt());
-            diagonal
-        })
+        factor_or_diagonal(matrix)
     }
 
     /// First responsibilities: each point belongs to the nearest of centres chosen as k-means++ does (Arthur and
     /// Vassilvitskii 2007), in units of the parameters' spreads, after a few rounds of k-means.
     fn first_assignment(&self, components: usize, seed: u64) -> Vec<usize> {
         let d = self.d;
-        let scale: Vec<f64> = (0..d).map(|j| self.covariance[j * d + j].sqrt()).collect();
+        let scale: Vec<f64> = self.covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
         let distance = |a: &[f64], b: &[f64]| -> f64 { (0..d).map(|j| ((a[j] - b[j]) / scale[j]).powi(2)).sum() };
         let stream = Stream { seed, purpose: PURPOSE };
         let choose = |shares: &[f64], k: usize| {
@@ -147,7 +143,7 @@ impl<'a> Weighted<'a> {
             for (c, centre) in centres.iter_mut().enumerate() {
                 let own = self.points.iter().zip(&assignment).filter(|(_, a)| **a == c).map(|(p, _)| *p);
                 if own.clone().next().is_some() {
-                    *centre = moments(own, d).0;
+                    centre.copy_from_slice(moments(own, d).0.as_slice());
                 }
             }
         }
@@ -196,8 +192,8 @@ impl<'a> Weighted<'a> {
             let effective = weight * weight / own.clone().map(|p| p.1 * p.1).sum::<f64>();
             let (mean, covariance) = moments(own, self.d);
             weights.push(weight);
-            means.push(mean);
-            factors.push(self.factor(&covariance, effective));
+            means.push(mean.as_slice().to_vec());
+            factors.push(self.factor(covariance, effective));
         }
         let each = (0..factors.len()).collect();
         Mixture::new(weights, means, factors, each)
@@ -212,7 +208,7 @@ mod tests {
         Mixture::new(
             vec![0.5, 0.3, 0.2],
             vec![vec![0.0, 0.0], vec![8.0, 0.0], vec![0.0, 9.0]],
-            vec![vec![1.0, 0.0, 0.8, 0.6], vec![0.5, 0.0, 0.0, 1.5]],
+            [[1.0, 0.0, 0.8, 0.6], [0.5, 0.0, 0.0, 1.5]].map(|l| DMatrix::from_row_slice(2, 2, &l)).to_vec(),
             vec![0, 1, 1],
         )
         .expect("well formed")
@@ -230,7 +226,7 @@ mod tests {
             let own = (0..3).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
             assert!(near(&own).sqrt() < 0.15);
             assert!((fitted.weights()[own] - truth.weights()[k]).abs() < 0.03);
-            let off = fitted.factor(own).iter().zip(truth.factor(k)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let off = (fitted.factor(own) - truth.factor(k)).amax();
             assert!(off < 0.12, "{:?}", fitted.factor(own));
         }
     }

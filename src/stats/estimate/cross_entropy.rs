@@ -3,6 +3,7 @@
 //! towards the failures level by level, each level's goal being a quantile of the limit state; importance sampling
 //! with the last mixture and a defensive share gives the estimate.
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::draws::judged;
@@ -103,7 +104,7 @@ pub fn cross_entropy(
     let mut proposal: Option<Mixture> = None;
     let mut runs = 0;
     let mut reached = f64::INFINITY;
-    let mut nominal_covariance = Vec::new();
+    let mut nominal_covariance = DMatrix::zeros(0, 0);
     for level in 0..options.levels.max(1) {
         let stream = Stream { seed: options.seed, purpose: purpose::CROSS_ENTROPY + level as u32 };
         let indices = 0..options.samples_per_level;
@@ -173,7 +174,7 @@ fn smoothed(new: &Mixture, old: &Mixture, share: f64) -> Result<Mixture> {
     Mixture::new(
         kept.iter().map(|k| both.weights()[*k]).collect(),
         kept.iter().map(|k| both.mean(*k).to_vec()).collect(),
-        kept.iter().map(|k| both.factor(*k).to_vec()).collect(),
+        kept.iter().map(|k| both.factor(*k).clone()).collect(),
         (0..kept.len()).collect(),
     )
 }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::stats::density::covariance::{cholesky, colour, moments, whiten};
+use crate::stats::density::covariance::{factor_or_diagonal, moments};
 use crate::stats::density::normal::uniform;
 use crate::stats::random::Stream;
 
@@ -215,9 +216,9 @@ struct Walk<'a> {
     density: &'a dyn Density,
     seed: u64,
     /// Mean of the reference.
-    mean: Vec<f64>,
+    mean: DVector<f64>,
     /// L of the reference.
-    factor: Vec<f64>,
+    factor: DMatrix<f64>,
     /// Share s of the new direction in an autoregressive move.
     turn: f64,
     /// Step of the random walk in units of the seeds' spread.
@@ -301,7 +302,7 @@ impl<'a> Walk<'a> {
             let log_density = self.density.log_density(&point);
             return Some((point, log_density));
         }
-        let step = colour(&self.factor, &z);
+        let step = &self.factor * DVector::from_vec(z);
         let point: Vec<f64> =
             (0..d).map(|j| self.mean[j] + keep * (state.point[j] - self.mean[j]) + self.turn * step[j]).collect();
         // The correction: ln reference, up to its constant, at the point left and at the point proposed.
@@ -310,17 +311,16 @@ impl<'a> Walk<'a> {
     }
 
     /// A step of a random walk, or `None` where the density refuses it.
-    fn walked(&self, state: &State, seeds: &[f64], stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
-        let step = colour(seeds, &normals(stream, index, 1, self.density.dimensions()));
+    fn walked(&self, state: &State, seeds: &DMatrix<f64>, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
+        let step = seeds * DVector::from_vec(normals(stream, index, 1, self.density.dimensions()));
         let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.stride * s).collect();
         self.judged_by_density(state, point, 0.0, stream, index)
     }
 
     fn log_reference(&self, point: &[f64]) -> f64 {
-        let from_mean: Vec<f64> = point.iter().zip(&self.mean).map(|(x, m)| x - m).collect();
-        let mut z = vec![0.0; from_mean.len()];
-        whiten(&self.factor, &from_mean, &mut z);
-        -0.5 * z.iter().map(|z| z * z).sum::<f64>()
+        let mut z = DVectorView::from_slice(point, point.len()) - &self.mean;
+        self.factor.solve_lower_triangular_mut(&mut z);
+        -0.5 * z.norm_squared()
     }
 
     fn judged_by_density(
@@ -341,21 +341,12 @@ impl<'a> Walk<'a> {
 }
 
 /// Mean of states and L of their covariance, drawn a little towards its diagonal.
-fn spread(states: &[State], d: usize) -> (Vec<f64>, Vec<f64>) {
+fn spread(states: &[State], d: usize) -> (DVector<f64>, DMatrix<f64>) {
     let (mean, mut covariance) = moments(states.iter().map(|s| (s.point.as_slice(), 1.0)), d);
     let keep = states.len() as f64 / (states.len() as f64 + d as f64 + 1.0);
-    for i in 0..d {
-        for j in 0..d {
-            if i != j {
-                covariance[i * d + j] *= keep;
-            }
-        }
-        covariance[i * d + i] += (1e-9 * (1.0 + mean[i].abs())).powi(2);
-    }
-    let factor = cholesky(&covariance, d).unwrap_or_else(|| {
-        let mut diagonal = vec![0.0; d * d];
-        (0..d).for_each(|j| diagonal[j * d + j] = covariance[j * d + j].sqrt());
-        diagonal
-    });
-    (mean, factor)
+    let mut diagonal = covariance.diagonal();
+    diagonal.zip_apply(&mean, |variance, mean| *variance += (1e-9 * (1.0 + mean.abs())).powi(2));
+    covariance *= keep;
+    covariance.set_diagonal(&diagonal);
+    (mean, factor_or_diagonal(covariance))
 }
