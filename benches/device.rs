@@ -7,17 +7,19 @@
 //! real GPU needs 1,000 and more to be busy). Both compute the same lanes. The CPU runs ten headways.
 
 mod common;
+#[path = "../tests/common/counting.rs"]
+mod counting;
 
 use std::time::Instant;
 
 use common::{lane_steps, paper_size_scenarios};
+use counting::{Counting, OperationCount};
 use lanesweep::engine::gpu::{Adapters, GpuBackend, GpuOptions, choose};
 use lanesweep::engine::{
     Backend, BackendChoice, CpuBackend, DeviceName, Executor, Headway, LanePlan, LaneRunner, Wanted,
 };
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::model::scalar::{Counting, OperationCount};
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
 

@@ -6,7 +6,7 @@ use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
-use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
+use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, proposal_text};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
@@ -226,7 +226,7 @@ impl Seeds {
                 .map(|d| written(|p| write_density(p, d).unwrap()))
                 .collect(),
             distributions: ["stochastic", "deterministic"].map(distribution).to_vec(),
-            proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
+            proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: parts.into(),
             plans: vec![{
                 let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().cases;
