@@ -32,7 +32,7 @@ pub mod verify;
 pub(crate) mod version;
 mod watch;
 
-pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+pub use backend::{Backend, Chunk, RecheckBy, Session, Wanted};
 pub use confusion::Confusion;
 pub use cpu::backend::CpuBackend;
 pub(crate) use cpu::backend::lanes_within_seconds;

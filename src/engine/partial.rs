@@ -90,9 +90,6 @@ impl Partial {
     /// [`Error::Internal`] if the chunk does not fit the plan.
     pub fn from_chunk_keeping(plan: &LanePlan, chunk: &Chunk, worst_limit: usize) -> Result<Partial> {
         chunk.check(plan)?;
-        if !chunk.counts.is_empty() {
-            return Err(Error::Internal("a chunk of counts has no lanes to compare".to_owned()));
-        }
         if u32::try_from(plan.headways.len()).is_err() {
             return Err(Error::Internal("a unit has more headways than u32 counts".to_owned()));
         }
