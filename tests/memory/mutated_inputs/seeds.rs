@@ -18,7 +18,7 @@ use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 use super::plans;
-use super::readers::{CRITERION, PART_UNITS, WEIGHTED_UNITS, small_plan};
+use super::readers::{CRITERION, PART_UNITS, STUDY_UNITS, WEIGHTED_UNITS, small_plan};
 use super::small;
 
 /// Valid inputs and what the next steps need beside them.
@@ -46,7 +46,7 @@ pub struct Seeds {
     pub plans: Vec<Vec<u8>>,
     pub journals: Vec<Vec<u8>>,
     pub weighted_parts: Vec<Vec<u8>>,
-    pub partials: Vec<Vec<u8>>,
+    pub study_parts: Vec<Vec<u8>>,
     pub profile: Profile,
     pub jrc: Profile,
     pub study: LanePlan,
@@ -172,7 +172,12 @@ impl Seeds {
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
-        let partial = Partial::from_chunk_keeping(&study, &plans::chunk(&study, 1..3, &lane, true), 20).unwrap();
+        let study_part = Part {
+            run_sha256: "00".to_owned(),
+            units: STUDY_UNITS,
+            lanes_redone_and_rechecked: [0; 2],
+            segments: vec![Partial::from_chunk(&study, &plans::chunk(&study, STUDY_UNITS, &lane, false)).unwrap()],
+        };
         let driven = Driven { hours: Some(1.5), kilometres: Some(90.0) };
         let exposure =
             ExposureFile { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
@@ -234,7 +239,7 @@ impl Seeds {
             }],
             journals: journals.into(),
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
-            partials: vec![partial.to_json().unwrap().into_bytes()],
+            study_parts: vec![written(|p| write_part(p, &study_part).unwrap())],
             profile,
             jrc: Profile::load("jrc-2021").unwrap(),
             study,
