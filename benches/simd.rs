@@ -12,15 +12,17 @@
 #![allow(unsafe_code)] // the roof's loops are compiled for instructions that the machine is asked for
 
 mod common;
+#[path = "../tests/common/counting.rs"]
+mod counting;
 
 use std::time::Instant;
 
 use common::worker::{WORKER, Worker, cpu_seconds, serve};
 use common::{lane_steps, paper_size_scenarios, peak_memory_bytes};
+use counting::Counting;
 use lanesweep::engine::{CpuBackend, Executor, Headway, Instructions, LanePlan, LaneRunner, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::model::scalar::Counting;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::{Category, Scenario};
 use rayon::prelude::*;

@@ -1,5 +1,5 @@
 // Entry point: bindings, and the lanes of an invocation. Other functions read their arguments, constants
-// and the launch only; those of shared/reduction.wgsl also write results.
+// and the launch only; those of shared/verdicts.wgsl also write results.
 //
 // Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion. Their numbers of
 // steps differ by far: an invocation whose lane has ended takes the next one of its workgroup, so that a warp does not
@@ -12,7 +12,7 @@
 @group(0) @binding(4) var<storage, read> lateral_table: array<vec2<f32>>;
 @group(0) @binding(5) var<storage, read_write> verdicts: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> outcomes: array<OutcomeRecord>;
-@group(0) @binding(7) var<storage, read_write> counts: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> finished: array<atomic<u32>>;
 
 const WORKGROUP: u32 = 64u;
 // More than any dispatch has.
@@ -51,7 +51,7 @@ fn lanes(
             if !frame_queue {
                 break;
             }
-            write_outcome(lane, at % launch.variants, outcome(state, lane_case));
+            write_outcome(lane, outcome(state, lane_case));
             done = done + 1u;
             lane = atomicAdd(&next_lane, 1u);
             if lane >= end {
@@ -63,22 +63,16 @@ fn lanes(
         }
     }
     if !frame_queue & (state.end != END_NOT_YET) {
-        write_outcome(lane, at % launch.variants, outcome(state, lane_case));
+        write_outcome(lane, outcome(state, lane_case));
         done = 1u;
     }
     // The host checks this counter: the device must compute every lane to its end.
-    atomicAdd(&counts[launch.done_word], done);
+    atomicAdd(&finished[launch.finished_word], done);
 }
 
-fn write_outcome(lane: u32, variant: u32, record: OutcomeRecord) {
-    if !frame_values | (launch.wanted != WANTED_COUNTS) {
-        pack_verdicts(launch, lane, record);
-    }
+fn write_outcome(lane: u32, record: OutcomeRecord) {
+    pack_verdicts(launch, lane, record);
     if frame_values {
-        if launch.wanted == WANTED_COUNTS {
-            count_lane(launch, variant, record);
-        } else {
-            outcomes[launch.first_outcome + lane] = record;
-        }
+        outcomes[launch.first_outcome + lane] = record;
     }
 }

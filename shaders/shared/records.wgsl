@@ -52,20 +52,14 @@ struct Launch {
     lanes: u32,
     // Headways per case, at least 1.
     headways: u32,
-    // Variants per unit, at least 1.
-    variants: u32,
     // First case in the buffer of cases.
     first_case: u32,
     // First word of this dispatch in the verdicts.
     first_word: u32,
     // First record of this dispatch in the outcomes.
     first_outcome: u32,
-    // First word of this dispatch's cells in the counts: one cell per variant.
-    first_cell_word: u32,
-    // Word of the counts with the number of finished lanes of this dispatch.
-    done_word: u32,
-    // WANTED_…
-    wanted: u32,
+    // Word with the number of finished lanes of this dispatch.
+    finished_word: u32,
     // Lanes of a workgroup, at least WORKGROUP.
     lanes_per_group: u32,
     // A smaller TTC fails, s: the profile's, or a watch's.
@@ -73,10 +67,6 @@ struct Launch {
     // Verdicts mark contacts at this closing speed, m/s, or a greater one.
     marks_contacts_from: f32,
 }
-
-const WANTED_VERDICTS: u32 = 0u;
-const WANTED_OUTCOMES: u32 = 1u;
-const WANTED_COUNTS: u32 = 2u;
 
 // Result of a finished lane. Infinite minima are bits, because WGSL has no infinite literal.
 struct OutcomeRecord {

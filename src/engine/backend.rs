@@ -5,8 +5,6 @@ use std::ops::Range;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
 use super::watch::Watch;
-use crate::model::criterion::Criterion;
-use crate::model::scalar::Real;
 use crate::{Error, Result};
 
 /// How much of a lane comes back.
@@ -19,55 +17,15 @@ pub enum Wanted {
     Watched(Watch),
     /// Verdict bits and the continuous values.
     Outcomes,
-    /// No lane at all: failures and smallest values per variant and model.
-    Counts,
 }
 
-/// Failures and smallest values of the lanes of one block, variant and model.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellCounts {
-    /// Lanes.
-    pub lanes: u64,
-    /// Lanes that failed, per criterion in the order of [`Criterion::ALL`].
-    pub failed: [u64; Criterion::ALL.len()],
-    /// Lanes that ended at the time cap.
-    pub capped: u64,
-    /// Smallest TTC, s; infinite where no ego closed in.
-    pub min_ttc_s: f64,
-    /// Smallest gap, m; infinite where there was none.
-    pub min_gap_m: f64,
-}
-
-impl CellCounts {
-    /// No lane yet.
-    pub const EMPTY: CellCounts = CellCounts {
-        lanes: 0,
-        failed: [0; Criterion::ALL.len()],
-        capped: 0,
-        min_ttc_s: f64::INFINITY,
-        min_gap_m: f64::INFINITY,
-    };
-
-    /// Counts one lane.
-    pub fn count<R: Real>(&mut self, outcome: &Outcome<R>) {
-        self.lanes += 1;
-        for criterion in Criterion::ALL {
-            self.failed[criterion.index()] += u64::from(outcome.verdicts.failed(criterion));
+impl Wanted {
+    /// The watch of a sweep that has one.
+    pub(super) fn watch(self) -> Option<Watch> {
+        match self {
+            Wanted::Watched(watch) => Some(watch),
+            Wanted::Verdicts | Wanted::Outcomes => None,
         }
-        self.capped += u64::from(outcome.verdicts.capped());
-        self.min_ttc_s = self.min_ttc_s.min(outcome.min_ttc.to_f64());
-        self.min_gap_m = self.min_gap_m.min(outcome.min_gap.to_f64());
-    }
-
-    /// Counts other lanes of the same cell.
-    pub fn add(&mut self, other: &CellCounts) {
-        self.lanes += other.lanes;
-        for (ours, theirs) in self.failed.iter_mut().zip(other.failed) {
-            *ours += theirs;
-        }
-        self.capped += other.capped;
-        self.min_ttc_s = self.min_ttc_s.min(other.min_ttc_s);
-        self.min_gap_m = self.min_gap_m.min(other.min_gap_m);
     }
 }
 
@@ -78,14 +36,12 @@ pub struct Chunk {
     pub units: Range<u64>,
     /// Index of the first lane.
     pub first_lane: u64,
-    /// One per lane; empty where counts were wanted.
+    /// One per lane.
     pub verdicts: Vec<Verdicts>,
     /// One per lane where outcomes were wanted, else empty. Values are exact widenings of the lane's own.
     pub outcomes: Vec<Outcome<f64>>,
     /// The lanes that a [watch](Watch) marked, ascending, with their outcomes; `None` without a watch.
     pub valued: Option<Vec<(u64, Outcome<f64>)>>,
-    /// One per cell of the plan ([`LanePlan::cell`]) where counts were wanted, else empty.
-    pub counts: Vec<CellCounts>,
     /// Lanes that the fallback computed, and lanes that were computed again on the CPU and are equal. The executor sets both.
     pub redone_and_rechecked: [u64; 2],
 }
@@ -93,7 +49,7 @@ pub struct Chunk {
 impl Chunk {
     /// Number of lanes.
     pub fn lanes(&self) -> u64 {
-        if self.counts.is_empty() { self.verdicts.len() as u64 } else { self.counts.iter().map(|c| c.lanes).sum() }
+        self.verdicts.len() as u64
     }
 
     /// Checks that it is what was asked for; see [`Chunk::check`].
@@ -101,11 +57,7 @@ impl Chunk {
     /// # Errors
     /// [`Error::Internal`] where it is not.
     pub fn check_asked(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
-        let complete = match wanted {
-            Wanted::Verdicts | Wanted::Watched(_) => self.counts.is_empty(),
-            Wanted::Outcomes => self.outcomes.len() == self.verdicts.len(),
-            Wanted::Counts => !self.counts.is_empty(),
-        };
+        let complete = wanted != Wanted::Outcomes || self.outcomes.len() == self.verdicts.len();
         if self.units == *units && complete {
             self.check(plan)
         } else {
@@ -124,12 +76,7 @@ impl Chunk {
             && self.units.end <= plan.unit_count()
             && self.first_lane == first_lane
             && [0, lanes].contains(&self.outcomes.len())
-            && if self.counts.is_empty() {
-                self.verdicts.len() == lanes
-            } else {
-                self.counts.len() == plan.cell_count()
-                    && self.counts.iter().map(|c| c.lanes).sum::<u64>() == lanes as u64
-            };
+            && self.verdicts.len() == lanes;
         if fits {
             Ok(())
         } else {

@@ -3,11 +3,17 @@
 
 use std::ops::Range;
 
-use super::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
+use rayon::prelude::*;
+
+use super::backend::{Backend, Chunk, Session, Wanted};
 use super::cpu::runner::LaneRunner;
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
+use super::watch::Watch;
 use crate::{Error, Result};
+
+/// Lanes of one task that values marked lanes.
+const VALUING_TASK: usize = 4096;
 
 /// What computes the lanes of a run, what stands in where it fails, and which lanes are computed again.
 #[derive(Clone, Copy)]
@@ -103,10 +109,20 @@ impl<'a> Executor<'a> {
             (Err(error), None) => return Err(error),
         };
         let valuing = wanted.watch().map(|watch| (watch, LaneRunner::of_few(plan)));
-        let value = |chunk: &mut Chunk| {
+        // Values the marked lanes of a chunk, checks it and hands it on.
+        let mut deliver = |mut chunk: Chunk, computed_by: &dyn Backend, redone: u64| {
             if let Some((watch, runner)) = &valuing {
-                watch.value(plan, runner, chunk);
+                value_marked(plan, watch, runner, &mut chunk);
             }
+            let by = computed_by.rechecked_by(wanted);
+            let rechecked = recheck.map(|recheck| recheck.check(&chunk, wanted, &computed_by.describe(), by));
+            let rechecked = rechecked.transpose()?.unwrap_or(0);
+            chunk.redone_and_rechecked = [redone * chunk.lanes(), rechecked];
+            summary.redone_chunks += redone;
+            summary.redone_lanes += redone * chunk.lanes();
+            summary.rechecked_lanes += rechecked;
+            summary.lanes += chunk.lanes();
+            each(chunk)
         };
         let mut from = units.start;
         // The backend is not asked for units before this one.
@@ -114,21 +130,9 @@ impl<'a> Executor<'a> {
         while from < units.end {
             if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
                 let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
-                let by = backend.rechecked_by(wanted);
-                match (chunk_and_samples(plan, session.as_mut(), range.clone(), wanted, recheck, by), fallback) {
-                    (Ok((mut chunk, samples)), _) => {
-                        value(&mut chunk);
-                        if let Some(recheck) = recheck {
-                            let name = backend.describe();
-                            let mut rechecked = recheck.check(&chunk, wanted, &name, by)?;
-                            for sample in &samples {
-                                rechecked += recheck.check_all(sample, &name, by)?;
-                            }
-                            chunk.redone_and_rechecked[1] = rechecked;
-                            summary.rechecked_lanes += rechecked;
-                        }
-                        summary.lanes += chunk.lanes();
-                        each(chunk)?;
+                match (compute(plan, session.as_mut(), &range, wanted), fallback) {
+                    (Ok(chunk), _) => {
+                        deliver(chunk, backend, 0)?;
                         from = range.end;
                         continue;
                     }
@@ -150,20 +154,7 @@ impl<'a> Executor<'a> {
                 none => none.insert(fallback.prepare(plan)?),
             };
             let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(most));
-            let mut chunk = session.run(range.clone(), wanted)?;
-            chunk.check_asked(plan, &range, wanted)?;
-            value(&mut chunk);
-            chunk.redone_and_rechecked[0] = chunk.lanes();
-            if let Some(recheck) = recheck {
-                let by = fallback.rechecked_by(wanted);
-                let rechecked = recheck.check(&chunk, wanted, &fallback.describe(), by)?;
-                chunk.redone_and_rechecked[1] = rechecked;
-                summary.rechecked_lanes += rechecked;
-            }
-            summary.redone_chunks += 1;
-            summary.redone_lanes += chunk.lanes();
-            summary.lanes += chunk.lanes();
-            each(chunk)?;
+            deliver(compute(plan, session.as_mut(), &range, wanted)?, fallback, 1)?;
             from = range.end;
         }
         summary.device_s = session.as_ref().and_then(|s| s.device_seconds());
@@ -171,22 +162,34 @@ impl<'a> Executor<'a> {
     }
 }
 
-/// A chunk, and lanes to check where it holds none: counts hold no lanes, so some units are asked for again, lane
-/// by lane.
-fn chunk_and_samples(
-    plan: &LanePlan,
-    session: &mut dyn Session,
-    units: Range<u64>,
-    wanted: Wanted,
-    recheck: Option<&Recheck>,
-    by: RecheckBy,
-) -> Result<(Chunk, Vec<Chunk>)> {
+/// A chunk that is checked to be what was asked for.
+fn compute(plan: &LanePlan, session: &mut dyn Session, units: &Range<u64>, wanted: Wanted) -> Result<Chunk> {
     let chunk = session.run(units.clone(), wanted)?;
-    chunk.check_asked(plan, &units, wanted)?;
-    let has_no_lane = wanted == Wanted::Counts && by != RecheckBy::Nothing;
-    let Some(recheck) = recheck.filter(|_| has_no_lane) else { return Ok((chunk, Vec::new())) };
-    let samples = recheck.units(units).map(|unit| session.run(unit..unit + 1, Wanted::Verdicts));
-    Ok((chunk, samples.collect::<Result<_>>()?))
+    chunk.check_asked(plan, units, wanted)?;
+    Ok(chunk)
+}
+
+/// Values the marked lanes of a chunk, one by one, and gives them their own verdicts. A backend that returned every
+/// outcome leaves nothing to value.
+fn value_marked(plan: &LanePlan, watch: &Watch, runner: &LaneRunner<'_, f32>, chunk: &mut Chunk) {
+    if !chunk.outcomes.is_empty() {
+        return;
+    }
+    let first_lane = chunk.first_lane;
+    let tasks = chunk.verdicts.par_chunks_mut(VALUING_TASK).enumerate();
+    let valued = tasks.flat_map_iter(|(task, lanes)| {
+        let lanes = lanes.iter_mut().zip(first_lane + (task * VALUING_TASK) as u64..);
+        lanes.filter_map(|(verdicts, lane)| {
+            let model = plan.models[plan.model_of(lane)];
+            if !watch.marks(model, *verdicts) {
+                return None;
+            }
+            let outcome = runner.run(&plan.key(lane)?).widen();
+            *verdicts = outcome.verdicts;
+            Some((lane, outcome))
+        })
+    });
+    chunk.valued = Some(valued.collect());
 }
 
 /// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.

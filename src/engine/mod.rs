@@ -32,7 +32,7 @@ pub mod verify;
 pub(crate) mod version;
 mod watch;
 
-pub use backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+pub use backend::{Backend, Chunk, RecheckBy, Session, Wanted};
 pub use confusion::Confusion;
 pub use cpu::backend::CpuBackend;
 pub(crate) use cpu::backend::lanes_within_seconds;
@@ -49,7 +49,7 @@ pub(crate) use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther};
 pub use lane_step::Seen;
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
-pub use partial::{Partial, UnitCounts, WORST_LANES, WorstLane};
+pub use partial::{Partial, UnitCounts};
 pub use plan::{Block, CLOSE_HEADWAY_S, CaseSource, Headway, LaneKey, LanePlan};
 pub use recheck::{ONE_IN, RecheckOptions, same_words, words};
 pub use scene::Scene;

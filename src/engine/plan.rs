@@ -282,17 +282,6 @@ impl LanePlan {
         self.lanes_per_unit(block) as usize * Criterion::ALL.len()
     }
 
-    /// Number of cells: blocks × their variants × models.
-    pub fn cell_count(&self) -> usize {
-        self.blocks.iter().map(|b| b.variants.len()).sum::<usize>() * self.models.len()
-    }
-
-    /// Index of a cell.
-    pub fn cell(&self, block: usize, variant: usize, model: usize) -> usize {
-        let before: usize = self.blocks[..block].iter().map(|b| b.variants.len()).sum();
-        (before + variant) * self.models.len() + model
-    }
-
     /// Index of the first lane of a unit (counted over all blocks), or the number of lanes at the end.
     pub fn first_lane_of(&self, unit: u64) -> u64 {
         let found = self.blocks.iter().rev().find(|b| b.first_unit <= unit && !b.units.is_empty());

@@ -76,16 +76,12 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     pub fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
-        self.check_some(chunk, wanted, backend, by, self.one_in)
-    }
-
-    fn check_some(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy, one_in: u64) -> Result<u64> {
         if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
             return Ok(0);
         }
         let end = chunk.first_lane + chunk.verdicts.len() as u64;
         let mut keys: Vec<LaneKey> =
-            self.chosen(chunk.first_lane..end, one_in).filter_map(|lane| self.plan.key(lane)).collect();
+            self.chosen(chunk.first_lane..end).filter_map(|lane| self.plan.key(lane)).collect();
         keys.sort_by_key(|key| (key.block, key.model));
         let groups = keys.chunk_by(|a, b| (a.block, a.model) == (b.block, b.model));
         let tasks: Vec<&[LaneKey]> = groups.flat_map(|group| group.chunks(TASK)).collect();
@@ -131,22 +127,9 @@ impl<'p> Recheck<'p> {
         mixed(!self.seed, self.plan.lane(key)).is_multiple_of(SINGLE_ONE_IN)
     }
 
-    /// The chosen units of an interval, for a sweep that returns no lanes.
-    pub fn units(&self, units: Range<u64>) -> impl Iterator<Item = u64> {
-        self.chosen(units, self.one_in)
-    }
-
-    /// Computes every lane of a chunk again; see [`Recheck::check`].
-    ///
-    /// # Errors
-    /// [`Error::Verification`] with the first lane that differs.
-    pub fn check_all(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
-        self.check_some(chunk, Wanted::Verdicts, backend, by, 1)
-    }
-
     /// The chosen lanes of an interval, ascending.
-    fn chosen(&self, lanes: Range<u64>, one_in: u64) -> impl Iterator<Item = u64> {
-        let seed = self.seed;
+    fn chosen(&self, lanes: Range<u64>) -> impl Iterator<Item = u64> {
+        let &Recheck { seed, one_in, .. } = self;
         (lanes.start / one_in..lanes.end.div_ceil(one_in))
             .map(move |stratum| stratum * one_in + mixed(seed, stratum) % one_in)
             .filter(move |lane| lanes.contains(lane))
@@ -367,8 +350,8 @@ mod tests {
             let keys: Vec<LaneKey> = lanes.map(|lane| self.plan.key(lane).unwrap()).collect();
             let mut verdicts = vec![Verdicts::default(); keys.len()];
             Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
-            let (outcomes, counts) = (Vec::new(), Vec::new());
-            Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked: [0; 2] })
+            let outcomes = Vec::new();
+            Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, redone_and_rechecked: [0; 2] })
         }
     }
 
@@ -420,15 +403,15 @@ mod tests {
         let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
         let options = RecheckOptions { seed: 7, one_in: 100 };
         let recheck = Recheck::new(&plan, options);
-        let all: Vec<u64> = recheck.chosen(0..plan.lane_count(), 100).collect();
+        let all: Vec<u64> = recheck.chosen(0..plan.lane_count()).collect();
         for cut in [1, 99, 100, 12_345] {
             let ends = (0..).map(|k| k * cut).take_while(|from| *from < plan.lane_count());
-            let parts = ends.flat_map(|from| recheck.chosen(from..(from + cut).min(plan.lane_count()), 100));
+            let parts = ends.flat_map(|from| recheck.chosen(from..(from + cut).min(plan.lane_count())));
             assert_eq!(parts.collect::<Vec<_>>(), all, "{cut}");
         }
         assert_eq!(all.len() as u64, plan.lane_count().div_ceil(100));
         let cpu = CpuBackend::lane_arithmetic();
-        for wanted in [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts] {
+        for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
             let executor = Executor { recheck: Some(options), ..Executor::new(&cpu) };
             let summary = executor.sweep(&plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap();
             let is_checked = cpu.rechecked_by(wanted) != RecheckBy::Nothing;

@@ -1,19 +1,11 @@
 //! A sweep that returns verdicts, and the values of those lanes only that may be wanted: a watch marks them by their
-//! verdicts. Marked lanes are computed again, one by one.
+//! verdicts. The [executor](super::Executor) computes marked lanes again, one by one.
 
-use rayon::prelude::*;
-
-use super::backend::{Chunk, Wanted};
-use super::cpu::runner::LaneRunner;
 use super::outcome::{Outcome, Verdicts};
-use super::plan::LanePlan;
 use crate::model::criterion::{Criteria, Criterion};
 use crate::model::driver::{MODELS, ModelId};
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
-
-/// Lanes of one task.
-const TASK: usize = 4096;
 
 /// Which lanes of a model are valued. More may be marked than are meant, never fewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +45,7 @@ impl Watch {
     }
 
     /// Whether the verdicts of a lane mark it.
-    fn marks(&self, model: ModelId, verdicts: Verdicts) -> bool {
+    pub(super) fn marks(&self, model: ModelId, verdicts: Verdicts) -> bool {
         match self.0[model.index()] {
             Marks::Nothing => false,
             Marks::Contacts(_) => verdicts.0 & Verdicts::MARKED_CONTACT == Verdicts::MARKED_CONTACT,
@@ -72,39 +64,6 @@ impl Watch {
             Marks::BtnFailures => outcome.verdicts.failed(Criterion::Btn),
         }
     }
-
-    /// Values the marked lanes of a chunk and gives them their own verdicts. A backend that returned every outcome
-    /// leaves nothing to value.
-    pub(super) fn value(&self, plan: &LanePlan, runner: &LaneRunner<'_, f32>, chunk: &mut Chunk) {
-        if !chunk.outcomes.is_empty() {
-            return;
-        }
-        let first_lane = chunk.first_lane;
-        let tasks = chunk.verdicts.par_chunks_mut(TASK).enumerate();
-        let valued = tasks.flat_map_iter(|(task, lanes)| {
-            let lanes = lanes.iter_mut().zip(first_lane + (task * TASK) as u64..);
-            lanes.filter_map(|(verdicts, lane)| {
-                let model = plan.models[plan.model_of(lane)];
-                if !self.marks(model, *verdicts) {
-                    return None;
-                }
-                let outcome = runner.run(&plan.key(lane)?).widen();
-                *verdicts = outcome.verdicts;
-                Some((lane, outcome))
-            })
-        });
-        chunk.valued = Some(valued.collect());
-    }
-}
-
-impl Wanted {
-    /// The watch of a sweep that has one.
-    pub(super) fn watch(self) -> Option<Watch> {
-        match self {
-            Wanted::Watched(watch) => Some(watch),
-            Wanted::Verdicts | Wanted::Outcomes | Wanted::Counts => None,
-        }
-    }
 }
 
 #[cfg(test)]
@@ -113,7 +72,9 @@ mod tests {
     use std::ops::Range;
 
     use crate::engine::verify::{RandomOptions, random_plan};
-    use crate::engine::{Backend, CpuBackend, Executor, RecheckBy, RecheckOptions, Session, same_words};
+    use crate::engine::{
+        Backend, Chunk, CpuBackend, Executor, LanePlan, RecheckBy, RecheckOptions, Session, Wanted, same_words,
+    };
     use crate::{Error, Result};
 
     fn plan() -> LanePlan {

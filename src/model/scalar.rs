@@ -1,5 +1,4 @@
-//! The number a lane computes with: f64 (the reference), f32 (the lane arithmetic of every backend) and
-//! a type that counts the operations of a step.
+//! The number a lane computes with: f64 (the reference) and f32 (the lane arithmetic of every backend).
 //!
 //! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
 //! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
@@ -8,7 +7,6 @@
 //! rounded, and no sum, difference or magnitude of such numbers is -0; a product or a negated number may be, and is
 //! compared only where another condition excludes it.
 
-use std::cell::Cell;
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -148,136 +146,6 @@ real_float!(
 );
 real_float!(f64, |x| Flag::of(x < 0.0), |x| Flag::of(x > 0.0), |a, b| Flag::of(a < b));
 
-/// Operations of the counting type, by kind.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct OperationCount {
-    /// Additions and subtractions.
-    pub additions: u64,
-    /// Multiplications.
-    pub multiplications: u64,
-    /// Correctly rounded divisions.
-    pub divisions: u64,
-    /// Comparisons.
-    pub comparisons: u64,
-}
-
-impl OperationCount {
-    /// All of them.
-    pub fn total(&self) -> u64 {
-        self.additions + self.multiplications + self.divisions + self.comparisons
-    }
-}
-
-thread_local! {
-    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0 }) };
-}
-
-/// Kinds of operations that are counted.
-enum Operation {
-    Addition,
-    Multiplication,
-    Division,
-    Comparison,
-}
-
-fn count(operation: Operation) {
-    COUNT.with(|cell| {
-        let mut now = cell.get();
-        let counter = match operation {
-            Operation::Addition => &mut now.additions,
-            Operation::Multiplication => &mut now.multiplications,
-            Operation::Division => &mut now.divisions,
-            Operation::Comparison => &mut now.comparisons,
-        };
-        *counter += 1;
-        cell.set(now);
-    });
-}
-
-/// An f64 that counts what is done with it, per thread.
-#[derive(Debug, Clone, Copy)]
-pub struct Counting(f64);
-
-impl Counting {
-    /// Runs `work` and returns its result with the operations it took on this thread.
-    pub fn measure<T>(work: impl FnOnce() -> T) -> (T, OperationCount) {
-        COUNT.with(|cell| cell.set(OperationCount::default()));
-        let result = work();
-        (result, COUNT.with(Cell::get))
-    }
-}
-
-impl Add for Counting {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        count(Operation::Addition);
-        Counting(self.0 + other.0)
-    }
-}
-impl Sub for Counting {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        count(Operation::Addition);
-        Counting(self.0 - other.0)
-    }
-}
-impl Mul for Counting {
-    type Output = Self;
-    fn mul(self, other: Self) -> Self {
-        count(Operation::Multiplication);
-        Counting(self.0 * other.0)
-    }
-}
-impl Neg for Counting {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Counting(-self.0)
-    }
-}
-impl PartialEq for Counting {
-    fn eq(&self, other: &Self) -> bool {
-        count(Operation::Comparison);
-        self.0 == other.0
-    }
-}
-impl PartialOrd for Counting {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        count(Operation::Comparison);
-        self.0.partial_cmp(&other.0)
-    }
-}
-impl Real for Counting {
-    const ZERO: Self = Counting(0.0);
-    const ONE: Self = Counting(1.0);
-    const INFINITY: Self = Counting(f64::INFINITY);
-
-    fn from_f64(value: f64) -> Self {
-        Counting(value)
-    }
-    fn to_f64(self) -> f64 {
-        self.0
-    }
-    fn from_step(step: u32) -> Self {
-        Counting(f64::from(step))
-    }
-    fn exact_div(self, divisor: Self) -> Self {
-        count(Operation::Division);
-        Counting(self.0 / divisor.0)
-    }
-    fn floor_to_step(self) -> u32 {
-        self.0 as u32
-    }
-    fn is_negative(self) -> Flag {
-        Flag::of(self < Self::ZERO)
-    }
-    fn is_positive(self) -> Flag {
-        Flag::of(self > Self::ZERO)
-    }
-    fn is_below(self, other: Self) -> Flag {
-        Flag::of(self < other)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -305,16 +173,5 @@ mod tests {
                 assert_eq!(f64::from(a).is_below(f64::from(b)).holds(), a < b, "{a} {b}");
             }
         }
-    }
-
-    #[test]
-    fn the_counting_type_sees_every_operation() {
-        let (value, count) = Counting::measure(|| {
-            let a = Counting::from_f64(3.0);
-            let b = Counting::from_f64(2.0);
-            (a * b + a).exact_div(b).larger(b)
-        });
-        assert_eq!(value.to_f64(), 4.5);
-        assert_eq!(count, OperationCount { additions: 1, multiplications: 1, divisions: 1, comparisons: 1 });
     }
 }

@@ -33,11 +33,7 @@ pub fn comparison(comparison: &Comparison) -> String {
         text += "* outside 5–95 %: these lanes hardly test this criterion\n";
     }
     if comparison.modes_differing > 0 {
-        let _ = writeln!(
-            text,
-            "{} values differ if only verdicts or counts are requested",
-            count(comparison.modes_differing)
-        );
+        let _ = writeln!(text, "{} verdicts differ if only verdicts are requested", count(comparison.modes_differing));
     }
     for lane in &comparison.worst {
         let _ = writeln!(text, "  {} differs in {}", lane.key, lane.names().join(", "));

@@ -85,7 +85,6 @@ pub fn chunk(
         verdicts: lanes.iter().map(|l| l.0).collect(),
         outcomes: if with_outcomes { lanes.iter().map(outcome).collect() } else { Vec::new() },
         valued: None,
-        counts: Vec::new(),
         redone_and_rechecked: [0; 2],
     }
 }

@@ -4,14 +4,12 @@
 use crate::common::device::software_device;
 use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
-use lanesweep::engine::{
-    Backend, Block, CaseSource, CpuBackend, Executor, Headway, LaneCase, LanePlan, RecheckOptions, Wanted, same_words,
-};
+use lanesweep::engine::{Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Wanted, same_words};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::scenario::Tables;
 
-const ALL_WANTED: [Wanted; 3] = [Wanted::Verdicts, Wanted::Outcomes, Wanted::Counts];
+const ALL_WANTED: [Wanted; 2] = [Wanted::Verdicts, Wanted::Outcomes];
 
 fn open(options: GpuOptions) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;
@@ -67,7 +65,7 @@ fn assert_equal(gpu: &GpuBackend, plan: &LanePlan, what: &str) {
             let (a, b) = (ours.run(units.clone(), wanted).unwrap(), theirs.run(units.clone(), wanted).unwrap());
             a.check(plan).unwrap();
             b.check(plan).unwrap();
-            assert!(a.verdicts == b.verdicts && a.counts == b.counts, "{what} {units:?} {wanted:?}");
+            assert!(a.verdicts == b.verdicts, "{what} {units:?} {wanted:?}");
             assert_eq!(a.outcomes.len(), b.outcomes.len(), "{what} {units:?} {wanted:?}");
             assert!(a.outcomes.iter().zip(&b.outcomes).all(|(a, b)| same_words(a, b)), "{what} {units:?} {wanted:?}");
         }
@@ -169,26 +167,4 @@ fn a_device_may_go_before_its_sessions_which_then_hear_of_it() {
         sender.send(session.run(0..1, Wanted::Verdicts).is_err()).unwrap();
     });
     assert!(done.recv_timeout(std::time::Duration::from_secs(20)).expect("the drop hangs"));
-}
-
-#[test]
-fn a_device_that_fails_while_counts_are_checked_leaves_complete_counts() {
-    let plan = random(400, 6, &ModelId::ALL);
-    let cpu = CpuBackend::lane_arithmetic();
-    let expected = cpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Counts).unwrap();
-    // One job per category, then those of the check.
-    for at_job in [2, 3, 10] {
-        let fault = Some(Fault { at_job, kind: FaultKind::Lost });
-        let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
-        let recheck = Some(RecheckOptions { seed: 1, one_in: 1 });
-        let executor = Executor { recheck, ..Executor::new(&gpu).with_fallback(Some(&cpu)) };
-        let mut chunks = Vec::new();
-        let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Counts, |chunk| {
-            chunks.push(chunk);
-            Ok(())
-        });
-        let summary = summary.unwrap();
-        assert!(chunks.len() == 1 && chunks[0].counts == expected.counts, "lost at job {at_job}");
-        assert_eq!((summary.redone_lanes, summary.rechecked_lanes), (plan.lane_count(), 0));
-    }
 }

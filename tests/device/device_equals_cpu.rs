@@ -126,7 +126,6 @@ fn shaders_without_run_time_checks_give_the_same_words() {
 fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
     let profile = Profile::load("paper").unwrap();
     let (many, few) = (random(&profile, 3000), random(&profile, 7));
-    let cpu = CpuBackend::lane_arithmetic();
     // With more, llvmpipe ends the loop: there the first invocations take all lanes of a workgroup.
     for lanes in [2, 3] {
         let lanes_per_invocation = Some(lanes);
@@ -134,8 +133,6 @@ fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
         for plan in [&many, &few] {
             let what = format!("{lanes} lanes per invocation");
             assert_equal(&what, &compare("random", plan, &gpu, |_| ()).unwrap());
-            let [ours, theirs] = [&gpu as &dyn Backend, &cpu].map(|backend| run(backend, plan, Wanted::Counts).counts);
-            assert_eq!(ours, theirs, "{what}");
         }
         assert_equal("study", &compare("study", &small_study(), &gpu, |_| ()).unwrap());
     }

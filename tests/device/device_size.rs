@@ -69,7 +69,7 @@ fn expected(plan: &LanePlan, lane: u64) -> Verdicts {
     Verdicts(if collides { 1 << Criterion::Collision.index() | 1 << Criterion::Btn.index() } else { 0 })
 }
 
-/// Sweeps for verdicts and for counts, and compares every lane.
+/// Sweeps for verdicts, and compares every lane.
 fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
     let Some((adapters, index)) = software_device() else { return };
     let gpu = GpuBackend::open(&adapters, index, GpuOptions { first_lanes, ..Default::default() }).unwrap();
@@ -86,15 +86,6 @@ fn assert_every_lane(plan: &LanePlan, first_lanes: u64) {
         Ok(())
     });
     assert_eq!((lane, summary.unwrap().lanes), (plan.lane_count(), plan.lane_count()));
-    let (mut lanes, mut counted) = (0, 0);
-    Executor::new(&gpu)
-        .sweep(plan, all, Wanted::Counts, |chunk| {
-            lanes += chunk.counts.iter().map(|c| c.lanes).sum::<u64>();
-            counted += chunk.counts.iter().map(|c| c.failed[Criterion::Collision.index()]).sum::<u64>();
-            Ok(())
-        })
-        .unwrap();
-    assert_eq!((lanes, counted), (plan.lane_count(), collisions));
 }
 
 #[test]

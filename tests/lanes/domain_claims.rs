@@ -4,9 +4,11 @@ use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent
 use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
 use lanesweep::model::driver::{BelowTrigger, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::model::scalar::{Counting, Real};
+use lanesweep::model::scalar::Real;
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::scenario::{Ahead, Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
+
+use crate::counting::Counting;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
     let mut tables = Tables::default();

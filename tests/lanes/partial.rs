@@ -6,6 +6,7 @@ use crate::common::plans::{chunk, mixed, plan};
 use lanesweep::Place;
 use lanesweep::engine::{LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
+use lanesweep::run::parts::{seal, unseal};
 use lanesweep::scenario::Category;
 use proptest::prelude::*;
 
@@ -25,6 +26,15 @@ fn lane(seed: u64) -> impl Fn(u64) -> (Verdicts, f64) {
 
 fn whole(plan: &LanePlan, seed: u64) -> Partial {
     Partial::from_chunk(plan, &chunk(plan, 0..plan.unit_count(), &lane(seed), true)).unwrap()
+}
+
+/// A partial as the content of a part.
+fn text_of(partial: &Partial) -> String {
+    String::from_utf8(seal("part", partial).unwrap().0).unwrap()
+}
+
+fn read(text: &[u8]) -> lanesweep::Result<Partial> {
+    Ok(unseal("part", text, &Place::item("part.json"), "compute this part again")?.0)
 }
 
 proptest! {
@@ -55,25 +65,24 @@ proptest! {
         let merged = parts.pop().unwrap();
         let expected = whole(&plan, seed);
         prop_assert_eq!(&merged, &expected);
-        prop_assert_eq!(merged.to_json().unwrap(), expected.to_json().unwrap());
+        prop_assert_eq!(text_of(&merged), text_of(&expected));
         prop_assert!(merged.is_complete(&plan));
     }
 
     #[test]
     fn a_partial_survives_its_file(seed: u64) {
         let partial = whole(&study(), seed);
-        let text = partial.to_json().unwrap();
-        prop_assert_eq!(Partial::from_json(&text, Place::item("test")).unwrap(), partial);
+        prop_assert_eq!(read(text_of(&partial).as_bytes()).unwrap(), partial);
     }
 
     #[test]
     fn a_changed_digit_is_noticed(seed: u64, at in 0usize..4000) {
-        let text = whole(&study(), seed).to_json().unwrap();
+        let text = text_of(&whole(&study(), seed));
         let digits: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect();
         let at = digits[at % digits.len()];
         let mut bytes = text.into_bytes();
         bytes[at] = if bytes[at] == b'7' { b'3' } else { b'7' };
-        let error = Partial::from_json(std::str::from_utf8(&bytes).unwrap(), Place::item("test")).unwrap_err();
+        let error = read(&bytes).unwrap_err();
         prop_assert!(error.help().is_some(), "{}", error);
     }
 }
@@ -91,17 +100,6 @@ fn counts_by_headway_that_do_not_add_up_are_those_of_no_study() {
     assert!(!serde_json::from_value::<Partial>(changed.clone()).unwrap().adds_up(&plan));
     changed["headway_failures"].as_array_mut().unwrap().pop();
     assert!(!serde_json::from_value::<Partial>(changed).unwrap().adds_up(&plan));
-}
-
-#[test]
-fn the_worst_lanes_are_the_smallest_by_value_and_then_by_lane() {
-    let plan = study();
-    let lane = |lane: u64| (Verdicts(0), if lane.is_multiple_of(3) { 0.0 } else { 1.0 });
-    let partial = Partial::from_chunk_keeping(&plan, &chunk(&plan, 0..9, &lane, true), 4).unwrap();
-    assert_eq!(partial.worst().iter().map(|w| w.lane).collect::<Vec<_>>(), [0, 3, 6, 9]);
-    assert_eq!(partial.valued_lanes(), plan.lane_count());
-    let silent = Partial::from_chunk(&plan, &chunk(&plan, 0..9, &lane, false)).unwrap();
-    assert_eq!((silent.worst().len(), silent.valued_lanes()), (0, 0));
 }
 
 #[test]
@@ -139,20 +137,6 @@ fn overlaps_and_strangers_are_refused() {
     let other = plans::plan(&[(Category::Lvd, 9, &["i"])]);
     let error = part(&plan, 0..5).merge(part(&other, 5..6)).unwrap_err();
     assert!(error.to_string().contains("belongs to plan"), "{error}");
-    let read = |text: &str| Partial::from_json(text, Place::item("part.json")).unwrap_err().to_string();
-    assert!(read("{\"a\": 1}").contains("no partial result"));
-    assert!(read("{\"format\": \"lanesweep partial\", \"ver").contains("no complete JSON"));
-    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 99}").contains("version is 99"));
-    assert!(read("{\"format\": \"lanesweep partial\", \"version\": 3}").contains("damaged"));
-}
-
-#[test]
-fn parts_that_keep_different_numbers_of_worst_lanes_do_not_merge() {
-    let plan = study();
-    let few = Partial::from_chunk_keeping(&plan, &chunk(&plan, 0..2, &lane(1), true), 3).unwrap();
-    let error = Partial::empty(&plan).merge(few.clone()).unwrap_err().to_string();
-    assert!(error.contains("keeps 3 worst lanes, the other 20"), "{error}");
-    assert_eq!(Partial::empty_keeping(&plan, 3).merge(few.clone()).unwrap(), few);
 }
 
 #[test]

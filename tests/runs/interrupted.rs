@@ -298,8 +298,8 @@ impl Session for AskedSession<'_> {
     fn run(&mut self, units: Range<u64>, _: Wanted) -> lanesweep::Result<Chunk> {
         let first_lane = self.0.first_lane_of(units.start);
         let verdicts = vec![Verdicts::default(); (self.0.first_lane_of(units.end) - first_lane) as usize];
-        let (outcomes, counts) = (Vec::new(), Vec::new());
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked: [0; 2] })
+        let outcomes = Vec::new();
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, redone_and_rechecked: [0; 2] })
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {

@@ -7,7 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::engine::backend::{Backend, CellCounts, Chunk, RecheckBy, Session, Wanted};
+use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
 use crate::engine::cpu::instructions::Instructions;
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
@@ -224,7 +224,6 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
         let first_lane = plan.first_lane_of(units.start);
         let mut verdicts = Vec::new();
         let mut outcomes = Vec::new();
-        let mut counts = Vec::new();
         for (block, inside) in plan.segments(units.clone()) {
             let per_unit = plan.lanes_per_unit(&plan.blocks[block]) as usize;
             let count = (inside.end - inside.start) as usize;
@@ -232,9 +231,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             let task = |k: usize| Self::task(&inside, task_units, k);
             let task_lanes = task_units as usize * per_unit;
             let from = verdicts.len();
-            if wanted != Wanted::Counts {
-                verdicts.resize(from + count * per_unit, Verdicts::default());
-            }
+            verdicts.resize(from + count * per_unit, Verdicts::default());
             match wanted {
                 Wanted::Verdicts | Wanted::Watched(_) => {
                     let watch = wanted.watch();
@@ -253,34 +250,9 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                         });
                     });
                 }
-                Wanted::Counts => {
-                    counts.resize(plan.cell_count(), CellCounts::EMPTY);
-                    let cells = plan.blocks[block].variants.len() * plan.models.len();
-                    let empty = || vec![CellCounts::EMPTY; cells];
-                    let lanes_per_variant = plan.headways.len() * plan.models.len();
-                    let tasks = count.div_ceil(task_units as usize);
-                    let of_tasks = (0..tasks).into_par_iter().fold(empty, |mut cells, k| {
-                        run.outcomes(block, task(k), &mut |at, outcome| {
-                            let inside = at % per_unit;
-                            let cell = inside / lanes_per_variant * plan.models.len() + inside % plan.models.len();
-                            cells[cell].count(&outcome);
-                        });
-                        cells
-                    });
-                    // Integers and minima: the order of the sum does not matter.
-                    let sum = of_tasks.reduce(empty, |mut a, b| {
-                        a.iter_mut().zip(&b).for_each(|(a, b)| a.add(b));
-                        a
-                    });
-                    let first = plan.cell(block, 0, 0);
-                    counts[first..first + cells].iter_mut().zip(&sum).for_each(|(a, b)| a.add(b));
-                }
             }
         }
-        if wanted == Wanted::Counts {
-            counts.resize(plan.cell_count(), CellCounts::EMPTY);
-        }
         let redone_and_rechecked = [0; 2];
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counts, redone_and_rechecked })
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, redone_and_rechecked })
     }
 }

@@ -20,7 +20,7 @@ pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
 pub use choice::choose;
 pub use device::{Fault, FaultKind, GpuOptions};
 pub use records::Generation;
-pub use records::{Launch, OutcomeRecord, StartRecord, wanted_code};
+pub use records::{Launch, OutcomeRecord, StartRecord};
 pub use session::GpuBackend;
 pub use spirv::{Checks, exact_spirv};
 pub use visible::{visible, visible_here};

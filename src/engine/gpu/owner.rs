@@ -61,8 +61,8 @@ pub(super) enum Command {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prepared {
     pub session: u64,
-    /// Maximum number of lanes per model of a job: verdicts, outcomes, counts.
-    pub max_lanes: [u64; 3],
+    /// Maximum number of lanes per model of a job: verdicts, outcomes.
+    pub max_lanes: [u64; 2],
     /// Maximum number of cases on the device.
     pub max_cases: u64,
 }
@@ -189,7 +189,7 @@ impl DeviceOwner {
         self.sessions.insert(session, inputs);
         let models = setup.models;
         let record = size_of::<super::records::OutcomeRecord>() as f64;
-        let max_lanes = [0.5, record + 0.5, 1e-3].map(|bytes| self.device.max_lanes(models, bytes));
+        let max_lanes = [0.5, record + 0.5].map(|bytes| self.device.max_lanes(models, bytes));
         let limits = self.device.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let most = most.min(if setup.generator.is_some() { MAX_MADE_BYTES } else { MAX_CASE_BYTES });

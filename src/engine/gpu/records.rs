@@ -7,7 +7,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts, Wanted};
+use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
 use crate::model::criterion::{BrakeThreatMaximum, Contact, Criteria};
 use crate::model::driver::MODELS;
 use crate::model::flag::Flag;
@@ -58,35 +58,20 @@ pub struct Launch {
     pub lanes: u32,
     /// Headways per case, at least 1.
     pub headways: u32,
-    /// Variants per unit, at least 1.
-    pub variants: u32,
     /// First case in the buffer of cases.
     pub first_case: u32,
     /// First word of this dispatch in the verdicts.
     pub first_word: u32,
     /// First record of this dispatch in the outcomes.
     pub first_outcome: u32,
-    /// First word of this dispatch's cells in the counts: one cell per variant.
-    pub first_cell_word: u32,
-    /// Word of the counts that counts the lanes of this dispatch.
-    pub done_word: u32,
-    /// 0 verdicts, 1 outcomes, 2 counts.
-    pub wanted: u32,
+    /// Word that counts the finished lanes of this dispatch.
+    pub finished_word: u32,
     /// Lanes of a workgroup, at least [`WORKGROUP`](super::shader::WORKGROUP).
     pub lanes_per_group: u32,
     /// A smaller TTC fails, s: the profile's, or a watch's.
     pub ttc_threshold_s: f32,
     /// Verdicts mark contacts at this closing speed, m/s, or a greater one.
     pub marks_contacts_from: f32,
-}
-
-/// The number of what is wanted, in [`Launch`].
-pub fn wanted_code(wanted: Wanted) -> u32 {
-    match wanted {
-        Wanted::Verdicts | Wanted::Watched(_) => 0,
-        Wanted::Outcomes => 1,
-        Wanted::Counts => 2,
-    }
 }
 
 /// Result of a finished lane.
@@ -152,17 +137,6 @@ impl OutcomeRecord {
             min_gap: f32::from_bits(self.min_gap_bits),
         })
     }
-}
-
-/// Words per cell of the counts.
-pub const CELL_WORDS: usize = 8;
-
-/// An empty cell: zero counts, no minimum.
-pub const EMPTY_CELL: [u32; CELL_WORDS] = [0, 0, 0, 0, 0, u32::MAX, u32::MAX, 0];
-
-/// The number of an order-preserving integer.
-pub fn from_ordered(key: u32) -> f32 {
-    f32::from_bits(if key & 0x8000_0000 != 0 { key & 0x7fff_ffff } else { !key })
 }
 
 /// One dispatch of the generator.

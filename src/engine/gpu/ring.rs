@@ -7,9 +7,8 @@ use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
 use super::generator::Inputs;
-use super::records::{CELL_WORDS, EMPTY_CELL, Launch, OutcomeRecord, wanted_code};
+use super::records::{Launch, OutcomeRecord};
 use super::shader::WORKGROUP;
-use crate::engine::Wanted;
 use crate::model::criterion::Criteria;
 use crate::{Error, Result};
 
@@ -23,10 +22,11 @@ pub(super) struct Job {
     pub pipelines: Vec<PipelineSpec>,
     /// First case in the buffer of cases.
     pub first_case: u32,
-    pub units: u32,
-    pub variants: u32,
+    /// Units × variants.
+    pub cases: u32,
     pub headways: u32,
-    pub wanted: Wanted,
+    /// Whether its pipelines write outcomes.
+    pub has_outcomes: bool,
     /// The criteria of each model.
     pub criteria: Vec<Criteria<f32>>,
 }
@@ -34,19 +34,15 @@ pub(super) struct Job {
 impl Job {
     /// Lanes per model.
     pub fn lanes(&self) -> u32 {
-        self.units * self.variants * self.headways
+        self.cases * self.headways
     }
 
     fn words(&self) -> usize {
-        if self.wanted == Wanted::Counts { 0 } else { self.lanes().div_ceil(8) as usize }
+        self.lanes().div_ceil(8) as usize
     }
 
     fn records(&self) -> usize {
-        if self.wanted == Wanted::Outcomes { self.lanes() as usize } else { 0 }
-    }
-
-    fn cells(&self) -> usize {
-        if self.wanted == Wanted::Counts { self.variants as usize } else { 0 }
+        if self.has_outcomes { self.lanes() as usize } else { 0 }
     }
 }
 
@@ -57,8 +53,6 @@ pub(super) struct Answer {
     pub words: Vec<Vec<u32>>,
     /// Outcomes of each model, if requested.
     pub outcomes: Vec<Vec<OutcomeRecord>>,
-    /// Cells of each model, one per variant, if requested.
-    pub cells: Vec<Vec<[u32; CELL_WORDS]>>,
     /// Time of the slowest dispatch, s.
     pub slowest_s: f64,
     /// Time of all dispatches, s.
@@ -75,7 +69,7 @@ struct Buffers {
     launches: wgpu::Buffer,
     verdicts: wgpu::Buffer,
     outcomes: wgpu::Buffer,
-    counts: wgpu::Buffer,
+    finished: wgpu::Buffer,
     readback: wgpu::Buffer,
     timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     models: usize,
@@ -86,7 +80,7 @@ struct Buffers {
 struct ResultOffsets {
     verdicts: u64,
     outcomes: u64,
-    counts: u64,
+    finished: u64,
     times: u64,
 }
 
@@ -95,14 +89,14 @@ impl ResultOffsets {
         ResultOffsets {
             verdicts: (models * job.words() * 4) as u64,
             outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
-            counts: ((models + models * job.cells() * CELL_WORDS) * 4) as u64,
+            finished: (models * 4) as u64,
             times: (models * 16) as u64,
         }
     }
 
     fn total(&self) -> u64 {
         // Times are resolved to multiples of 8 bytes.
-        (self.verdicts + self.outcomes + self.counts).next_multiple_of(8) + self.times
+        (self.verdicts + self.outcomes + self.finished).next_multiple_of(8) + self.times
     }
 }
 
@@ -125,18 +119,14 @@ impl Slot {
         let stride = launch_stride(device);
         let lanes_per_group = WORKGROUP * device.lanes_per_invocation(job.lanes());
         let mut launches = vec![0_u8; stride as usize * models];
-        let mut counts = vec![0_u32; models];
         for model in 0..models {
             let launch = Launch {
                 lanes: job.lanes(),
                 headways: job.headways,
-                variants: job.variants,
                 first_case: job.first_case,
                 first_word: (model * job.words()) as u32,
                 first_outcome: (model * job.records()) as u32,
-                first_cell_word: (models + model * job.cells() * CELL_WORDS) as u32,
-                done_word: model as u32,
-                wanted: wanted_code(job.wanted),
+                finished_word: model as u32,
                 lanes_per_group,
                 ttc_threshold_s: job.criteria[model].ttc.threshold,
                 // No closing speed is larger.
@@ -144,10 +134,8 @@ impl Slot {
             };
             let at = stride as usize * model;
             launches[at..at + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
-            counts.extend(EMPTY_CELL.repeat(job.cells()));
         }
         device.queue.write_buffer(&buffers.launches, 0, &launches);
-        device.queue.write_buffer(&buffers.counts, 0, bytemuck::cast_slice(&counts));
         let binding = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let launch = wgpu::BufferBinding {
             buffer: &buffers.launches,
@@ -165,18 +153,20 @@ impl Slot {
                 binding(4, inputs.lateral.as_entire_binding()),
                 binding(5, buffers.verdicts.as_entire_binding()),
                 binding(6, buffers.outcomes.as_entire_binding()),
-                binding(7, buffers.counts.as_entire_binding()),
+                binding(7, buffers.finished.as_entire_binding()),
             ],
         });
         let (x, y) = device.grid(job.lanes().div_ceil(lanes_per_group));
         let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
         // Words that no lane writes must be zero.
-        if parts.verdicts > 0 {
-            encoder.clear_buffer(&buffers.verdicts, 0, Some(parts.verdicts));
-        }
-        if parts.outcomes > 0 {
-            encoder.clear_buffer(&buffers.outcomes, 0, Some(parts.outcomes));
+        let results = [
+            (&buffers.verdicts, parts.verdicts),
+            (&buffers.outcomes, parts.outcomes),
+            (&buffers.finished, parts.finished),
+        ];
+        for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
+            encoder.clear_buffer(buffer, 0, Some(bytes));
         }
         for (model, pipeline) in pipelines.iter().enumerate() {
             let timestamp_writes = buffers.timing.as_ref().map(|(set, _)| wgpu::ComputePassTimestampWrites {
@@ -191,12 +181,8 @@ impl Slot {
             pass.dispatch_workgroups(x, y, 1);
         }
         let mut at = 0;
-        for (buffer, bytes) in
-            [(&buffers.verdicts, parts.verdicts), (&buffers.outcomes, parts.outcomes), (&buffers.counts, parts.counts)]
-        {
-            if bytes > 0 {
-                encoder.copy_buffer_to_buffer(buffer, 0, &buffers.readback, at, bytes);
-            }
+        for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
+            encoder.copy_buffer_to_buffer(buffer, 0, &buffers.readback, at, bytes);
             at += bytes;
         }
         if let Some((set, resolved)) = &buffers.timing {
@@ -252,7 +238,7 @@ impl Slot {
             b.models == models
                 && b.verdicts.size() >= parts.verdicts
                 && b.outcomes.size() >= parts.outcomes
-                && b.counts.size() >= parts.counts
+                && b.finished.size() >= parts.finished
                 && b.readback.size() >= parts.total()
         });
         if enough {
@@ -268,7 +254,7 @@ impl Slot {
             launches: device.buffer("launches", stride * models as u64, Use::UNIFORM | Use::COPY_DST),
             verdicts: device.buffer("verdicts", room(parts.verdicts, most), results),
             outcomes: device.buffer("outcomes", room(parts.outcomes, most), results),
-            counts: device.buffer("counts", room(parts.counts, most), results),
+            finished: device.buffer("finished", room(parts.finished, most), results),
             readback: device.buffer(
                 "results",
                 room(parts.total(), limits.max_buffer_size),
@@ -298,13 +284,11 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let models = job.pipelines.len();
     let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
     let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
-    let (counts, _) = rest.split_at(parts.counts as usize);
+    let finished: Vec<u32> = bytemuck::pod_collect_to_vec(&rest[..parts.finished as usize]);
     let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
-    let counts: Vec<u32> = bytemuck::pod_collect_to_vec(counts);
-    let (done, cells) = counts.split_at(models);
-    if let Some(model) = done.iter().position(|&lanes| lanes != job.lanes()) {
+    if let Some(model) = finished.iter().position(|&lanes| lanes != job.lanes()) {
         let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
-        let problem = format!("it completed {} of {lanes} lanes of {name}", done[model]);
+        let problem = format!("it completed {} of {lanes} lanes of {name}", finished[model]);
         let help =
             "use option `backend = cpu`; if lanes have very many steps, a larger time step (option `dt`) may help";
         return Err(Error::device(&device.name, problem, help));
@@ -330,10 +314,6 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
                 bytemuck::cast_slice_mut(&mut records).copy_from_slice(&part);
                 records
             })
-            .collect(),
-        cells: cells
-            .chunks(job.cells().max(1) * CELL_WORDS)
-            .map(|model| model.chunks_exact(CELL_WORDS).map(|c| std::array::from_fn(|at| c[at])).collect())
             .collect(),
         slowest_s: if timed { slowest_s } else { wall_s },
         device_s: if timed { device_s } else { wall_s },

@@ -12,10 +12,10 @@ use super::adapters::{AdapterCard, Adapters, DeviceKind};
 use super::device::{GpuOptions, PipelineSpec};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
-use super::records::{CELL_WORDS, StartRecord, from_ordered, wanted_code};
+use super::records::StartRecord;
 use super::ring::{Answer, Job, RING};
 use super::shader::{self, Specialization};
-use crate::engine::{Backend, CellCounts, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use crate::engine::{Backend, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
@@ -80,7 +80,7 @@ impl<'p> GpuSession<'p> {
     }
 
     fn max_lanes(&self, wanted: Wanted) -> u64 {
-        self.prepared.max_lanes[wanted_code(wanted) as usize]
+        self.prepared.max_lanes[usize::from(wanted == Wanted::Outcomes)]
     }
 
     /// Sends one job of units from the start of `units`; returns its end.
@@ -117,8 +117,8 @@ impl<'p> GpuSession<'p> {
         };
         let count = self.pacer.units(per_unit, most);
         let end = units.end.min(units.start + count).min(held.end);
-        let values = matches!(wanted, Wanted::Outcomes | Wanted::Counts);
-        let specialization = Specialization { paired: *paired, values, queue: self.queue };
+        let has_outcomes = wanted == Wanted::Outcomes;
+        let specialization = Specialization { paired: *paired, values: has_outcomes, queue: self.queue };
         let constants = &self.constants[block];
         let criteria = |&model| match wanted.watch() {
             Some(watch) => watch.criteria(&plan.profile, model, constants.criteria),
@@ -128,10 +128,9 @@ impl<'p> GpuSession<'p> {
             pipelines: specs(plan, constants, specialization),
             criteria: plan.models.iter().map(criteria).collect(),
             first_case: ((units.start - held.start) * variants) as u32,
-            units: (end - units.start) as u32,
-            variants: variants as u32,
+            cases: ((end - units.start) * variants) as u32,
             headways: plan.headways.len() as u32,
-            wanted,
+            has_outcomes,
         };
         let (reply, answer) = mpsc::channel();
         let request = Box::new(Request { session: self.prepared.session, cases, job, reply });
@@ -150,29 +149,17 @@ impl<'p> GpuSession<'p> {
         self.pacer.observe(lanes as u64 / models as u64, answer.slowest_s);
         self.device_s += answer.device_s;
         let from = (block.first_lane + piece.units.start * per_unit - chunk.first_lane) as usize;
-        match wanted {
-            Wanted::Counts => {
-                let first = plan.cell(piece.block, 0, 0);
-                for (model, cells) in answer.cells.iter().enumerate() {
-                    for (variant, cell) in cells.iter().enumerate() {
-                        chunk.counts[first + variant * models + model].add(&counts(cell));
-                    }
-                }
-            }
-            Wanted::Verdicts | Wanted::Watched(_) => spread(&answer.words, &mut chunk.verdicts[from..from + lanes]),
-            Wanted::Outcomes => {
-                spread(&answer.words, &mut chunk.verdicts[from..from + lanes]);
-                let criteria = &self.constants[piece.block].criteria;
-                let outcomes: Option<Vec<Outcome<f64>>> = (0..lanes)
-                    .into_par_iter()
-                    .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
-                    .collect();
-                let outcomes = outcomes.ok_or_else(|| {
-                    Error::device(&self.device, "it did not write a lane", "use option `backend = cpu`")
-                })?;
-                // Pieces come in the plan's order.
-                chunk.outcomes.extend(outcomes);
-            }
+        spread(&answer.words, &mut chunk.verdicts[from..from + lanes]);
+        if wanted == Wanted::Outcomes {
+            let criteria = &self.constants[piece.block].criteria;
+            let outcomes: Option<Vec<Outcome<f64>>> = (0..lanes)
+                .into_par_iter()
+                .map(|at| Some(answer.outcomes[at % models][at / models].outcome(criteria)?.widen()))
+                .collect();
+            let outcomes = outcomes
+                .ok_or_else(|| Error::device(&self.device, "it did not write a lane", "use option `backend = cpu`"))?;
+            // Pieces come in the plan's order.
+            chunk.outcomes.extend(outcomes);
         }
         Ok(())
     }
@@ -185,18 +172,11 @@ impl<'p> GpuSession<'p> {
         let mut chunk = Chunk {
             units: units.clone(),
             first_lane,
-            verdicts: Vec::new(),
+            verdicts: vec![Verdicts::default(); lanes],
             outcomes: Vec::new(),
             valued: None,
-            counts: Vec::new(),
             redone_and_rechecked: [0; 2],
         };
-        match wanted {
-            Wanted::Counts => chunk.counts = vec![CellCounts::EMPTY; plan.cell_count()],
-            Wanted::Verdicts | Wanted::Watched(_) | Wanted::Outcomes => {
-                chunk.verdicts = vec![Verdicts::default(); lanes]
-            }
-        }
         let mut pending: VecDeque<Piece> = VecDeque::new();
         for (block, inside) in plan.segments(units) {
             let mut from = inside.start;
@@ -269,18 +249,6 @@ fn spread(words: &[Vec<u32>], lanes: &mut [Verdicts]) {
             *lane = Verdicts((words[at % models][word] >> (4 * (at / models)) & 0xf) as u8);
         }
     });
-}
-
-/// A cell as the device counted it.
-fn counts(cell: &[u32; CELL_WORDS]) -> CellCounts {
-    let smallest = |key: u32| if cell[0] == 0 { f64::INFINITY } else { f64::from(from_ordered(key)) };
-    CellCounts {
-        lanes: cell[0].into(),
-        failed: [cell[1].into(), cell[2].into(), cell[3].into()],
-        capped: cell[4].into(),
-        min_ttc_s: smallest(cell[5]),
-        min_gap_m: smallest(cell[6]),
-    }
 }
 
 /// Lanes as invocations of a WGSL kernel on one device.

@@ -20,7 +20,7 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/btn.wgsl", include_str!("../../../shaders/shared/btn.wgsl")),
     ("shared/criteria.wgsl", include_str!("../../../shaders/shared/criteria.wgsl")),
     ("shared/frame.wgsl", include_str!("../../../shaders/shared/frame.wgsl")),
-    ("shared/reduction.wgsl", include_str!("../../../shaders/shared/reduction.wgsl")),
+    ("shared/verdicts.wgsl", include_str!("../../../shaders/shared/verdicts.wgsl")),
 ];
 
 /// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their tables: `normal_table:

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::engine::{Backend, CellCounts, Chunk, CpuBackend, LanePlan, Outcome, Session, Wanted, chunks, words};
+use crate::Result;
+use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Session, Wanted, chunks, words};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
-use crate::{Error, Result};
 
 /// Names of the output words, in the order of [`words`].
 pub const WORDS: [&str; 12] = [
@@ -124,7 +124,7 @@ impl Comparison {
 
 /// Runs every lane of a plan on the three backends. `done` gets the number of lanes of each finished part.
 ///
-/// The backend under test runs three times: for outcomes, verdicts and counts; all must agree. It has no fallback: a
+/// The backend under test runs twice, for outcomes and for verdicts; both must agree. It has no fallback: a
 /// lane that it cannot compute is an error.
 ///
 /// # Errors
@@ -197,22 +197,11 @@ fn tallies(plan: &LanePlan) -> Vec<GroupComparison> {
     plan.blocks.iter().flat_map(|block| models(block.category)).collect()
 }
 
-/// Values that differ if the backend returns only verdicts or only counts instead of outcomes.
+/// Lanes whose verdicts differ if the backend returns only verdicts instead of outcomes.
 fn modes(plan: &LanePlan, tested: &mut dyn Session, units: Range<u64>, outcomes: &Chunk) -> Result<u64> {
-    let verdicts = tested.run(units.clone(), Wanted::Verdicts)?;
+    let verdicts = tested.run(units, Wanted::Verdicts)?;
     verdicts.check(plan)?;
-    let counts = tested.run(units, Wanted::Counts)?;
-    counts.check(plan)?;
-    let mut expected = vec![CellCounts::EMPTY; plan.cell_count()];
-    for (at, outcome) in outcomes.outcomes.iter().enumerate() {
-        let key = plan.key(outcomes.first_lane + at as u64);
-        let key = key.ok_or_else(|| Error::Internal("a chunk reaches beyond its plan".to_owned()))?;
-        expected[plan.cell(key.block, key.variant, key.model)].count(outcome);
-    }
-    let wrong = |a: &CellCounts, b: &CellCounts| a != b;
-    let cells = expected.iter().zip(&counts.counts).filter(|(a, b)| wrong(a, b)).count();
-    let lanes = outcomes.outcomes.iter().zip(&verdicts.verdicts).filter(|(o, v)| o.verdicts != **v).count();
-    Ok((cells + lanes) as u64)
+    Ok(outcomes.outcomes.iter().zip(&verdicts.verdicts).filter(|(o, v)| o.verdicts != **v).count() as u64)
 }
 
 /// Adds a chunk of the three backends.

@@ -43,7 +43,7 @@ pub use lanes::{LaneLimitState, scenario_shares, truncated};
 pub use limit_state::limit_state;
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use plan::{SampleHeadways, SamplePlanOptions, plan_points, plan_samples};
-pub use proposal_file::{proposal_from_text, proposal_text, read_proposal, write_proposal};
+pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use risk::{Risk, RiskRate};
 pub use rows::{EstimateRow, crude_rows, headway_name};
 pub use sample::Sample;

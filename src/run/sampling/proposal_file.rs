@@ -6,7 +6,6 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::stats::density::{DensityModel, MAX_FILE_BYTES, Mixture};
-use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
@@ -48,16 +47,6 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
         factors: components.map(|k| proposal.factor(k).transpose().as_slice().to_vec()).collect(),
     };
     serde_json::to_string_pretty(&file).map_err(|e| Error::Internal(format!("a proposal cannot be written: {e}")))
-}
-
-/// Writes a proposal: whole or not at all.
-///
-/// # Errors
-/// [`Error::Io`] if the folder cannot be written to.
-pub fn write_proposal(path: &Path, density: &DensityModel, proposal: &Mixture) -> Result<()> {
-    let mut out = AtomicFile::create(path)?;
-    out.append(proposal_text(density, proposal)?.as_bytes())?;
-    out.stage()?.publish()
 }
 
 /// Reads a proposal for a density.

@@ -13,9 +13,6 @@ pub(super) fn contradiction(plan: &LanePlan, partial: &Partial) -> Option<String
     if !partial.fits(plan) {
         return Some("a unit has other variants, models or criteria than the plan".to_owned());
     }
-    if let Some(lane) = partial.worst().iter().find(|worst| worst.lane >= plan.lane_count()) {
-        return Some(format!("lane {} is beyond the plan", lane.lane));
-    }
     let of_units =
         units.iter().find_map(|unit| of_unit(unit, plan).map(|problem| format!("unit {}: {problem}", unit.unit)));
     let by_headway = || (!partial.adds_up(plan)).then(|| "failures by headway do not add up".to_owned());

@@ -124,9 +124,4 @@ impl Estimate {
         let crude = self.probability * (1.0 - self.probability) / runs as f64;
         self.variance_reduction = if self.variance > 0.0 { crude / self.variance } else { f64::NAN };
     }
-
-    /// √variance.
-    pub fn standard_error(&self) -> f64 {
-        self.variance.sqrt()
-    }
 }

@@ -116,13 +116,6 @@ impl WeightSums {
         (ratio(self.failing_squared, (self.tries as f64).powi(2)) - ratio(p * p, self.tries as f64)).max(0.0)
     }
 
-    /// Variance of the same estimate in the author's form, the proposal's validity share being taken as known:
-    /// Σ (x − mean)² / N² over the N valid draws.
-    pub fn author_variance(&self) -> f64 {
-        let p = self.unbiased();
-        (ratio(self.failing_squared, (self.tries as f64).powi(2)) - ratio(p * p, self.draws as f64)).max(0.0)
-    }
-
     /// Figures about the weights.
     pub fn figures(&self) -> WeightFigures {
         let tries = self.tries as f64;

@@ -22,7 +22,6 @@ use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::{Error, Place, Result};
 use serde_json::value::RawValue;
-use sha2::{Digest, Sha256};
 
 use super::seeds::{Seeds, density_of};
 
@@ -65,7 +64,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
     readers.push(plain("journal", &seeds.journals, journal));
     readers.push(Reader { reseal: Some(sealed), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
-    readers.push(Reader { reseal: Some(reseal_partial), ..plain("partial", &seeds.partials, partial) });
+    readers.push(Reader { reseal: Some(sealed), ..plain("study part", &seeds.study_parts, study_part) });
     readers
 }
 
@@ -208,10 +207,6 @@ fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
     Some(String::from_utf8(bytes.to_vec()).ok()?.replacen(old, new, 1).into_bytes())
 }
 
-fn hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
-}
-
 /// The first line of a sealed file, sealed anew.
 fn resealed(bytes: &[u8]) -> Option<Vec<u8>> {
     #[derive(serde::Deserialize)]
@@ -224,21 +219,6 @@ fn resealed(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut text = seal(&lanesweep, &content).ok()?.0;
     text.extend(bytes.get(end + 1..).unwrap_or_default());
     Some(text)
-}
-
-fn with_checksum(bytes: &[u8], sum: &str) -> Option<Vec<u8>> {
-    let key = b"\"sha256\":\"";
-    let at = bytes.windows(key.len()).position(|w| w == key)? + key.len();
-    let mut bytes = bytes.to_vec();
-    (at + 64 <= bytes.len()).then(|| bytes.splice(at..at + 64, sum.bytes()));
-    Some(bytes)
-}
-
-/// A partial's fields are sealed in the order of the type and written in the order of names.
-fn reseal_partial(bytes: &[u8], _: &Path, _: &Seeds) -> Option<Vec<u8>> {
-    let value: serde_json::Value = serde_json::from_slice(bytes).ok()?;
-    let partial: Partial = serde_json::from_value(value.get("partial")?.clone()).ok()?;
-    with_checksum(bytes, &hex(&serde_json::to_vec(&partial).ok()?))
 }
 
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
@@ -279,6 +259,9 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
 /// The units of the part that is made as a seed.
 pub const PART_UNITS: std::ops::Range<u64> = 3..17;
 
+/// The units of the part of a study that is made as a seed.
+pub const STUDY_UNITS: std::ops::Range<u64> = 1..3;
+
 /// The units of the part of weighted sums that is made as a seed.
 pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
 
@@ -295,14 +278,15 @@ fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     Ok(())
 }
 
-fn partial(bytes: &[u8], _: &Path, seeds: &Seeds, _: bool) -> Result<()> {
-    let place = || Place::item("partial");
-    let text = std::str::from_utf8(bytes).map_err(|e| Error::input(place(), e.to_string(), "use UTF-8"))?;
-    let partial = Partial::from_json(text, place())?;
-    partial.covered();
-    let merged = Partial::empty(&seeds.study).merge(partial)?;
-    merged.covered();
-    merged.is_complete(&seeds.study);
+fn study_part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let path = file(bytes, dir, "part.json");
+    let part = read_part::<Partial>(&path, "00", &STUDY_UNITS, "again", &|_| Ok(()))?;
+    for partial in part.segments {
+        partial.covered();
+        let merged = Partial::empty(&seeds.study).merge(partial)?;
+        merged.covered();
+        merged.is_complete(&seeds.study);
+    }
     Ok(())
 }
 

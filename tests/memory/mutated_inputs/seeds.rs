@@ -6,7 +6,7 @@ use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
-use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, write_proposal};
+use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, proposal_text};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
@@ -19,7 +19,7 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use lanesweep::traffic::{DataProvenance, Driven};
 
 use super::plans;
-use super::readers::{CRITERION, PART_UNITS, WEIGHTED_UNITS, small_plan};
+use super::readers::{CRITERION, PART_UNITS, STUDY_UNITS, WEIGHTED_UNITS, small_plan};
 use super::small;
 
 /// Valid inputs and what the next steps need beside them.
@@ -47,7 +47,7 @@ pub struct Seeds {
     pub plans: Vec<Vec<u8>>,
     pub journals: Vec<Vec<u8>>,
     pub weighted_parts: Vec<Vec<u8>>,
-    pub partials: Vec<Vec<u8>>,
+    pub study_parts: Vec<Vec<u8>>,
     pub profile: Profile,
     pub jrc: Profile,
     pub study: LanePlan,
@@ -173,7 +173,12 @@ impl Seeds {
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
-        let partial = Partial::from_chunk_keeping(&study, &plans::chunk(&study, 1..3, &lane, true), 20).unwrap();
+        let study_part = Part {
+            run_sha256: "00".to_owned(),
+            units: STUDY_UNITS,
+            lanes_redone_and_rechecked: [0; 2],
+            segments: vec![Partial::from_chunk(&study, &plans::chunk(&study, STUDY_UNITS, &lane, false)).unwrap()],
+        };
         let driven = Some(Driven { hours: Some(1.5), kilometres: Some(90.0) });
         let exposure =
             DataProvenance { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
@@ -227,7 +232,7 @@ impl Seeds {
                 .map(|d| written(|p| write_density(p, d).unwrap()))
                 .collect(),
             distributions: ["stochastic", "deterministic"].map(distribution).to_vec(),
-            proposals: vec![written(|p| write_proposal(p, &density, &density.mixture().unwrap()).unwrap())],
+            proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: parts.into(),
             plans: vec![{
                 let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().cases;
@@ -235,7 +240,7 @@ impl Seeds {
             }],
             journals: journals.into(),
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
-            partials: vec![partial.to_json().unwrap().into_bytes()],
+            study_parts: vec![written(|p| write_part(p, &study_part).unwrap())],
             profile,
             jrc: Profile::load("jrc-2021").unwrap(),
             study,
