@@ -179,7 +179,7 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, source: &Source, extr
     if !headways.is_empty() {
         options.headways = headways;
     }
-    let plan = plan_study(&mined, profile, &options)?.plan;
+    let plan = plan_study(&mined, profile, &options)?;
     let is_synthetic = mined.iter().any(|scenario| scenario.synthetic);
     let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
     let about = About { data: &data, is_synthetic, mined: &mined, density: None, are_alike: false, incomplete };

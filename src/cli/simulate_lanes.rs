@@ -94,7 +94,7 @@ pub(super) fn of_scenarios(path: &Path, profile: &Profile, asked: &Asked, implau
     if let Some(headway) = asked.key.rsplit('/').nth(1).and_then(Headway::parse) {
         options.headways = vec![headway];
     }
-    let plan = plan_study(&scenarios, profile, &options)?.plan;
+    let plan = plan_study(&scenarios, profile, &options)?;
     let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
     let origin = format!("profile {}, f64, scenarios of {}", profile.name, path.display());
     Ok(Lanes { traced: traced::<f64>(&plan, asked, false)?, origin, synthetic, incomplete })
