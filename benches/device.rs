@@ -76,7 +76,7 @@ fn plan(scenarios: &[Scenario], category: Category, model: ModelId, headways: u3
         headways: (0..headways).map(|k| Headway::ThwS(2.0 - 1.8 * f64::from(k) / last)).collect(),
         ..StudyOptions::default()
     };
-    plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap().plan
+    plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
 }
 
 #[allow(clippy::too_many_arguments)] // one row's columns

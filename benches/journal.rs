@@ -78,7 +78,7 @@ fn study(folder: &Path) {
         })
     });
     let scenarios: Vec<Scenario> = many.collect();
-    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().cases;
+    let study = outline_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap();
     let plan = study.window(0..study.outline().unit_count()).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     pairs("study", folder, plan.unit_count(), &[], |ledger: &mut Ledger<Partial>| {
@@ -145,7 +145,8 @@ fn plan_file(folder: &Path, study: &StudyCases) {
     let path = folder.join("plan.json");
     let start = Instant::now();
     let (head, _) = seal("plan", study.head()).unwrap();
-    let bytes = [&head, study.records().unwrap()].concat();
+    let pages: Vec<Vec<u8>> = study.pages().unwrap().map(|page| page.unwrap()).collect();
+    let bytes = [head, pages.concat()].concat();
     std::fs::write(&path, &bytes).unwrap();
     let written = start.elapsed().as_secs_f64();
     let start = Instant::now();

@@ -29,7 +29,7 @@ fn main() {
     println!("part,repetition,seconds,amount,unit");
     let scenarios = paper_size_scenarios();
     let profile = Profile::load("paper").unwrap();
-    let plan = || plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap().plan;
+    let plan = || plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap();
     let made = plan();
     assert_eq!(made.lane_count(), 493_600);
     let narrow = CpuBackend::lane_arithmetic();

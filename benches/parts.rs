@@ -73,14 +73,14 @@ fn sweeping(criterion: &mut Criterion) {
     for category in Category::ALL {
         for model in ModelId::ALL {
             let options = StudyOptions { categories: vec![category], models: vec![model], ..Default::default() };
-            let plan = plan_study(&scenarios, &profile, &options).unwrap().plan;
+            let plan = plan_study(&scenarios, &profile, &options).unwrap();
             group.throughput(Throughput::Elements(common::lane_steps(&plan, &cpu)));
             let name = format!("{} {}", category.key(), model.name());
             group.bench_function(name, |b| b.iter(|| swept(black_box(&plan), &cpu)));
         }
     }
     group.finish();
-    let plan = plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap().plan;
+    let plan = plan_study(&scenarios, &profile, &StudyOptions::default()).unwrap();
     let partial = swept(&plan, &cpu);
     criterion.bench_function("score", |b| b.iter(|| score(&plan, &partial, &ScoreOptions::default()).unwrap()));
 }
@@ -96,7 +96,7 @@ fn study(criterion: &mut Criterion) {
             GeneratorOptions::default,
             |generator| {
                 let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
-                let plan = plan_study(&mined.scenarios, &profile, &StudyOptions::default()).unwrap().plan;
+                let plan = plan_study(&mined.scenarios, &profile, &StudyOptions::default()).unwrap();
                 let partial = swept(&plan, &cpu);
                 score(&plan, &partial, &ScoreOptions::default()).unwrap()
             },

@@ -66,7 +66,7 @@ struct Measured {
 /// Times the sweep of one model's lanes, prints its row and writes its lanes.
 fn measure(scenarios: &[Scenario], profile: &Profile, category: Category, model: ModelId, folder: &Path) -> Measured {
     let options = StudyOptions { categories: vec![category], models: vec![model], ..StudyOptions::default() };
-    let plan = plan_study(scenarios, profile, &options).unwrap().plan;
+    let plan = plan_study(scenarios, profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let best = |backend: &dyn Backend| {
         let once = || {

@@ -146,8 +146,7 @@ fn print_steps() {
     for category in Category::ALL {
         for model in ModelId::ALL {
             let options = StudyOptions { categories: vec![category], models: vec![model], ..StudyOptions::default() };
-            let plan =
-                plan_study(&scenarios, &Profile::load("paper").expect("a profile"), &options).expect("a plan").plan;
+            let plan = plan_study(&scenarios, &Profile::load("paper").expect("a profile"), &options).expect("a plan");
             let mut steps: Vec<u64> = Vec::new();
             Executor::new(&cpu)
                 .sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {

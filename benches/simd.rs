@@ -223,7 +223,7 @@ fn memory(scenarios: &[Scenario]) {
 
 fn plan(scenarios: &[Scenario], categories: Vec<Category>, models: Vec<ModelId>, headways: Vec<Headway>) -> LanePlan {
     let options = StudyOptions { categories, models, headways, ..StudyOptions::default() };
-    plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap().plan
+    plan_study(scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
 }
 
 fn run(plan: &LanePlan, backend: &CpuBackend<f32>) {

@@ -73,7 +73,7 @@ pub struct Study {
     seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
     ///
-    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 150,000
+    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 115,000
     /// scenarios.
     #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,
@@ -214,7 +214,7 @@ impl Study {
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
-        for left_out in study.left_out() {
+        for left_out in study.cases().left_out() {
             tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
         }
         Ok((study, timings))

@@ -169,7 +169,7 @@ impl Verify {
         let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         let collection = source::load(&source, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
-        let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
+        let plan = plan_study(&collection.scenarios, profile, &options)?;
         if plan.unit_count() == 0 {
             let problem = format!("no scenario to simulate ({})", counts_text(&collection.scenarios));
             let help = "use more recordings or scenarios that pass the paper's filters";

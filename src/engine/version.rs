@@ -194,9 +194,7 @@ mod tests {
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
     use crate::run::sampling::{SampleSource, generator_of};
-    use crate::run::study::plan_file::{BlockHead, StudyHead};
-    use crate::run::study::unit_record;
-    use crate::run::study::unit_record::UnitRecords;
+    use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
     use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis};
     use crate::scenario::{Category, Scenario};
     use crate::stats::density::{Mixture, ParameterSpace};
@@ -247,18 +245,14 @@ mod tests {
     /// Two scenarios of every category with every parameterization.
     fn study(profile: &Profile) -> LanePlan {
         let options = ParameterizationOptions::default();
-        let (mut held, mut blocks, mut record) = (UnitRecords::default(), Vec::new(), Vec::new());
+        let (mut held, mut blocks) = (Vec::new(), Vec::new());
         for category in Category::ALL {
-            for number in 0..2 {
-                record.clear();
-                unit_record::write(&scenario(category, number), None, &mut record);
-                held.push(&record);
-            }
+            held.extend((0..2).map(|number| stripped(&scenario(category, number), None)));
             blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options))));
         }
         let headways = vec![Headway::ThwS(1.2), Headway::ThwS(0.4), Headway::GapM(9.0)];
         let head = StudyHead::new(profile.clone(), models(), headways, options, blocks, &held).unwrap();
-        head.with_records(held).unwrap().window(0..6).unwrap()
+        head.with_scenarios(0, held).unwrap().window(0..6).unwrap()
     }
 
     fn lanes(digest: &mut Sha256, plan: &LanePlan) -> usize {

@@ -100,7 +100,7 @@ impl<'a> Compare<'a> {
         mut options: CompareOptions,
     ) -> Result<Compare<'a>> {
         options.study.categories.retain(|c| options.parameterizations.iter().any(|id| id.category == *c));
-        let plan = plan_study(scenarios, &profile, &options.study)?.plan;
+        let plan = plan_study(scenarios, &profile, &options.study)?;
         if plan.unit_count() == 0 {
             return Err(Error::input(
                 Place::item(&facts.data),

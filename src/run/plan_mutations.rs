@@ -71,8 +71,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let weighted = text(serde_json::to_string(&weighted));
     try_all(weighted_plan::KIND, &weighted, &[], &|path| WeightedPlan::read(path).map(drop));
     let study = study_of(scenarios, |scenario| scenario.category == Category::Lvd);
-    let records = study.cases().records().unwrap().to_vec();
-    try_all(Study::KIND, &content_of(&study).to_string(), &records, &|path| Study::read(path, None).map(drop));
+    try_all(Study::KIND, &content_of(&study).to_string(), &lines_of(&study), &|path| Study::read(path, None).map(drop));
 }
 
 /// A study of the first six scenarios of a kind.
@@ -82,49 +81,35 @@ fn study_of(scenarios: Vec<Scenario>, is_of_kind: impl Fn(&Scenario) -> bool) ->
     Study::builder(&few, Profile::load("paper").unwrap()).plan().unwrap()
 }
 
+fn lines_of(study: &Study) -> Vec<u8> {
+    study.cases().pages().unwrap().flat_map(|page| page.unwrap()).collect()
+}
+
 fn content_of(study: &Study) -> serde_json::Value {
     let mut sealed: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
     sealed["content"].take()
 }
 
 /// Floats that a scenario or a case stumbles over.
-const FLOATS: [f64; 14] = [
-    f64::NAN,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
-    -0.0,
-    0.0,
-    5e-324,
-    f64::MIN_POSITIVE,
-    1e-9,
-    0.1,
-    -1.0,
-    1e6,
-    1e15,
-    f64::MAX,
-    f64::MIN,
-];
-
-/// Lengths and counts that a reader stumbles over.
-const WORDS: [u32; 10] = [0, 1, 2, 13, 64, 65_536, 0x1000_0000, 0x1fff_ffff, 0x8000_0000, u32::MAX];
+const FLOATS: [f64; 11] = [-0.0, 0.0, 5e-324, f64::MIN_POSITIVE, 1e-9, 0.1, -1.0, 1e6, 1e15, f64::MAX, f64::MIN];
 
 #[test]
-fn changed_records_under_checksums_that_fit_are_an_error_or_scenarios_with_plausible_cases() {
+fn changed_scenarios_under_checksums_that_fit_are_an_error_or_scenarios_with_plausible_cases() {
     let generator = GeneratorOptions { recordings: 2, duration_s: 240.0, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("plan.json");
     for category in Category::ALL {
         let study = study_of(scenarios.clone(), |scenario| scenario.category == category);
-        let (records, mut content) = (study.cases().records().unwrap().to_vec(), content_of(&study));
+        let (lines, mut content) = (lines_of(&study), content_of(&study));
         let (mut accepted, mut refused) = (0, 0);
         for input in 0..INPUTS {
             let dice = &mut mutate::Dice(input);
             let changed = match input % 4 {
-                0 => mutate::mutated(dice, std::slice::from_ref(&records), std::slice::from_ref(&records)),
-                _ => with_changed_number(dice, &records),
+                0 => mutate::mutated(dice, std::slice::from_ref(&lines), std::slice::from_ref(&lines)),
+                _ => with_changed_number(dice, &lines),
             };
-            let head = study.cases().head().with_changed_records(&changed).unwrap();
+            let head = study.cases().head().with_changed_lines(&changed).unwrap();
             content["plan"] = serde_json::to_value(head).unwrap();
             std::fs::write(&path, [seal(Study::KIND, &content).unwrap().0, changed].concat()).unwrap();
             let read = Study::read(&path, None);
@@ -145,28 +130,30 @@ fn changed_records_under_checksums_that_fit_are_an_error_or_scenarios_with_plaus
     }
 }
 
-/// Records with another number in one of them: a length, the count of samples, the flags, a float.
-fn with_changed_number(dice: &mut mutate::Dice, records: &[u8]) -> Vec<u8> {
-    let word = |at: usize| u32::from_le_bytes(records[at..at + 4].try_into().unwrap()) as usize;
-    let mut begins = vec![0];
-    while let Some(next) = begins.last().map(|at| at + 4 + word(*at)).filter(|next| *next < records.len()) {
-        begins.push(next);
-    }
-    let mut changed = records.to_vec();
-    let begin = begins[dice.below(begins.len())];
-    let samples = begin + 8 + word(begin + 4);
-    let floats = (begin + 4 + word(begin) - samples - 5) / 8;
-    let mut put = |at: usize, bytes: &[u8]| changed[at..at + bytes.len()].copy_from_slice(bytes);
-    match dice.below(8) {
-        0 => put([begin, begin + 4, samples][dice.below(3)], &WORDS[dice.below(WORDS.len())].to_le_bytes()),
-        1 => put(samples + 4, &[dice.below(256) as u8]),
-        // The first six are sizes and rates; a series is long.
-        kind => {
-            let float = if kind < 5 { dice.below(9.min(floats)) } else { dice.below(floats) };
-            put(samples + 5 + 8 * float, &FLOATS[dice.below(FLOATS.len())].to_le_bytes());
+/// Lines with another number in one of them: a size, a rate, a value of a series, the length of a series.
+fn with_changed_number(dice: &mut mutate::Dice, lines: &[u8]) -> Vec<u8> {
+    let mut lines: Vec<&[u8]> = lines.split_inclusive(|byte| *byte == b'\n').collect();
+    let at = dice.below(lines.len());
+    let mut scenario: serde_json::Value = serde_json::from_slice(lines[at]).unwrap();
+    let float = serde_json::json!(FLOATS[dice.below(FLOATS.len())]);
+    let series = ["v", "y"][dice.below(2)];
+    let vehicle = if scenario["lead"].is_null() { "target" } else { ["target", "lead"][dice.below(2)] };
+    match dice.below(9) {
+        0 => scenario["fps"] = float,
+        1 => scenario["ego"][["v0", "length", "width"][dice.below(3)]] = float,
+        2 => scenario[vehicle][["length", "width"][dice.below(2)]] = float,
+        3 => scenario[["D", "gap0"][dice.below(2)]] = float,
+        4 => drop(scenario[vehicle][series].as_array_mut().unwrap().pop()),
+        5 => scenario[["kept", "category", "side"][dice.below(3)]] = float,
+        _ => {
+            let series = scenario[vehicle][series].as_array_mut().unwrap();
+            let at = dice.below(series.len());
+            series[at] = float;
         }
     }
-    changed
+    let changed = format!("{scenario}\n");
+    lines[at] = changed.as_bytes();
+    lines.concat()
 }
 
 /// Content as it is and changed, each with a checksum that fits and followed by the same bytes.

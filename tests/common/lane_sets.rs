@@ -77,5 +77,5 @@ pub fn small_study() -> LanePlan {
 pub fn small_study_of(options: StudyOptions) -> LanePlan {
     let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
     let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
-    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &options).unwrap().plan
+    plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
 }

@@ -305,7 +305,7 @@ fn failures_of_samples_and_studies_vary_smoothly_with_the_time_step() {
         });
         let studied = Category::ALL.into_iter().map(|category| {
             let study = StudyOptions { categories: vec![category], ..StudyOptions::default() };
-            failures(&plan_study(scenarios(), &profile, &study).unwrap().plan)
+            failures(&plan_study(scenarios(), &profile, &study).unwrap())
         });
         sampled.chain(studied).collect()
     };

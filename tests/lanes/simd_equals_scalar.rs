@@ -84,7 +84,7 @@ fn any_number_of_headways_gives_the_same_words() {
     {
         let headways = (1..=count).map(|k| Headway::ThwS(3.0 * f64::from(k) / f64::from(count))).collect();
         let options = StudyOptions { headways, ..StudyOptions::default() };
-        assert_equal(&format!("{count} headways"), &plan_study(&scenarios, profile, &options).unwrap().plan);
+        assert_equal(&format!("{count} headways"), &plan_study(&scenarios, profile, &options).unwrap());
     }
 }
 

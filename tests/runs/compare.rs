@@ -155,7 +155,7 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
     let profile = Profile::load("paper").unwrap();
     let headways = vec![Headway::ThwS(1.4), Headway::ThwS(0.8), Headway::ThwS(0.4)];
     let options = StudyOptions { headways: headways.clone(), ..StudyOptions::default() };
-    let study = plan_study(&scenarios, &profile, &options).unwrap().plan;
+    let study = plan_study(&scenarios, &profile, &options).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let mut partial = Partial::empty(&study);
     Executor::new(&cpu)

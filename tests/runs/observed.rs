@@ -38,9 +38,9 @@ fn kept(data: &Collection, category: Category) -> Vec<&Scenario> {
 fn s_and_every_s_prime_start_from_the_recorded_gap() {
     let data = recordings(3);
     let paper = Profile::load("paper").unwrap();
-    let plan = plan_study(&data.scenarios, &paper, &observed()).unwrap().plan;
+    let plan = plan_study(&data.scenarios, &paper, &observed()).unwrap();
     let imposed = StudyOptions { headways: vec![Headway::GapM(0.0)], ..StudyOptions::default() };
-    let imposed = plan_study(&data.scenarios, &paper, &imposed).unwrap().plan;
+    let imposed = plan_study(&data.scenarios, &paper, &imposed).unwrap();
     assert_ne!(plan.hash(), imposed.hash());
     let runner = LaneRunner::<f64>::new(&plan);
     for (at, block) in plan.blocks.iter().enumerate() {
@@ -98,7 +98,7 @@ fn failures_below(
     options: &StudyOptions,
     limit_s: f64,
 ) -> (Vec<CloseFollowing>, Vec<CloseFollowing>) {
-    let plan = plan_study(&data.scenarios, &Profile::load("paper").unwrap(), options).unwrap().plan;
+    let plan = plan_study(&data.scenarios, &Profile::load("paper").unwrap(), options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let mut parts = Vec::new();
     let sweep = |chunk: lanesweep::engine::Chunk| {

@@ -79,7 +79,7 @@ mod tests {
         let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
         let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
         let options = StudyOptions { categories: vec![Category::CutOut], ..StudyOptions::default() };
-        plan_study(&mined.scenarios, profile, &options).unwrap().plan
+        plan_study(&mined.scenarios, profile, &options).unwrap()
     }
 
     /// Steps two lanes together: one with both vehicles, and one with only the second from that step on. Ego, gap,

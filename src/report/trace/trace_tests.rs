@@ -122,7 +122,7 @@ fn check(traces: &[Trace]) -> Panels {
 fn small_study() -> LanePlan {
     let generator = GeneratorOptions { recordings: 3, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
-    plan_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan
+    plan_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
 }
 
 #[test]

@@ -155,20 +155,27 @@ impl<T: Countable> RunState<T> {
 }
 
 /// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once. A plan is told by its
-/// first line, which holds the checksums of all that follows. One with this line and other bytes behind it was damaged
+/// first line, which holds the checksums of the pages that follow. One with this line and other bytes behind it was damaged
 /// and is written again.
 ///
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
-pub fn leave_plan(out: &Path, line: &[u8], rest: &[u8]) -> Result<()> {
+pub fn leave_plan(
+    out: &Path,
+    line: &[u8],
+    mut pages: impl Iterator<Item = std::io::Result<Vec<u8>>> + Clone,
+) -> Result<()> {
     let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
     if let Some(mut there) = open_plan(&path, line)? {
-        if is_rest(&mut there, rest).map_err(|e| Error::io(&path, "read", e))? {
+        if is_rest(&mut there, pages.clone()).map_err(|e| Error::io(&path, "read", e))? {
             return Ok(());
         }
         tracing::warn!("{} was damaged: it is written again", path.display());
     }
-    write_inside(&path, |file| file.write_all(line).and_then(|()| file.write_all(rest)))
+    write_inside(&path, |file| {
+        file.write_all(line)?;
+        pages.try_for_each(|page| file.write_all(&page?))
+    })
 }
 
 /// Copies a plan file into a run's folder, or finds the same one there. A shard reads neither in whole: readers find
@@ -211,16 +218,16 @@ fn open_plan(path: &Path, line: &[u8]) -> Result<Option<BufReader<File>>> {
     Err(Error::input(Place::file(path), problem, help))
 }
 
-/// Whether a file ends with exactly these bytes.
-fn is_rest(file: &mut impl BufRead, mut rest: &[u8]) -> std::io::Result<bool> {
-    loop {
-        let piece = file.fill_buf()?;
-        if piece.is_empty() {
-            return Ok(rest.is_empty());
+/// Whether a file ends with exactly these pages.
+fn is_rest(file: &mut BufReader<File>, pages: impl Iterator<Item = std::io::Result<Vec<u8>>>) -> std::io::Result<bool> {
+    let mut there = Vec::new();
+    for page in pages {
+        let page = page?;
+        there.clear();
+        file.take(page.len() as u64).read_to_end(&mut there)?;
+        if there != page {
+            return Ok(false);
         }
-        let Some(after) = rest.strip_prefix(piece) else { return Ok(false) };
-        let length = piece.len();
-        rest = after;
-        file.consume(length);
     }
+    Ok(file.fill_buf()?.is_empty())
 }

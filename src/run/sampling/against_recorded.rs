@@ -57,7 +57,7 @@ fn replay(
         parameterization: density.space.options().clone(),
     };
     let plan = match plan_study(&density.scenarios, profile, &options) {
-        Ok(planned) => planned.plan,
+        Ok(plan) => plan,
         // The samples are there: what cannot stand beside them does not take them away.
         Err(Error::Input { .. } | Error::Usage { .. }) => return Ok(None),
         Err(error) => return Err(error),

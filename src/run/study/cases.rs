@@ -12,21 +12,23 @@ use crate::engine::plan::{Block, CaseSource, LanePlan};
 use crate::engine::units::Units;
 use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
-use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{
     Parameterization, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
 };
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
-/// The cases of a study, or of an interval of its scenarios, as what they follow from: 0.9 to 1.9 kB per scenario,
-/// depending on the category. Cases, ten times as large, are made for a window of scenarios at a time.
+/// The cases of a study, or of an interval of its scenarios, as what they follow from: about 2 kB per scenario. Cases, ten
+/// times as large, are made for a window of scenarios at a time.
 pub struct StudyCases {
     pub(crate) head: StudyHead,
     pub(crate) outline: LanePlan,
-    /// One per block.
+    /// The decompositions, one per block that has one.
     pub(crate) reductions: Vec<Option<Reduction>>,
-    pub(crate) held: UnitRecords,
+    /// Unit of the first scenario held.
+    pub(crate) first_held: u64,
+    pub(crate) held: Vec<Scenario>,
+    pub(super) left_out: Vec<Error>,
 }
 
 /// Cases of a window of units.
@@ -61,6 +63,21 @@ impl StudyCases {
     /// The plan without cases: counts, keys, hash.
     pub fn outline(&self) -> &LanePlan {
         &self.outline
+    }
+
+    /// Parts that could not be planned, with the reason: too few scenarios for a decomposition, for instance.
+    pub fn left_out(&self) -> &[Error] {
+        &self.left_out
+    }
+
+    /// The units whose scenarios are held.
+    pub(super) fn held_units(&self) -> Range<u64> {
+        self.first_held..self.first_held + self.held.len() as u64
+    }
+
+    /// The scenario of a unit, if it is held.
+    pub(super) fn scenario(&self, unit: u64) -> Option<&Scenario> {
+        self.held.get(usize::try_from(unit.checked_sub(self.first_held)?).ok()?)
     }
 
     /// The plan with the cases of these units, which must be held.
@@ -157,7 +174,7 @@ impl StudyCases {
     /// Bytes of the series that a sweep holds at once, about: those of its first window, and as many again for their copy in
     /// binary32 and what a batch unrolls.
     pub(crate) fn window_bytes(&self) -> u64 {
-        let first = self.held.units();
+        let first = self.held_units();
         let bytes = self.series_bytes(first.start..first.end.min(first.start + WINDOW));
         2 * bytes.min((MAX_ENTRIES_AT_ONCE * size_of::<f64>() as f64) as u64)
     }
@@ -168,9 +185,8 @@ impl StudyCases {
         let of_segment = |(at, inside): (usize, Range<u64>)| {
             let block = &self.outline.blocks[at];
             let ids = parameterizations(block.category, self.reductions[at].is_some());
-            let records = inside.filter_map(|unit| self.held.get(block.first_unit + unit));
-            let durations = records.filter_map(|record| unit_record::read(record, block.category));
-            let steps: f64 = durations.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
+            let scenarios = inside.filter_map(|unit| self.scenario(block.first_unit + unit));
+            let steps: f64 = scenarios.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
             steps * entries_per_step(block.category, ids)
         };
         self.outline.segments(units).into_iter().map(of_segment).sum()
@@ -179,13 +195,12 @@ impl StudyCases {
     /// S, then every S', of a unit of a block, and the gap that all of them start from where no headway sets it, m.
     fn cases(&self, at: usize, unit: u64) -> Result<(Vec<Case>, f64)> {
         let block = &self.outline.blocks[at];
-        let record = self.held.get(block.first_unit + unit);
-        let scenario = record.and_then(|record| unit_record::read(record, block.category));
+        let scenario = self.scenario(block.first_unit + unit);
         let scenario = scenario.ok_or_else(|| Error::Internal(format!("scenario {unit} of a study is not held")))?;
         let reduction = self.reductions[at].as_ref();
         let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
         let grid = TimeGrid::of(&self.outline.profile);
-        let cases = cases_of(&scenario, &ids, reduction, grid, &self.head.parameterization)?;
+        let cases = cases_of(scenario, &ids, reduction, grid, &self.head.parameterization)?;
         Ok((cases, scenario.gap0.unwrap_or(0.0)))
     }
 }
@@ -230,7 +245,7 @@ mod tests {
     use super::*;
     use crate::engine::Headway;
     use crate::model::profile::Profile;
-    use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
+    use crate::run::study::plan::{StudyOptions, outline_study};
     use crate::traffic::mining::{MiningOptions, mine_generated};
     use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -239,7 +254,7 @@ mod tests {
         mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
     }
 
-    fn outlined(scenarios: &[Scenario]) -> StudyOutline {
+    fn outlined(scenarios: &[Scenario]) -> StudyCases {
         outline_study(scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
     }
 
@@ -266,10 +281,10 @@ mod tests {
     #[test]
     fn a_window_has_the_cases_of_its_scenarios_and_the_hash_of_the_whole() {
         let scenarios = scenarios();
-        let StudyOutline { cases: study, reductions, .. } = outlined(&scenarios);
+        let study = outlined(&scenarios);
         let (plan, options) = (study.outline(), ParameterizationOptions::default());
         for (at, block) in plan.blocks.iter().enumerate() {
-            let reduction = &reductions[at];
+            let reduction = study.reductions[at].as_ref();
             let ids: Vec<Parameterization> = parameterizations(block.category, true).collect();
             let kept = scenarios.iter().filter(|s| s.kept && s.category == block.category);
             for (unit, scenario) in kept.enumerate().step_by(3) {
@@ -277,7 +292,7 @@ mod tests {
                 assert_eq!(window.hash(), plan.hash());
                 assert_eq!(window.blocks[at].units.name(unit as u64), scenario.id);
                 let mut tables = Tables::default();
-                let cases = cases_of(scenario, &ids, Some(reduction), TimeGrid::of(&plan.profile), &options).unwrap();
+                let cases = cases_of(scenario, &ids, reduction, TimeGrid::of(&plan.profile), &options).unwrap();
                 for (variant, case) in cases.iter().enumerate() {
                     let expected = LaneCase::encode(case, &plan.profile, &mut tables);
                     assert_eq!(window.case(at, unit as u64, variant), expected, "{}", scenario.id);

@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cases::StudyCases;
 use super::histogram::{ParameterHistogram, parameter_histograms};
-use super::plan::StudyOutline;
 use crate::Result;
 use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
-use crate::scenario::parameterization::{ModeShape, ParameterizationOptions};
+use crate::scenario::parameterization::{ModeShape, ParameterizationOptions, Reduction};
 use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.
@@ -66,20 +66,20 @@ pub struct StudyFacts {
 /// Of every block of the plan.
 pub(super) fn category_facts(
     collection: &Collection,
-    planned: &StudyOutline,
+    planned: &StudyCases,
     options: &ParameterizationOptions,
 ) -> Result<Vec<CategoryFacts>> {
-    let facts = |block: &Block| {
+    let facts = |(block, reduction): (&Block, &Option<Reduction>)| {
         let of = count(&collection.scenarios, block.category);
-        let reduction = planned.reductions.iter().find(|r| r.category == block.category);
+        let reduction = reduction.as_ref();
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
         let kept: Vec<&Scenario> =
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
         let modes = reduction.map_or(Ok(Vec::new()), |reduction| reduction.mode_shapes(&kept))?;
         let parameters = parameter_histograms(block.category, &kept, options)?;
-        let is_observed = Headway::is_observed(&planned.cases.outline().headways);
+        let is_observed = Headway::is_observed(&planned.outline().headways);
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
         Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes, close_units })
     };
-    planned.cases.outline().blocks.iter().map(facts).collect()
+    planned.outline().blocks.iter().zip(&planned.reductions).map(facts).collect()
 }

@@ -9,13 +9,12 @@ pub(crate) mod plan_file;
 mod planned;
 mod read;
 mod run;
-pub(crate) mod unit_record;
 
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
 pub use facts::{CategoryFacts, StudyFacts};
 pub use histogram::{ParameterHistogram, parameter_histograms};
-pub use plan::{StudyOptions, StudyOutline, StudyPlan, outline_study, plan_study};
+pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
 pub use planned::{Study, StudyBuilder};
 pub use run::{StudyResult, StudyRun};

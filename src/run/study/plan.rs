@@ -4,8 +4,7 @@ use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
-use crate::run::study::plan_file::{BlockHead, StudyHead};
-use crate::run::study::unit_record::{self, UnitRecords};
+use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
 use crate::scenario::parameterization::{
     ParameterizationOptions, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
@@ -37,43 +36,27 @@ impl Default for StudyOptions {
     }
 }
 
-/// A plan with what could not be planned and why (too few scenarios for a decomposition, for instance).
-pub struct StudyPlan {
-    /// The plan, with every case.
-    pub plan: LanePlan,
-    /// The decompositions, one per category that has one.
-    pub reductions: Vec<Reduction>,
-    /// Parts that were left out, with the reason.
-    pub left_out: Vec<Error>,
-}
-
-/// A study as [`StudyPlan`] has it, whose cases are made window by window.
-pub struct StudyOutline {
-    /// The cases.
-    pub cases: StudyCases,
-    /// The decompositions, one per category that has one.
-    pub reductions: Vec<Reduction>,
-    /// Parts that were left out, with the reason.
-    pub left_out: Vec<Error>,
-}
-
 /// Entries of all series at the paper's time step: so many for any file, and more for each value in it, enough for any
 /// number of scenarios from 10 Hz on. Sparse series of long scenarios would make gigabytes of a short file.
 const MAX_ENTRIES: f64 = (4 << 20) as f64;
 const MAX_ENTRIES_PER_VALUE: f64 = 15.0;
 const PAPER_DT_S: f64 = 0.04;
+
 /// Plans a study over mined scenarios with all of its cases: the kept ones are simulated, in the order given; a
 /// decomposition may be fitted on more (see [`SvdFit`]).
-pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyPlan> {
-    let StudyOutline { cases, reductions, left_out } = outline_study(scenarios, profile, options)?;
-    Ok(StudyPlan { plan: cases.window(0..cases.outline.unit_count())?, reductions, left_out })
+///
+/// # Errors
+/// As [`outline_study`] and [`StudyCases::window`].
+pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<LanePlan> {
+    let cases = outline_study(scenarios, profile, options)?;
+    cases.window(0..cases.outline.unit_count())
 }
 
 /// Plans a study as [`plan_study`] does, without making its cases.
 ///
 /// # Errors
 /// [`Error::Usage`] for a category, model, headway or kept scenario that is there twice: each lane has a key of its own.
-pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyOutline> {
+pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyCases> {
     refuse_repeats(|| Place::option("categories"), options.categories.iter().map(|c| (*c, c.label())))?;
     let kept = scenarios.iter().filter(|scenario| scenario.kept);
     refuse_repeats(|| Place::item("scenarios"), kept.map(|scenario| (&scenario.id, &scenario.id)))?;
@@ -82,8 +65,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
     let is_observed = Headway::is_observed(&options.headways);
     let grid = TimeGrid::of(profile);
     let (mut entries, mut values) = (0.0, 0.0);
-    let mut held = UnitRecords::default();
-    let mut record = Vec::new();
+    let mut held = Vec::new();
     let (mut blocks, mut reductions, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for &category in &options.categories {
         let of_category = || scenarios.iter().filter(move |s| s.category == category);
@@ -108,18 +90,15 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         let recorded = if category == Category::Lvd { 1.0 } else { 2.0 };
         values += kept.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * recorded;
         check_size(entries, values, dt_s)?;
-        held.bytes.reserve_exact(kept.iter().map(|scenario| unit_record::max_bytes(scenario)).sum());
+        held.reserve_exact(kept.len());
         for scenario in &kept {
             if category == Category::CutOut {
                 vehicle_ahead(scenario)?;
             }
-            record.clear();
-            let gap_m = is_observed.then(|| scenario.start_gap_m()).transpose()?;
-            unit_record::write(scenario, gap_m, &mut record);
-            held.push(&record);
+            held.push(stripped(scenario, is_observed.then(|| scenario.start_gap_m()).transpose()?));
         }
         blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref()));
-        reductions.extend(reduction);
+        reductions.push(reduction);
     }
     let head = StudyHead::new(
         profile.clone(),
@@ -129,7 +108,8 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         blocks,
         &held,
     )?;
-    Ok(StudyOutline { cases: head.with_records(held)?, reductions, left_out })
+    // Of the decompositions, facts need more than the file holds.
+    Ok(StudyCases { reductions, left_out, ..head.with_scenarios(0, held)? })
 }
 
 /// Bounds the tables before anything of them is made.

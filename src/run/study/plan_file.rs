@@ -1,5 +1,6 @@
-//! A study as a file: a head, then the records of its scenarios in pages, each with a checksum in the head. A process
-//! that computes some of the scenarios reads their pages alone. The hash of the plan is that of head and checksums.
+//! A study as a file: a line of JSON, then its scenarios as in a scenario file, one a line, in pages of 64. The first line
+//! has a checksum of every page. A process that computes some of the scenarios reads their pages alone. The hash of the
+//! plan is that of head and checksums.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -8,15 +9,52 @@ use crate::engine::plan::Headway;
 use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::study::unit_record::{self, UnitRecords};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
-use crate::scenario::{Category, problem_of};
+use crate::scenario::{Category, Scenario, problem_of};
 use crate::support::hex::hex;
 use crate::support::repeats::repeated;
 use crate::{Error, Place, Result};
 
 /// Scenarios of a page.
 pub(super) const PAGE: u64 = 64;
+
+/// What the cases of a scenario follow from, and the gap that it starts from where no headway sets it. Nothing else of it
+/// is in the file or in the hash.
+pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
+    let mut stripped = Scenario {
+        recording: String::new(),
+        reason: String::new(),
+        lane_width: 3.5,
+        thw0: None,
+        gap0: gap_m,
+        peak_decel: None,
+        truncated_start: None,
+        end_cause: None,
+        frame_switch: None,
+        tag_frames: None,
+        // The study's facts tell it.
+        synthetic: false,
+        ..scenario.clone()
+    };
+    if scenario.category == Category::Lvd {
+        stripped.target.y.fill(0.0);
+    }
+    if scenario.category != Category::CutOut {
+        (stripped.lead, stripped.lead_gap) = (None, None);
+    }
+    stripped.lead.iter_mut().for_each(|lead| lead.y.fill(0.0));
+    stripped
+}
+
+/// The lines of a page.
+pub(super) fn lines(scenarios: &[Scenario]) -> std::io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    for scenario in scenarios {
+        serde_json::to_writer(&mut text, scenario)?;
+        text.push(b'\n');
+    }
+    Ok(text)
+}
 
 /// What a study is beside its scenarios, and the checksums of those.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,7 +66,7 @@ pub struct StudyHead {
     pub(super) headways: Vec<Headway>,
     pub(crate) parameterization: ParameterizationOptions,
     pub(super) blocks: Vec<BlockHead>,
-    /// Bytes and SHA-256 of every page of records.
+    /// Bytes and SHA-256 of every page of scenarios.
     pub(super) pages: Vec<(u64, String)>,
 }
 
@@ -63,27 +101,23 @@ impl StudyHead {
         headways: Vec<Headway>,
         parameterization: ParameterizationOptions,
         blocks: Vec<BlockHead>,
-        held: &UnitRecords,
+        held: &[Scenario],
     ) -> Result<StudyHead> {
-        let mut pages = Vec::new();
-        let mut begin = 0;
-        for ends in held.ends.chunks(PAGE as usize) {
-            let end = ends.last().copied().unwrap_or(begin);
-            pages.push(((end - begin) as u64, hex(&Sha256::digest(&held.bytes[begin..end]))));
-            begin = end;
-        }
+        let page = |scenarios| lines(scenarios).map(|text| (text.len() as u64, hex(&Sha256::digest(text))));
+        let pages: std::io::Result<_> = held.chunks(PAGE as usize).map(page).collect();
+        let pages = pages.map_err(|e| Error::Internal(format!("a scenario cannot be written: {e}")))?;
         let plan_sha256 = String::new();
         let mut head = StudyHead { plan_sha256, profile, models, headways, parameterization, blocks, pages };
         head.plan_sha256 = head.hash()?;
         Ok(head)
     }
 
-    /// The head whose checksums and hash fit these records of one page, whatever they hold.
+    /// The head whose checksums and hash fit these lines of one page, whatever they hold.
     #[cfg(test)]
-    pub(crate) fn with_changed_records(&self, records: &[u8]) -> Result<StudyHead> {
-        assert!(self.unit_count() <= PAGE, "the records of one page");
+    pub(crate) fn with_changed_lines(&self, lines: &[u8]) -> Result<StudyHead> {
+        assert!(self.unit_count() <= PAGE, "the scenarios of one page");
         let mut head = self.clone();
-        head.pages = vec![(records.len() as u64, hex(&Sha256::digest(records)))];
+        head.pages = vec![(lines.len() as u64, hex(&Sha256::digest(lines)))];
         head.plan_sha256 = head.hash()?;
         Ok(head)
     }
@@ -91,7 +125,7 @@ impl StudyHead {
     /// Hash of the plan: everything that decides the outcomes.
     fn hash(&self) -> Result<String> {
         let StudyHead { plan_sha256: _, profile, models, headways, parameterization, blocks, pages } = self;
-        let mut canonical = Canonical::new("study");
+        let mut canonical = Canonical::new("study of lines");
         canonical.value(&(profile, models, headways, parameterization, blocks))?;
         for (bytes, sha256) in pages {
             canonical.word(*bytes);
@@ -150,18 +184,28 @@ impl StudyHead {
         Ok(())
     }
 
-    /// Whether a record is of a scenario that can be simulated.
-    pub(super) fn check_record(&self, unit: u64, record: &[u8]) -> std::result::Result<(), String> {
+    /// Bytes of all scenarios.
+    pub(super) fn scenario_bytes(&self) -> u64 {
+        self.pages.iter().map(|(bytes, _)| *bytes).fold(0, u64::saturating_add)
+    }
+
+    /// The scenario of a line, if it can be simulated.
+    pub(super) fn scenario(&self, unit: u64, line: &[u8]) -> std::result::Result<Scenario, String> {
         let mut first = 0;
         let block = self.blocks.iter().find(|block| {
             first += block.units;
             unit < first
         });
-        let scenario = block.and_then(|block| unit_record::read(record, block.category));
-        let scenario = scenario.ok_or_else(|| format!("scenario {unit} is not whole"))?;
-        if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
-            return Err(format!("scenario {}: it has no recorded gap", scenario.id));
+        let scenario: Scenario =
+            serde_json::from_slice(line).map_err(|e| format!("scenario {unit} cannot be read: {e}"))?;
+        let wrong = |problem: &str| Err(format!("scenario {}: {problem}", scenario.id));
+        if !scenario.kept || block.is_none_or(|block| block.category != scenario.category) {
+            return wrong("it is none of its category that is simulated");
         }
-        problem_of(&scenario).map_or(Ok(()), |problem| Err(format!("scenario {}: {problem}", scenario.id)))
+        if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
+            return wrong("it has no recorded gap");
+        }
+        // The copy holds no more memory than it needs.
+        problem_of(&scenario).map_or_else(|| Ok(stripped(&scenario, scenario.gap0)), |problem| wrong(&problem))
     }
 }

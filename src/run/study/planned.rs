@@ -22,7 +22,7 @@ use crate::{Error, Place, Result};
 /// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
 const MAX_HEAD_BYTES: u64 = 1 << 30;
 
-/// The first line of the file. The records of the scenarios follow it.
+/// The first line of the file. The scenarios follow it.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyPlanFile {
@@ -71,7 +71,6 @@ struct StudyPlanFile {
 pub struct Study {
     pub(super) cases: StudyCases,
     facts: StudyFacts,
-    left_out: Vec<Error>,
     /// Where it was read, with the hash of the run.
     file: Option<(PathBuf, String)>,
 }
@@ -133,8 +132,8 @@ impl StudyBuilder<'_> {
     pub fn plan(self) -> Result<Study> {
         let StudyBuilder { collection, profile, options, mining, score, data, .. } = self;
         score.validate()?;
-        let planned = outline_study(&collection.scenarios, &profile, &options)?;
-        if planned.cases.outline().unit_count() == 0 {
+        let cases = outline_study(&collection.scenarios, &profile, &options)?;
+        if cases.outline().unit_count() == 0 {
             return Err(Error::input(
                 Place::item(data),
                 format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
@@ -148,15 +147,15 @@ impl StudyBuilder<'_> {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenario_file_sha256,
-            categories: category_facts(collection, &planned, &options.parameterization)?,
-            left_out: collection.problems.iter().chain(&planned.left_out).map(Error::to_string).collect(),
+            categories: category_facts(collection, &cases, &options.parameterization)?,
+            left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),
             mining,
             parameterization: options.parameterization,
             score,
         };
-        Ok(Study { cases: planned.cases, facts, left_out: planned.left_out, file: None })
+        Ok(Study { cases, facts, file: None })
     }
 }
 
@@ -194,11 +193,6 @@ impl Study {
         &self.facts
     }
 
-    /// Parts of the plan that could not be made, with the reason: too few scenarios for a decomposition, for instance.
-    pub fn left_out(&self) -> &[Error] {
-        &self.left_out
-    }
-
     /// Scores the counts of the whole study.
     ///
     /// # Errors
@@ -230,7 +224,7 @@ impl Study {
         match &self.file {
             // The file as it is: of a shard's scenarios alone the plan could not be written.
             Some((path, _)) => copy_plan(out, path),
-            None => leave_plan(out, &self.seal()?.0, self.cases.records()?),
+            None => leave_plan(out, &self.seal()?.0, self.cases.pages()?),
         }
     }
 
@@ -239,11 +233,14 @@ impl Study {
     /// # Errors
     /// [`Error::Io`].
     pub(crate) fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
-        let (head, records) = (self.seal()?.0, self.cases.records()?);
-        if (head.len() + records.len()) as u64 > max_bytes {
+        let (head, mut pages) = (self.seal()?.0, self.cases.pages()?);
+        if head.len() as u64 + self.cases.head().scenario_bytes() > max_bytes {
             return Ok(false);
         }
-        results.add_with(name, |out| out.write_all(&head).and_then(|()| out.write_all(records)))?;
+        results.add_with(name, |out| {
+            out.write_all(&head)?;
+            pages.try_for_each(|page| out.write_all(&page?))
+        })?;
         Ok(true)
     }
 
@@ -257,17 +254,17 @@ impl Study {
 
     /// The same with an interval of the scenarios, of so many: nothing else of the file is read.
     pub(super) fn read_units(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<Study> {
-        let (file, run_sha256, mut records) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, AGAIN)?;
+        let (file, run_sha256, mut scenarios) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, AGAIN)?;
         let StudyPlanFile { facts, plan } = file;
         let place = Place::file(path);
         facts.score.validate()?;
-        let cases = plan.read(&mut records, &place, wanted)?;
+        let cases = plan.read(&mut scenarios, &place, wanted)?;
         check_variants(cases.outline(), &place)?;
         if facts.categories.len() != cases.outline().blocks.len() {
             let problem = "it does not have the facts of every category";
             return Err(Error::input(place, problem, AGAIN));
         }
-        Ok(Study { cases, facts, left_out: Vec::new(), file: Some((path.to_path_buf(), run_sha256)) })
+        Ok(Study { cases, facts, file: Some((path.to_path_buf(), run_sha256)) })
     }
 }
 
@@ -299,7 +296,7 @@ mod tests {
     fn a_plan_with_variants_that_no_study_has_is_refused_before_they_are_printed() {
         let generated = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
         let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap().scenarios;
-        let made = || plan_study(&mined, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap().plan;
+        let made = || plan_study(&mined, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap();
         assert!(check_variants(&made(), &Place::item("plan")).is_ok());
         for (at, forged) in [(0, "1"), (1, "\u{1b}]0;owned\u{7}"), (1, "<script>"), (1, "S"), (2, "1")] {
             let mut plan = made();

@@ -6,13 +6,12 @@ use std::ops::Range;
 use sha2::{Digest, Sha256};
 
 use super::cases::{StudyCases, parameterizations};
-use super::plan_file::{BlockHead, PAGE, StudyHead};
-use super::unit_record::{self, UnitRecords, unit_ids};
+use super::plan_file::{BlockHead, PAGE, StudyHead, lines};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::plan::{Block, CaseSource, LanePlan};
 use crate::engine::units::Units;
-use crate::scenario::Tables;
 use crate::scenario::parameterization::Reduction;
+use crate::scenario::{Scenario, Tables};
 use crate::support::hex::hex;
 use crate::{Error, Place, Result};
 
@@ -31,14 +30,13 @@ impl CaseSource for NoCases {
 }
 
 impl StudyHead {
-    /// The study with these of its scenarios.
-    pub(crate) fn with_records(self, held: UnitRecords) -> Result<StudyCases> {
-        let mut records = unit_ids(&held).into_iter();
+    /// The study with these of its scenarios; `first_held` is the unit of the first one.
+    pub(crate) fn with_scenarios(self, first_held: u64, held: Vec<Scenario>) -> Result<StudyCases> {
+        let (mut ids, end_held) = (held.iter().map(|scenario| scenario.id.clone()), first_held + held.len() as u64);
         let (mut first, mut blocks, mut reductions) = (0, Vec::new(), Vec::new());
         for block in &self.blocks {
-            let (from, end) = (held.first.clamp(first, first + block.units), first + block.units);
-            let names: Vec<String> =
-                records.by_ref().take((held.units().end.clamp(from, end) - from) as usize).collect();
+            let (from, end) = (first_held.clamp(first, first + block.units), first + block.units);
+            let names: Vec<String> = ids.by_ref().take((end_held.clamp(from, end) - from) as usize).collect();
             let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
             blocks.push(Block {
                 category: block.category,
@@ -55,13 +53,13 @@ impl StudyHead {
         let (profile, models, headways) = (self.profile.clone(), self.models.clone(), self.headways.clone());
         let hash = self.plan_sha256.clone();
         let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Box::new(NoCases))?;
-        Ok(StudyCases { head: self, outline, reductions, held })
+        Ok(StudyCases { head: self, outline, reductions, first_held, held, left_out: Vec::new() })
     }
 
-    /// The study with some of its scenarios, whose records begin where the file stands. `wanted` says which, of so many.
+    /// The study with some of its scenarios, whose lines begin where the file stands. `wanted` says which, of so many.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] at `place` where head or records contradict themselves or the hash, or where a
+    /// [`Error::Io`]; [`Error::Input`] at `place` where head or scenarios contradict themselves or the hash, or where a
     /// page that is read is damaged.
     pub fn read(
         self,
@@ -77,13 +75,12 @@ impl StudyHead {
         let wanted = wanted(count);
         let begin = file.stream_position().map_err(io)?;
         let end = file.seek(SeekFrom::End(0)).map_err(io)?;
-        let told = self.pages.iter().map(|(bytes, _)| *bytes).fold(0, u64::saturating_add);
+        let told = self.scenario_bytes();
         if end - begin != told {
             let problem = format!("it holds {} bytes of scenarios, where its head tells of {told}", end - begin);
             return Err(wrong(format!("{problem}: it was cut off or added to")));
         }
-        let mut held = UnitRecords { first: wanted.start.min(count), ..UnitRecords::default() };
-        let mut at = begin;
+        let (mut held, mut at) = (Vec::new(), begin);
         for (page, (bytes, sha256)) in self.pages.iter().enumerate() {
             let units = page as u64 * PAGE..count.min((page as u64 + 1) * PAGE);
             let from = at;
@@ -98,30 +95,21 @@ impl StudyHead {
                 let problem = format!("scenarios {} to {} are damaged", units.start, units.end - 1);
                 return Err(wrong(format!("{problem}: their checksum does not match")));
             }
-            let mut rest = &content[..];
-            for unit in units.clone() {
-                let whole = unit_record::length(rest).map(|length| rest.split_at(length));
-                let (record, after) = whole.ok_or_else(|| wrong(format!("scenario {unit} is not whole")))?;
-                rest = after;
-                if wanted.contains(&unit) {
-                    self.check_record(unit, record).map_err(wrong)?;
-                    held.push(record);
-                }
+            let lines: Vec<&[u8]> = content.split_inclusive(|byte| *byte == b'\n').collect();
+            if lines.len() as u64 != units.end - units.start {
+                let of = format!("scenarios {} to {}", units.start, units.end - 1);
+                return Err(wrong(format!("there are {} lines where {of} should be", lines.len())));
             }
-            if !rest.is_empty() {
-                return Err(wrong(format!(
-                    "there is more than scenarios {} to {} in a page",
-                    units.start,
-                    units.end - 1
-                )));
+            for (unit, line) in units.zip(lines).filter(|(unit, _)| wanted.contains(unit)) {
+                held.push(self.scenario(unit, line).map_err(wrong)?);
             }
         }
-        self.with_records(held)
+        self.with_scenarios(wanted.start.min(count), held)
     }
 }
 
 impl StudyCases {
-    /// What stands before the records in a file.
+    /// What stands before the scenarios in a file.
     pub fn head(&self) -> &StudyHead {
         &self.head
     }
@@ -132,27 +120,27 @@ impl StudyCases {
     /// # Errors
     /// None for what this program makes.
     pub(crate) fn thinned(&self, most: u64, max_bytes: u64) -> Result<LanePlan> {
-        let by_bytes = self.series_bytes(self.held.units()).div_ceil(max_bytes.max(1));
-        let step = (self.held.ends.len() as u64).div_ceil(most.max(1)).max(by_bytes).max(1);
-        let (mut held, mut blocks) = (UnitRecords::default(), Vec::new());
+        let by_bytes = self.series_bytes(self.held_units()).div_ceil(max_bytes.max(1));
+        let step = (self.held.len() as u64).div_ceil(most.max(1)).max(by_bytes).max(1);
+        let (mut held, mut blocks) = (Vec::new(), Vec::new());
         for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {
             let units = block.units.held().map(|unit| block.first_unit + unit).step_by(step as usize);
-            let before = held.ends.len();
-            units.filter_map(|unit| self.held.get(unit)).for_each(|record| held.push(record));
-            blocks.push(BlockHead { units: (held.ends.len() - before) as u64, ..head.clone() });
+            let before = held.len();
+            held.extend(units.filter_map(|unit| self.scenario(unit)).cloned());
+            blocks.push(BlockHead { units: (held.len() - before) as u64, ..head.clone() });
         }
         let head = StudyHead { blocks, ..self.head.clone() };
-        let study = head.with_records(held)?;
+        let study = head.with_scenarios(0, held)?;
         study.window(0..study.outline.unit_count())
     }
 
-    /// The records of the file.
+    /// The lines of the scenarios in the file, page by page.
     ///
     /// # Errors
     /// [`Error::Internal`] where an interval of the study is held.
-    pub fn records(&self) -> Result<&[u8]> {
-        if self.held.units() == (0..self.outline.unit_count()) {
-            Ok(&self.held.bytes)
+    pub fn pages(&self) -> Result<impl Iterator<Item = std::io::Result<Vec<u8>>> + Clone> {
+        if self.held_units() == (0..self.outline.unit_count()) {
+            Ok(self.held.chunks(PAGE as usize).map(lines))
         } else {
             Err(Error::Internal("a part of a study cannot be written as the study".to_owned()))
         }
@@ -165,8 +153,7 @@ mod tests {
 
     use super::*;
     use crate::model::profile::Profile;
-    use crate::run::study::plan::{StudyOptions, StudyOutline, outline_study};
-    use crate::scenario::Scenario;
+    use crate::run::study::plan::{StudyOptions, outline_study};
     use crate::traffic::mining::{MiningOptions, mine_generated};
     use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -196,8 +183,9 @@ mod tests {
             |copy: usize| scenarios.iter().map(move |s| Scenario { id: format!("{}~{copy}", s.id), ..s.clone() });
         let many: Vec<Scenario> = (0..6).flat_map(copies).collect();
         let profile = Profile::load("paper").unwrap();
-        let StudyOutline { cases: study, .. } = outline_study(&many, &profile, &StudyOptions::default()).unwrap();
-        let (records, units) = (study.records().unwrap().to_vec(), study.outline().unit_count());
+        let study = outline_study(&many, &profile, &StudyOptions::default()).unwrap();
+        let pages: Vec<Vec<u8>> = study.pages().unwrap().map(|page| page.unwrap()).collect();
+        let (records, units) = (pages.concat(), study.outline().unit_count());
         assert!(units > 400, "{units}");
         let read = |records: Vec<u8>, wanted: Range<u64>| {
             let mut file = Counted(Cursor::new(records), 0);
@@ -214,7 +202,7 @@ mod tests {
             ours.key_text(&ours.key(ours.first_lane_of(160)).unwrap()),
             theirs.key_text(&theirs.key(theirs.first_lane_of(160)).unwrap())
         );
-        assert!(part.window(149..151).is_err() && part.records().is_err());
+        assert!(part.window(149..151).is_err() && part.pages().is_err());
         let outcome = |records: Vec<u8>, wanted: Range<u64>| match read(records, wanted).0 {
             Ok(_) => "read".to_owned(),
             Err(error) => error.to_string(),

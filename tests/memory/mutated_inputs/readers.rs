@@ -113,7 +113,7 @@ fn study(scenarios: &[Scenario], profile: &Profile, options: &ParameterizationOp
         parameterization: options.clone(),
         ..StudyOptions::default()
     };
-    let plan = plan_study(scenarios, profile, &options)?.plan;
+    let plan = plan_study(scenarios, profile, &options)?;
     if heavy { run_some(&plan, 1) } else { Ok(()) }
 }
 

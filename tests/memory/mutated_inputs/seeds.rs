@@ -235,8 +235,9 @@ impl Seeds {
             proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: parts.into(),
             plans: vec![{
-                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap().cases;
-                [&seal("plan", outlined.head()).unwrap().0, outlined.records().unwrap()].concat()
+                let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
+                let pages: Vec<Vec<u8>> = outlined.pages().unwrap().map(|page| page.unwrap()).collect();
+                [seal("plan", outlined.head()).unwrap().0, pages.concat()].concat()
             }],
             journals: journals.into(),
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
