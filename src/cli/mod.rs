@@ -26,7 +26,6 @@ mod lists;
 mod map;
 mod merge;
 mod mine;
-mod open_device;
 mod rerun;
 mod sample;
 mod sample_checks;

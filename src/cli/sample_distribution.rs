@@ -15,7 +15,7 @@ use super::sample_lanes;
 use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::model::profile::Profile;
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::grid::MapParameter;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
@@ -140,7 +140,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         seed,
         given: Vec::new(),
     };
-    let host = opened.host(crude.summary.rechecked_lanes, started);
+    let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started);
     let record = record(&kept, &samples, path);
     let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
     file.plan_sha256 = Some(plan.hash().to_owned());
