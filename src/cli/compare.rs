@@ -5,17 +5,18 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
-use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
+use crate::engine::{Forecast, Headway, LanePlan, OpenBackend, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::report::compare::{CompareFile, rates};
 use crate::report::html::PageFigure;
+use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
 use crate::scenario::parameterization::Parameterization;
@@ -161,7 +162,7 @@ impl Compare {
             left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
             categories,
             files: Vec::new(),
-            host: opened.host(swept.rechecked_lanes, started),
+            host: HostRecord::of(&opened, swept.rechecked_lanes, started),
         };
         self.write(&mut file, folder.results()?)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
@@ -173,7 +174,7 @@ impl Compare {
         data: &str,
         plan: &LanePlan,
         ids: &[Parameterization],
-        opened: &Opened,
+        opened: &OpenBackend,
         before_s: f64,
     ) -> Result<Exit> {
         let per_sample = (plan.headways.len() * plan.models.len()) as u64;

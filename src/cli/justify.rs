@@ -15,6 +15,7 @@ use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
+use crate::report::sampling::HostRecord;
 use crate::run::compare::CompareOptions;
 use crate::run::justify::{JustifyOptions, justify};
 use crate::run::study::StudyOptions;
@@ -137,7 +138,7 @@ impl Justify {
             author: self.author.clone(),
             date: self.date.clone(),
             command: command(),
-            host: opened.host(dossier.summary.rechecked_lanes, started),
+            host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started),
         };
         let mut results = folder.results()?;
         results.add("report.html", report.html()?.as_bytes())?;

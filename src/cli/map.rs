@@ -11,7 +11,7 @@ use super::dry_run::{BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::engine::{Backend, CpuBackend, Executor, Forecast, Verdicts, Wanted, forecast};
+use crate::engine::{Backend, Forecast, Verdicts, Wanted, forecast};
 use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -151,24 +151,19 @@ impl Map {
         let against = options.against.clone();
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
-        let wide = self.reference.then(CpuBackend::reference);
-        let backend: &dyn Backend = match &wide {
-            Some(wide) => wide,
-            None => opened.backend(),
-        };
+        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
         if self.dry_run {
-            return forecast_map(&map, backend, self.format);
+            return forecast_map(&map, opened.backend(), self.format);
         }
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
-        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
+        let executor = opened.executor().with_recheck(RECHECK_SEED);
         let bar = console::progress(verbosity, map.cell_count(), "sweeping");
         let started = Instant::now();
         let MapResult { grids, summary } = map.run(&executor, |cells| bar.inc(cells))?;
         bar.finish_and_clear();
         let host = MapHost {
-            backend: backend.describe(),
-            device: opened.device(),
+            backend: opened.backend().describe(),
+            device: opened.device().cloned(),
             sweep: SweepRecord {
                 rechecked_lanes: summary.rechecked_lanes,
                 recheck_seed: RECHECK_SEED,

@@ -24,7 +24,6 @@ mod lists;
 mod map;
 mod merge;
 mod mine;
-mod open_device;
 mod sample;
 mod sample_checks;
 mod sample_distribution;

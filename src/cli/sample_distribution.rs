@@ -11,7 +11,7 @@ use super::sample_checks::only_crude;
 use super::sample_lanes;
 use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, SampledFile};
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
 use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::reopen::DISTRIBUTION_FILE;
 use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
@@ -93,7 +93,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         seed,
         given: Vec::new(),
     };
-    let host = opened.host(crude.summary.rechecked_lanes, started);
+    let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started);
     let record = record(&sampled, &samples);
     let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
     file.plan_sha256 = Some(plan.hash().to_owned());

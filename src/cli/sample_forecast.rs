@@ -3,12 +3,11 @@
 use std::time::Instant;
 
 use super::Exit;
-use super::backend_flags::Opened;
 use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::sample_checks::MAX_HELD;
 use crate::Result;
-use crate::engine::{Forecast, Outcome, Wanted, forecast};
+use crate::engine::{Forecast, OpenBackend, Outcome, Wanted, forecast};
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
 use crate::run::sampling::crude_plan::CrudePlan;
@@ -24,7 +23,7 @@ const BYTES_OF_COUNTS: u64 = 6 << 20;
 const BYTES_PER_SAMPLE: u64 = 280;
 
 /// Prints what the run would be.
-pub(super) fn forecast_sample(sample: &Sample, opened: &Opened, format: FormatFlag) -> Result<Exit> {
+pub(super) fn forecast_sample(sample: &Sample, opened: &OpenBackend, format: FormatFlag) -> Result<Exit> {
     let (estimator, lanes, models) = match &sample.0 {
         SampleKind::Crude(planned, stop) => return forecast_crude(planned, opened, stop, format),
         SampleKind::Weighted(planned) => return forecast_weighted(planned, opened, format),
@@ -55,7 +54,7 @@ pub(super) fn forecast_sample(sample: &Sample, opened: &Opened, format: FormatFl
 fn forecast_adaptive(
     density: &DensityModel,
     (estimator, lanes, models): (&str, u64, &[ModelId]),
-    opened: &Opened,
+    opened: &OpenBackend,
     format: FormatFlag,
 ) -> Result<Exit> {
     let part = |model: &ModelId| ForecastPart {
@@ -82,7 +81,7 @@ fn forecast_adaptive(
 }
 
 /// What the run would be.
-fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format: FormatFlag) -> Result<Exit> {
+fn forecast_crude(planned: &CrudePlan, opened: &OpenBackend, stop: &StopRule, format: FormatFlag) -> Result<Exit> {
     let (plan, counting) = (&planned.plan, planned.counting());
     // Few lanes are valued.
     let verdicts = TallyOptions { worst: 0, ..counting.clone() };
@@ -107,7 +106,7 @@ fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format:
 }
 
 /// What the run would be: drawing and weighing cost more than the lanes, so all of it is measured.
-fn forecast_weighted(planned: &WeightedPlan, opened: &Opened, format: FormatFlag) -> Result<Exit> {
+fn forecast_weighted(planned: &WeightedPlan, opened: &OpenBackend, format: FormatFlag) -> Result<Exit> {
     let (facts, density) = (&planned.facts, &planned.density);
     let most = facts.samples.min(planned.chunk_samples());
     let (mut samples, mut took) = (most.min(256), 0.0);

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use super::Exit;
-use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
@@ -12,7 +11,7 @@ use super::sample_checks::{guard, only_crude};
 use super::sample_distribution;
 use super::sample_forecast::forecast_sample;
 use super::sample_lanes::{self, RowTable};
-use crate::engine::Executor;
+use crate::engine::{Executor, OpenBackend};
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
 use crate::run::parts::{PLAN_FILE, Shard};
 use crate::run::sampling::crude_plan::CrudePlan;
@@ -82,7 +81,7 @@ impl Sample {
     fn run_sample(
         &self,
         sample: sampling::Sample,
-        opened: &Opened,
+        opened: &OpenBackend,
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
@@ -101,7 +100,7 @@ impl Sample {
             let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
-            return write(&sample, result, opened.host(0, started), results, self.format);
+            return write(&sample, result, HostRecord::of(opened, 0, started), results, self.format);
         }
         let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
@@ -117,7 +116,7 @@ impl Sample {
     fn run_split(
         &self,
         sample: &sampling::Sample,
-        opened: &Opened,
+        opened: &OpenBackend,
         executor: &Executor,
         started: Instant,
         verbosity: Verbosity,
@@ -150,7 +149,7 @@ impl Sample {
             return Ok(Exit::Ok);
         }
         let result = run.take_result()?;
-        let host = opened.host(result.rechecked_lanes, started);
+        let host = HostRecord::of(opened, result.rechecked_lanes, started);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
         let exit = write(sample, result, host, results, self.format)?;

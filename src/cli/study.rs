@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
@@ -15,7 +15,7 @@ use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
+use crate::engine::{Block, Confusion, Headway, OpenBackend, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::model::profile::Profile;
 use crate::report::lanes::Digits;
@@ -136,10 +136,10 @@ impl Study {
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
-            let opened = self.backend.open()?;
+            let mut opened = self.backend.open()?;
             let study = study::Study::read(path, self.shards.shard)?;
             if study.facts().reference {
-                self.backend.none_but("--reference")?;
+                opened = self.backend.reference()?;
             }
             if self.dry_run {
                 return self.forecast(&study, &opened, None);
@@ -148,7 +148,7 @@ impl Study {
         }
         if self.shards.plan_only {
             if self.reference {
-                self.backend.none_but("--reference")?;
+                self.backend.reference()?;
             }
             let (study, _) = self.prepare(configured, verbosity)?;
             study.write_plan(&self.out)?;
@@ -156,7 +156,7 @@ impl Study {
             return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
@@ -221,10 +221,9 @@ impl Study {
     }
 
     /// What the run would be.
-    fn forecast(&self, study: &study::Study, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
+    fn forecast(&self, study: &study::Study, opened: &OpenBackend, before_s: Option<f64>) -> Result<Exit> {
         let plan = study.plan();
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
+        let backend = opened.backend();
         let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
         let mut forecast =
             forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
@@ -255,15 +254,14 @@ impl Study {
     fn sweep(
         &self,
         study: &study::Study,
-        opened: &Opened,
+        opened: &OpenBackend,
         configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Exit> {
         let plan = study.plan();
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(study.facts().score.seed);
+        let backend = opened.backend();
+        let executor = opened.executor().with_recheck(study.facts().score.seed);
         if self.shards.is_part() {
             study.write_plan(&self.out)?;
         }
@@ -296,7 +294,7 @@ impl Study {
                 (Some(stand_in), 1..) => format!("{}; after its failure {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },
-            device: opened.device(),
+            device: opened.device().cloned(),
             swept,
             timings,
             settings: configured.record(),

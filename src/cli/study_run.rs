@@ -7,11 +7,13 @@ use clap::Args;
 use super::format::FormatFlag;
 use super::{Exit, console};
 use crate::Result;
-use crate::engine::{Backend, CpuBackend, ENGINE_VERSION, Executor, Partial, SweepSummary, Wanted, chunks};
+use crate::engine::{
+    Backend, CpuBackend, DeviceRecord, ENGINE_VERSION, Executor, Partial, SweepSummary, Wanted, chunks,
+};
 use crate::model::criterion::Criterion;
 use crate::report::lanes::{self, Digits};
 use crate::report::reference::ReferenceComparison;
-use crate::report::run_record::{CategoryRecord, DeviceRecord, RunRecord, SettingRecord, SweepRecord, Timings};
+use crate::report::run_record::{CategoryRecord, RunRecord, SettingRecord, SweepRecord, Timings};
 use crate::report::study::{CategoryPictures, StudyReport};
 use crate::report::study_figures::HeadwayFailures;
 use crate::report::tables;

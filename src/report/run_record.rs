@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use crate::engine::Headway;
+use crate::engine::{DeviceRecord, Headway};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::sampling::{Sample, SampleHeadways, SampleKind};
@@ -44,30 +44,6 @@ pub struct Timings {
     pub sweep_s: f64,
     /// Scores and claims.
     pub score_s: f64,
-}
-
-/// The device that computed the lanes, where one did.
-#[derive(Debug, Clone, Serialize)]
-pub struct DeviceRecord {
-    /// Name.
-    pub name: String,
-    /// Interface: Vulkan, Metal, DX12, GL.
-    pub api: &'static str,
-    /// Driver and its version.
-    pub driver: String,
-    /// Place on the PCI bus, where it is known.
-    pub pci_bus_id: Option<String>,
-    /// Float operations reached the driver as written.
-    pub exact_path: bool,
-}
-
-impl DeviceRecord {
-    /// In one line, as pages show it.
-    pub(super) fn line(&self) -> String {
-        let path = if self.exact_path { "exact path" } else { "plain path" };
-        let at = self.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
-        format!("{} ({}, {}{at}, {path})", self.name, self.api, self.driver)
-    }
 }
 
 /// How the sweep went.
