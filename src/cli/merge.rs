@@ -7,9 +7,10 @@ use clap::Args;
 use super::Exit;
 use super::format::FormatFlag;
 use super::sample_run;
-use super::study_run::{Host, TablesFlag, finish_study};
+use super::study_run::TablesFlag;
 use crate::interop::cluster::quoted_word;
-use crate::report::run_record::Timings;
+use crate::report::run_record::{StudyHost, Timings};
+use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, Shard, kind_of};
 use crate::run::sampling::Sample;
 use crate::run::study::Study;
@@ -65,11 +66,9 @@ impl Merge {
             move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
         };
         match kind.as_str() {
-            Study::KIND => merge_study(
-                &OutputDir::open(&self.dir, STUDY_RECORD)?,
-                &again("study"),
-                (self.format, self.tables.tables),
-            ),
+            Study::KIND => {
+                merge_study(&OutputDir::open(&self.dir, STUDY_RECORD)?, &again("study"), (self.format, self.tables))
+            }
             kind if Sample::is_kind(kind) => {
                 sample_run::merge(&OutputDir::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
             }
@@ -81,14 +80,19 @@ impl Merge {
     }
 }
 
-fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: (FormatFlag, bool)) -> Result<Exit> {
+fn merge_study(
+    folder: &OutputDir,
+    again: &dyn Fn(Shard) -> String,
+    (format, tables): (FormatFlag, TablesFlag),
+) -> Result<Exit> {
     let (study, result) = Study::merge_or(folder.dir(), again)?;
-    let host = Host {
+    let host = StudyHost {
         backend: format!("{} merged", counted(result.parts, "part")),
         device: None,
         swept: result.summary,
         timings: Timings::default(),
         settings: Vec::new(),
     };
-    finish_study(&study, &result.counts, None, host, folder.results()?, format)
+    let report = StudyReport::of(&study, &result.counts, None, host)?;
+    tables.finish(report, folder.results()?, study.facts().incomplete, format)
 }

@@ -29,7 +29,6 @@ mod sample;
 mod sample_checks;
 mod sample_distribution;
 mod sample_forecast;
-mod sample_lanes;
 mod sample_options;
 mod sample_run;
 pub mod settings;

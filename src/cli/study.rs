@@ -12,14 +12,16 @@ use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
+use super::study_run::TablesFlag;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
 use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::model::profile::Profile;
-use crate::report::lanes::Digits;
-use crate::report::run_record::Timings;
+use crate::report::lanes::{self, table_format};
+use crate::report::reference::ReferenceComparison;
+use crate::report::run_record::{StudyHost, Timings};
+use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
 use crate::support::files::{check_folder, check_folder_of};
@@ -285,13 +287,12 @@ impl Study {
         let StudyResult { counts, summary: mut swept, .. } = run.take_result()?;
         let mut results = run.results()?;
         if let Some(path) = &self.rows {
-            let digits = if study.facts().reference { Digits::Binary64 } else { Digits::Binary32 };
-            let (again, table) = write_lanes(path, study.cases(), &executor, digits, study.facts().synthetic)?;
+            let (again, table) = lanes::write_study(path, study, &executor)?;
             swept.add(&again);
             results.join(table);
         }
-        let comparison = self.compare_reference.then(|| compare_reference(study.cases())).transpose()?;
-        let host = Host {
+        let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
+        let host = StudyHost {
             backend: match (executor.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; after its failure {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
@@ -302,7 +303,8 @@ impl Study {
             settings: configured.record(),
         };
         self.leave_plan(study, &mut results)?;
-        let exit = finish_study(study, &counts, comparison, host, results, (self.format, self.tables.tables))?;
+        let report = StudyReport::of(study, &counts, comparison, host)?;
+        let exit = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
         Ok(exit)
     }
@@ -331,7 +333,7 @@ impl Study {
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;
-        lane_format(lanes)?;
+        table_format(lanes)?;
         self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
     }
 }
