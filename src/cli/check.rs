@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::Exit;
 use super::case_flags::{CaseFlags, from_table, from_toml};
-use super::console::Verbosity;
+use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use crate::interop::openscenario::read_scenario;
@@ -98,7 +98,7 @@ impl Check {
             is_synthetic: asked.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
-            command: super::justify::command(),
+            command: console::command_line(),
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;

@@ -222,8 +222,7 @@ impl Compare {
         results.add("report.html", file.html(figures)?.as_bytes())?;
         file.files = results.names();
         results.publish(file.json()?.as_bytes())?;
-        self.format.print(|| text, || file.json())?;
-        tracing::info!("results written to {}", self.out.display());
+        self.format.print_results(|| text, || file.json(), &self.out)?;
         Ok(())
     }
 

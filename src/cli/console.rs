@@ -10,6 +10,7 @@ use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
+use crate::interop::cluster::quoted_word;
 use crate::report::tables::WIDTH;
 use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
@@ -81,6 +82,12 @@ fn write_out(text: &str) -> Result<()> {
 pub fn say(text: &str) {
     // Where stderr is gone there is nobody to tell.
     let _ = write!(io::stderr().lock(), "{}", shown(text));
+}
+
+/// What was typed, for whoever wants to repeat it.
+pub fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
+    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
 /// A progress bar on stderr; silent unless stderr is a terminal.

@@ -38,6 +38,18 @@ impl FormatFlag {
         }
     }
 
+    /// The same of results that are in a folder.
+    pub fn print_results(
+        self,
+        text: impl FnOnce() -> String,
+        json: impl FnOnce() -> Result<String>,
+        out: &std::path::Path,
+    ) -> Result<()> {
+        self.print(text, json)?;
+        tracing::info!("results written to {}", out.display());
+        Ok(())
+    }
+
     /// Says what `--plan-only` left.
     pub fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());

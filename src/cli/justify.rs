@@ -7,11 +7,10 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::configured::Configured;
-use super::console::Verbosity;
+use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
-use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
@@ -136,7 +135,7 @@ impl Justify {
             conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
             author: self.author.clone(),
             date: self.date.clone(),
-            command: command(),
+            command: console::command_line(),
             host: opened.host(dossier.summary.rechecked_lanes, started),
         };
         let mut results = folder.results()?;
@@ -147,8 +146,7 @@ impl Justify {
         }
         let files = results.names();
         results.publish(report.json(&files)?.as_bytes())?;
-        self.format.print(|| report.text(), || report.json(&files))?;
-        tracing::info!("results written to {}", self.out.display());
+        self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
         Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
     }
@@ -173,10 +171,4 @@ fn date(text: &str) -> std::result::Result<String, String> {
 
 fn named(tally: &crate::interop::conformance::Tally) -> String {
     tally.model.map_or_else(|| tally.label.clone(), |model| format!("{}, {}", tally.label, model.name()))
-}
-
-/// What was typed, for whoever wants to repeat it.
-pub(super) fn command() -> String {
-    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
-    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }

@@ -111,8 +111,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     })?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
     file.publish(results, Vec::new())?;
-    flags.format.print(|| file.text(), || file.json())?;
-    tracing::info!("results written to {}", flags.out.display());
+    flags.format.print_results(|| file.text(), || file.json(), &flags.out)?;
     Ok(Exit::Ok)
 }
 

@@ -14,7 +14,7 @@ use super::sample_forecast::forecast_sample;
 use crate::engine::{Chunk, Executor};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::run::parts::{PLAN_FILE, Shard};
+use crate::run::parts::PLAN_FILE;
 use crate::run::sampling::crude_plan::CrudePlan;
 use crate::run::sampling::{self, SampleKind, SampleResult, conditional};
 use crate::stats::density::read_density;
@@ -183,13 +183,6 @@ fn warn(planned: &CrudePlan) -> Result<()> {
     Ok(())
 }
 
-/// Makes the result of the parts in a folder; `again` gives the command that makes a shard.
-pub(super) fn merge(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
-    let (sample, result) = sampling::Sample::merge_or(folder.dir(), again)?;
-    let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
-    write(&sample, &result, host, folder.results()?, format)
-}
-
 /// Writes and prints the result.
 fn write(
     sample: &sampling::Sample,
@@ -201,7 +194,6 @@ fn write(
     let out = results.dir().to_path_buf();
     let mut file = EstimateFile::of_sample(sample, result, host)?;
     file.write(results, sample, result)?;
-    format.print(|| file.text(), || file.json())?;
-    tracing::info!("results written to {}", out.display());
+    format.print_results(|| file.text(), || file.json(), &out)?;
     Ok(Exit::Ok)
 }

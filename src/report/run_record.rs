@@ -8,8 +8,9 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::sampling::{Sample, SampleHeadways, SampleKind};
 use crate::run::score::{ScoreOptions, ScoreTable, f1};
-use crate::run::study::{CategoryFacts, Study};
+use crate::run::study::{CategoryFacts, Study, StudyResult};
 use crate::scenario::parameterization::ParameterizationOptions;
+use crate::support::readable::counted;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Error, Result};
 
@@ -155,6 +156,19 @@ pub struct StudyHost {
     pub timings: Timings,
     /// What was configured.
     pub settings: Vec<SettingRecord>,
+}
+
+impl StudyHost {
+    /// Of merged parts, which had machines and commands of their own.
+    pub fn of_parts(result: &StudyResult) -> StudyHost {
+        StudyHost {
+            backend: format!("{} merged", counted(result.parts, "part")),
+            device: None,
+            swept: result.summary,
+            timings: Timings::default(),
+            settings: Vec::new(),
+        }
+    }
 }
 
 impl RunRecord {
