@@ -104,7 +104,7 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
 }
 
 /// A text of the library with flags for its options: `--dt` for option `dt`, `--backend cpu` for option `backend = cpu`.
-fn with_flags(text: &str) -> String {
+pub fn with_flags(text: &str) -> String {
     let (mut out, mut rest) = (String::with_capacity(text.len()), text);
     while let Some((before, after)) = rest.split_once("option `") {
         let flag = after.split_once('`').map(|(option, rest)| {

@@ -28,7 +28,6 @@ mod open_device;
 mod sample;
 mod sample_checks;
 mod sample_distribution;
-mod sample_forecast;
 mod sample_options;
 mod sample_run;
 pub mod settings;

@@ -6,11 +6,11 @@ use super::Exit;
 use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_checks::{guard, only_crude};
 use super::sample_distribution;
-use super::sample_forecast::forecast_sample;
 use crate::engine::{Chunk, Executor};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
@@ -88,7 +88,8 @@ impl Sample {
         verbosity: Verbosity,
     ) -> Result<Exit> {
         if self.dry_run {
-            return forecast_sample(&sample, opened, self.format);
+            let (run, backend) = (sample.forecast(&opened.executor())?, opened.backend().describe());
+            return DryRun { run, backend, before_s: None }.print(self.format);
         }
         if self.shards.plan_only || self.shards.is_part() {
             sample.write_plan(&self.out)?;

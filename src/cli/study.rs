@@ -8,30 +8,26 @@ use clap::Args;
 use super::backend_flags::{BackendFlags, Opened};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun};
+use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::study_run::TablesFlag;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
-use crate::model::criterion::Criterion;
+use crate::engine::{Backend, CpuBackend, Executor, Headway};
 use crate::model::profile::Profile;
 use crate::report::lanes::{self, table_format};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
+use crate::run::study::{self, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::traffic::Source;
-
-/// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
-const FORECAST_BYTES: u64 = 64 << 20;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -224,33 +220,9 @@ impl Study {
 
     /// What the run would be.
     fn forecast(&self, study: &study::Study, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
-        let plan = study.plan();
         let reference = CpuBackend::reference();
         let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
-        let mut forecast =
-            forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
-        forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
-        forecast.lanes = plan.lane_count();
-        // The counts of every unit, in the ledger and joined.
-        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
-        let of_unit = size_of::<Confusion<u32>>() as u64;
-        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
-        DryRun {
-            data: study.facts().data.clone(),
-            parts: dry_run::parts(plan),
-            units: "scenarios",
-            is_at_most: false,
-            more_bytes: plan.blocks.iter().map(counts).sum::<u64>()
-                + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
-            more: "counts and the series of a window",
-            forecast: Some(forecast),
-            backend: backend.describe(),
-            before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
-            besides: "scores, figures, the plan file; --rows and --compare-reference",
-        }
-        .print(self.format)?;
-        Ok(Exit::Ok)
+        DryRun { run: study.forecast(backend)?, backend: backend.describe(), before_s }.print(self.format)
     }
 
     /// From a plan to a report, or to a part of one.

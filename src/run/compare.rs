@@ -111,6 +111,15 @@ impl<'a> Compare<'a> {
         Ok(Compare { scenarios, facts, profile, options, plan })
     }
 
+    /// What the scenarios are of.
+    pub(super) fn data(&self) -> &str {
+        &self.facts.data
+    }
+
+    pub(super) fn options(&self) -> &CompareOptions {
+        &self.options
+    }
+
     /// The lanes of S and S'.
     pub fn lane_plan(&self) -> &LanePlan {
         &self.plan
