@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Exit;
-use super::format::FormatFlag;
-use super::study_run::TablesFlag;
+use super::format::{FormatFlag, TablesFlag};
 use crate::Result;
 use crate::interop::cluster::quoted_word;
 use crate::report::run_record::StudyHost;

@@ -37,7 +37,6 @@ mod simulate;
 mod slurm;
 mod source;
 mod study;
-mod study_run;
 mod synth;
 mod verify;
 
