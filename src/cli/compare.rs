@@ -12,16 +12,13 @@ use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
-use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::report::compare::{CompareFile, rates};
-use crate::report::html::PageFigure;
+use crate::report::compare::CompareFile;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
-use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
+use crate::support::run_dir::{COMPARE_RECORD, OutputDir};
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
@@ -106,19 +103,13 @@ impl Compare {
         }
 
         let options = CompareOptions {
-            study: StudyOptions {
-                categories,
-                models: models.clone(),
-                headways: headways.clone(),
-                parameterization: config.of_densities(),
-            },
-            parameterizations: ids.clone(),
+            study: StudyOptions { categories, models, headways, parameterization: config.of_densities() },
+            parameterizations: ids,
             samples: self.samples,
             seed: self.seed,
             enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
         };
-        let enough = options.enough;
-        let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;
+        let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();
         if self.dry_run {
             let (backend, before_s) = (opened.backend(), Some(started.elapsed().as_secs_f64()));
@@ -131,60 +122,23 @@ impl Compare {
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
         let (counts, mut swept) = compare.replay(&executor, |units| bar.inc(units))?;
         bar.finish_and_clear();
-        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
+        let bar = console::progress(
+            verbosity,
+            compare.options().parameterizations.len() as u64 * self.samples,
+            "fitting and sampling",
+        );
         let result = compare.sample(&counts, &executor, |samples| bar.inc(samples));
         bar.finish_and_clear();
         let CompareResult { categories, left_out, failed, summary } = result?;
         swept.add(&summary);
-        for error in left_out.iter().chain(&failed) {
-            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
-        }
+        console::warn(left_out.iter().chain(&failed));
         let complete = collection.problems.is_empty() && left_out.is_empty();
 
-        let mut file = CompareFile {
-            lanesweep_comparison: 1,
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
-            data: facts.data.clone(),
-            synthetic: facts.synthetic,
-            scenarios_sha256: facts.scenarios_sha256.clone(),
-            driven: facts.driven,
-            profile: profile.name.clone(),
-            models,
-            headways: headways.iter().map(Headway::to_string).collect(),
-            samples: self.samples,
-            seed: self.seed,
-            level: compare::Compare::LEVEL,
-            enough,
-            study_plan_sha256: plan.hash().to_owned(),
-            left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
-            categories,
-            files: Vec::new(),
-            host: opened.host(swept.rechecked_lanes, started),
-        };
-        self.write(&mut file, folder.results()?)?;
+        let left_out = collection.problems.iter().chain(&failed).map(Error::to_string).collect();
+        let mut file = CompareFile::of(&compare, categories, left_out, opened.host(swept.rechecked_lanes, started));
+        file.write(folder.results()?)?;
+        self.format.print_results(|| file.text(), || file.json(), &self.out)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
-    }
-
-    /// Tables, figures and record.
-    fn write(&self, file: &mut CompareFile, mut results: Results) -> Result<()> {
-        let text = file.text();
-        results.add("compare.csv", &file.csv()?)?;
-        results.add("compare.txt", text.as_bytes())?;
-        let mut figures = Vec::new();
-        for comparison in &file.categories {
-            for criterion in Criterion::ALL {
-                let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
-                let figure = rates(file, comparison, criterion).figure();
-                let svg = figure.svg();
-                results.add(&name, svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
-            }
-        }
-        results.add("report.html", file.html(figures)?.as_bytes())?;
-        file.files = results.names();
-        results.publish(file.json()?.as_bytes())?;
-        self.format.print_results(|| text, || file.json(), &self.out)?;
-        Ok(())
     }
 
     fn check_samples(&self) -> Result<()> {

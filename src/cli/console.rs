@@ -129,6 +129,11 @@ pub fn with_flags(text: &str) -> String {
     out + rest
 }
 
+/// Tells what was left out, with what to do about it.
+pub fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
+    errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
+}
+
 /// Draws an error with its help on stderr.
 pub fn complain(error: &Error) {
     let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());

@@ -118,9 +118,7 @@ impl Justify {
         let folder = OutputDir::open(&self.out, DOSSIER_RECORD)?;
         let executor = opened.executor().with_recheck(config.compare.seed);
         let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;
-        for error in &dossier.left_out {
-            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
-        }
+        console::warn(&dossier.left_out);
         let mut conformance = check_shipped_tables(dossier.parameterization.category, &profile)?;
         conformance.retain(|tally| tally.model.is_none_or(|of| of == model));
         let report = DossierReport {
@@ -128,9 +126,7 @@ impl Justify {
             rules: &options.rules,
             margin: options.compare.enough.margin,
             confidence: options.score.confidence,
-            data: facts.data.clone(),
-            is_synthetic: facts.synthetic,
-            scenarios_sha256: facts.scenarios_sha256.clone(),
+            provenance: &facts,
             profile: &profile,
             conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
             author: self.author.clone(),
@@ -138,14 +134,7 @@ impl Justify {
             command: console::command_line(),
             host: opened.host(dossier.summary.rechecked_lanes, started),
         };
-        let mut results = folder.results()?;
-        results.add("report.html", report.html()?.as_bytes())?;
-        results.add("hidden.csv", &report.hidden_csv()?)?;
-        if let Some(svg) = report.example() {
-            results.add("hidden.svg", svg.as_bytes())?;
-        }
-        let files = results.names();
-        results.publish(report.json(&files)?.as_bytes())?;
+        let files = report.write(folder.results()?)?;
         self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
         Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })

@@ -211,9 +211,7 @@ impl Study {
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
-        for left_out in study.left_out() {
-            tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
-        }
+        console::warn(study.left_out());
         Ok((study, timings))
     }
 

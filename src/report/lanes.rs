@@ -13,7 +13,7 @@ use crate::model::scalar::Real;
 use crate::run::study::Study;
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
-use crate::support::files::make_folder;
+use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
 
@@ -23,9 +23,7 @@ use crate::{Error, Result};
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for a name that is no table's; of the lanes.
 pub(crate) fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
-    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
-        make_folder(dir)?;
-    }
+    make_folder_of(path)?;
     let (plan, facts) = (study.plan(), study.facts());
     let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };
     let mut table = create(path, "lanes", plan, facts.synthetic, columns(digits))?;

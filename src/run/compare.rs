@@ -112,11 +112,12 @@ impl<'a> Compare<'a> {
     }
 
     /// What the scenarios are of.
-    pub(super) fn data(&self) -> &str {
-        &self.facts.data
+    pub fn provenance(&self) -> &DataProvenance {
+        self.facts
     }
 
-    pub(super) fn options(&self) -> &CompareOptions {
+    /// What is compared.
+    pub fn options(&self) -> &CompareOptions {
         &self.options
     }
 
