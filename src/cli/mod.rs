@@ -27,8 +27,6 @@ mod mine;
 mod sample;
 mod sample_checks;
 mod sample_distribution;
-mod sample_forecast;
-mod sample_lanes;
 mod sample_options;
 mod sample_run;
 pub mod settings;
@@ -38,7 +36,6 @@ mod simulate;
 mod slurm;
 mod source;
 mod study;
-mod study_run;
 mod synth;
 mod verify;
 

@@ -120,7 +120,7 @@ impl Reopened {
         if !headways.is_empty() {
             options.headways = headways;
         }
-        let lanes = Lanes::Scenarios(Box::new(plan_study(scenarios, profile, &options)?.plan));
+        let lanes = Lanes::Scenarios(Box::new(plan_study(scenarios, profile, &options)?));
         let is_synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
         Ok(Reopened { lanes, data, is_synthetic, is_reference: true })
     }
