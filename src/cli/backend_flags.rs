@@ -1,13 +1,8 @@
-//! Which backend computes the lanes: `--backend` and `--device`, from what was typed to what is open.
-
-use std::time::Instant;
+//! Which backend computes the lanes: `--backend` and `--device`.
 
 use clap::Args;
 
-use super::open_device::{OpenDevice, nothing_to_verify, open_checked, open_device};
-use crate::engine::{Backend, BackendChoice, CpuBackend, DeviceName, Executor};
-use crate::report::run_record::DeviceRecord;
-use crate::report::sampling::HostRecord;
+use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::{Error, Place, Result};
 
 /// Flags of every verb that sweeps.
@@ -23,85 +18,32 @@ pub struct BackendFlags {
     device: Option<DeviceName>,
 }
 
-/// What computes the lanes, open.
-pub struct Opened {
-    /// The CPU in the lane arithmetic: the backend, or what stands in for a device that fails.
-    cpu: CpuBackend<f32>,
-    device: Option<OpenDevice>,
-}
-
 impl BackendFlags {
     /// Opens what the flags and the environment say.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a device that does not exist or contradicts the backend, [`Error::Device`] where
-    /// a GPU is asked for and there is none, or where it does not compute as the CPU does.
-    pub fn open(&self) -> Result<Opened> {
-        let cpu = CpuBackend::lane_arithmetic();
-        if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, device: None });
-        }
-        Ok(Opened { cpu, device: open_checked(self.backend, self.device.as_ref())? })
+    /// As [`OpenBackend::open`].
+    pub fn open(&self) -> Result<OpenBackend> {
+        OpenBackend::open(self.backend, self.device.as_ref())
     }
 
-    /// Opens what is to be verified: no check before the check, and no silent CPU.
+    /// Opens what is to be verified.
     ///
     /// # Errors
-    /// As [`BackendFlags::open`]; [`Error::Device`] also where nothing was asked for and there is no GPU.
-    pub fn open_to_verify(&self) -> Result<Opened> {
-        let cpu = CpuBackend::lane_arithmetic();
-        if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, device: None });
-        }
-        let device = open_device(self.backend, self.device.as_ref())?.ok_or_else(nothing_to_verify)?;
-        Ok(Opened { cpu, device: Some(device) })
+    /// As [`OpenBackend::open_to_verify`].
+    pub fn open_to_verify(&self) -> Result<OpenBackend> {
+        OpenBackend::open_to_verify(self.backend, self.device.as_ref())
     }
 
-    /// The CPU, for a flag that leaves no choice.
+    /// The processor in binary64, for `--reference`, which leaves no choice.
     ///
     /// # Errors
     /// [`Error::Usage`] where another backend or a device is asked for.
-    pub fn none_but(&self, flag: &str) -> Result<Opened> {
+    pub fn reference(&self) -> Result<OpenBackend> {
         if self.backend == BackendChoice::Gpu || self.device.is_some() {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
-            return Err(Error::usage(Place::item(flag), problem, "leave out --backend and --device"));
+            return Err(Error::usage(Place::item("--reference"), problem, "leave out --backend and --device"));
         }
-        Ok(Opened { cpu: CpuBackend::lane_arithmetic(), device: None })
-    }
-}
-
-impl Opened {
-    /// What computes.
-    pub fn backend(&self) -> &dyn Backend {
-        match &self.device {
-            Some(device) => &*device.backend,
-            None => &self.cpu,
-        }
-    }
-
-    /// What stands in for a device.
-    pub fn fallback(&self) -> Option<&dyn Backend> {
-        self.device.as_ref().map(|_| &self.cpu as &dyn Backend)
-    }
-
-    /// Both.
-    pub fn executor(&self) -> Executor<'_> {
-        Executor::new(self.backend()).with_fallback(self.fallback())
-    }
-
-    /// What computed a run that began at this instant, for its record.
-    pub fn host(&self, rechecked_lanes: u64, started: Instant) -> HostRecord {
-        HostRecord {
-            backend: self.backend().describe(),
-            device: self.device(),
-            rechecked_lanes,
-            seconds: started.elapsed().as_secs_f64(),
-            threads: rayon::current_num_threads(),
-        }
-    }
-
-    /// The device, for the record of the run.
-    pub fn device(&self) -> Option<DeviceRecord> {
-        self.device.as_ref().map(|device| device.record.clone())
+        Ok(OpenBackend::reference())
     }
 }

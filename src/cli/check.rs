@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::Exit;
 use super::case_flags::{CaseFlags, from_table, from_toml};
-use super::console::Verbosity;
+use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use crate::interop::openscenario::read_scenario;
@@ -16,7 +16,7 @@ use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
-use crate::support::files::{make_folder, write_atomically};
+use crate::support::files::{make_folder_of, write_atomically};
 use crate::{Error, Place, Result};
 
 /// Profiles unless told otherwise; the first one decides.
@@ -98,7 +98,7 @@ impl Check {
             is_synthetic: asked.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
-            command: super::justify::command(),
+            command: console::command_line(),
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
@@ -205,8 +205,6 @@ fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-        make_folder(dir)?;
-    }
+    make_folder_of(path)?;
     write_atomically(path, bytes)
 }

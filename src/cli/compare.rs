@@ -5,29 +5,23 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
+use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
-use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
-use crate::model::criterion::Criterion;
-use crate::report::compare::{CompareFile, rates};
-use crate::report::html::PageFigure;
+use crate::report::compare::CompareFile;
+use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
-use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
-use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
+use crate::support::run_dir::{COMPARE_RECORD, OutputDir};
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
-
-/// Memory of the counts of sampled lanes and of the figures, bytes, measured.
-const BYTES_OF_COUNTS: u64 = 8 << 20;
 
 /// Which parameterizations give the right risk, not only the right labels?
 ///
@@ -110,22 +104,18 @@ impl Compare {
         }
 
         let options = CompareOptions {
-            study: StudyOptions {
-                categories,
-                models: models.clone(),
-                headways: headways.clone(),
-                parameterization: config.of_densities(),
-            },
-            parameterizations: ids.clone(),
+            study: StudyOptions { categories, models, headways, parameterization: config.of_densities() },
+            parameterizations: ids,
             samples: self.samples,
             seed: self.seed,
             enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
         };
-        let enough = options.enough;
-        let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;
+        let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();
         if self.dry_run {
-            return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
+            let (backend, before_s) = (opened.backend(), Some(started.elapsed().as_secs_f64()));
+            return DryRun { run: compare.forecast(backend)?, backend: backend.describe(), before_s }
+                .print(self.format);
         }
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
@@ -133,98 +123,24 @@ impl Compare {
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
         let (counts, mut swept) = compare.replay(&executor, |units| bar.inc(units))?;
         bar.finish_and_clear();
-        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
+        let bar = console::progress(
+            verbosity,
+            compare.options().parameterizations.len() as u64 * self.samples,
+            "fitting and sampling",
+        );
         let result = compare.sample(&counts, &executor, |samples| bar.inc(samples));
         bar.finish_and_clear();
         let CompareResult { categories, left_out, failed, summary } = result?;
         swept.add(&summary);
-        for error in left_out.iter().chain(&failed) {
-            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
-        }
+        console::warn(left_out.iter().chain(&failed));
         let complete = collection.problems.is_empty() && left_out.is_empty();
 
-        let mut file = CompareFile {
-            lanesweep_comparison: 1,
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
-            data: facts.data.clone(),
-            synthetic: facts.synthetic,
-            scenarios_sha256: facts.scenarios_sha256.clone(),
-            driven: facts.driven,
-            profile: profile.name.clone(),
-            models,
-            headways: headways.iter().map(Headway::to_string).collect(),
-            samples: self.samples,
-            seed: self.seed,
-            level: compare::Compare::LEVEL,
-            enough,
-            study_plan_sha256: plan.hash().to_owned(),
-            left_out: collection.problems.iter().chain(&failed).map(Error::to_string).collect(),
-            categories,
-            files: Vec::new(),
-            host: opened.host(swept.rechecked_lanes, started),
-        };
-        self.write(&mut file, folder.results()?)?;
+        let left_out = collection.problems.iter().chain(&failed).map(Error::to_string).collect();
+        let mut file =
+            CompareFile::of(&compare, categories, left_out, HostRecord::of(&opened, swept.rechecked_lanes, started));
+        file.write(folder.results()?)?;
+        self.format.print_results(|| file.text(), || file.json(), &self.out)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
-    }
-
-    /// What the run would be. Sampled lanes are taken to cost what those of their category's scenarios do.
-    fn forecast(
-        &self,
-        data: &str,
-        plan: &LanePlan,
-        ids: &[Parameterization],
-        opened: &Opened,
-        before_s: f64,
-    ) -> Result<Exit> {
-        let per_sample = (plan.headways.len() * plan.models.len()) as u64;
-        let mut parts = dry_run::parts(plan);
-        let mut whole = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
-            Partial::from_chunk(plan, &chunk).map(drop)
-        })?;
-        let per_lane_s = whole.seconds / whole.lanes.max(1) as f64;
-        for id in ids {
-            let lanes = self.samples.saturating_mul(per_sample);
-            let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
-            parts.push(ForecastPart { of, what, units: self.samples, lanes });
-            whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
-        }
-        DryRun {
-            data: data.to_owned(),
-            parts,
-            units: "cases",
-            is_at_most: false,
-            more_bytes: BYTES_OF_COUNTS,
-            more: "counts per scenario and figures",
-            forecast: Some(whole),
-            backend: opened.backend().describe(),
-            before: Some((before_s, "reading, mining and planning")),
-            besides: "fitting the densities",
-        }
-        .print(self.format)?;
-        Ok(Exit::Ok)
-    }
-
-    /// Tables, figures and record.
-    fn write(&self, file: &mut CompareFile, mut results: Results) -> Result<()> {
-        let text = file.text();
-        results.add("compare.csv", &file.csv()?)?;
-        results.add("compare.txt", text.as_bytes())?;
-        let mut figures = Vec::new();
-        for comparison in &file.categories {
-            for criterion in Criterion::ALL {
-                let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
-                let figure = rates(file, comparison, criterion).figure();
-                let svg = figure.svg();
-                results.add(&name, svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
-            }
-        }
-        results.add("report.html", file.html(figures)?.as_bytes())?;
-        file.files = results.names();
-        results.publish(file.json()?.as_bytes())?;
-        self.format.print(|| text, || file.json())?;
-        tracing::info!("results written to {}", self.out.display());
-        Ok(())
     }
 
     fn check_samples(&self) -> Result<()> {

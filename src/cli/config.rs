@@ -14,7 +14,7 @@ use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
 use crate::interop::cluster::quoted_word;
-use crate::support::files::{make_folder, write_atomically};
+use crate::support::files::{make_folder_of, write_atomically};
 use crate::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages
@@ -132,9 +132,7 @@ impl Init {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
             return Err(Error::usage(Place::file(&self.file), "it exists already and is not overwritten", help));
         }
-        if let Some(folder) = self.file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            make_folder(folder)?;
-        }
+        make_folder_of(&self.file)?;
         write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
         let file = self.file.display().to_string();
         console::print(&format!("{file} written; use it with --config {}\n", quoted_word(&file)))?;

@@ -10,6 +10,7 @@ use tracing::Level;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
+use crate::interop::cluster::quoted_word;
 use crate::report::tables::WIDTH;
 use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
@@ -83,6 +84,12 @@ pub fn say(text: &str) {
     let _ = write!(io::stderr().lock(), "{}", shown(text));
 }
 
+/// What was typed, for whoever wants to repeat it.
+pub fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
+    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
+}
+
 /// A progress bar on stderr; silent unless stderr is a terminal.
 pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
@@ -97,7 +104,7 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
 }
 
 /// A text of the library with flags for its options: `--dt` for option `dt`, `--backend cpu` for option `backend = cpu`.
-fn with_flags(text: &str) -> String {
+pub fn with_flags(text: &str) -> String {
     let (mut out, mut rest) = (String::with_capacity(text.len()), text);
     while let Some((before, after)) = rest.split_once("option `") {
         let flag = after.split_once('`').map(|(option, rest)| {
@@ -120,6 +127,11 @@ fn with_flags(text: &str) -> String {
         };
     }
     out + rest
+}
+
+/// Tells what was left out, with what to do about it.
+pub fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
+    errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
 }
 
 /// Draws an error with its help on stderr.

@@ -28,6 +28,6 @@ impl Devices {
 
     #[cfg(not(feature = "gpu"))]
     pub fn run(&self) -> Result<Exit> {
-        Err(super::open_device::no_gpu("lanesweep verify devices"))
+        Err(crate::engine::no_gpu("lanesweep verify devices"))
     }
 }

@@ -1,6 +1,6 @@
 //! `lanesweep fit`: scenarios in, densities of their parameters out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -16,7 +16,7 @@ use crate::report::records;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
-use crate::support::files::{check_folder_of, make_folder};
+use crate::support::files::{check_folder_of, make_folder_of};
 use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
 use crate::traffic::DataProvenance;
@@ -115,9 +115,7 @@ impl Fit {
                 }
                 Err(error) => return Err(error),
             };
-            for error in result.left_out.iter().chain(&result.not_compared) {
-                bar.suspend(|| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
-            }
+            bar.suspend(|| console::warn(result.left_out.iter().chain(&result.not_compared)));
             if self.without_scenarios {
                 result.model.scenarios.clear();
             }
@@ -128,9 +126,7 @@ impl Fit {
         if fitted.is_empty() && !failed.is_empty() {
             return Err(failed.swap_remove(0));
         }
-        for error in &failed {
-            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
-        }
+        console::warn(&failed);
         write(&fitted, folder.as_ref())?;
         self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
@@ -175,9 +171,7 @@ impl Fit {
 fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&OutputDir>) -> Result<()> {
     let Some(folder) = folder else {
         return fitted.iter().try_for_each(|(path, model)| {
-            if let Some(dir) = path.parent().filter(|dir| *dir != Path::new("")) {
-                make_folder(dir)?;
-            }
+            make_folder_of(path)?;
             write_density(path, model)
         });
     };

@@ -1,10 +1,13 @@
-//! `--format`: what a verb prints, for people or for programs.
+//! `--format` and `--tables`: what a verb prints, for people or for programs.
 
 use clap::{Args, ValueEnum};
 
-use super::console;
+use super::{Exit, console};
 use crate::Result;
+use crate::report::study::StudyReport;
+use crate::report::tables;
 use crate::support::readable::count;
+use crate::support::run_dir::Results;
 
 /// How tables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -38,11 +41,53 @@ impl FormatFlag {
         }
     }
 
+    /// The same of results that are in a folder.
+    pub fn print_results(
+        self,
+        text: impl FnOnce() -> String,
+        json: impl FnOnce() -> Result<String>,
+        out: &std::path::Path,
+    ) -> Result<()> {
+        self.print(text, json)?;
+        tracing::info!("results written to {}", out.display());
+        Ok(())
+    }
+
     /// Says what `--plan-only` left.
     pub fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
         self.print(text, || {
             crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))
         })
+    }
+}
+
+/// The flag of every verb that ends in a study's report.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct TablesFlag {
+    /// Print all tables instead of the answer; they are in report.txt too
+    #[arg(long)]
+    pub tables: bool,
+}
+
+impl TablesFlag {
+    /// Writes the files and prints the answer, or all tables.
+    pub fn finish(
+        self,
+        mut report: StudyReport,
+        results: Results,
+        is_incomplete: bool,
+        format: FormatFlag,
+    ) -> Result<Exit> {
+        let out = results.dir().to_path_buf();
+        report.write(results)?;
+        let width = console::width();
+        let claims = if report.claims.is_empty() { "" } else { ", claims" };
+        let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
+        let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
+        format.print(|| if self.tables { report.text(width) } else { answer() }, || report.json())?;
+        let page = out.join("report.html");
+        tracing::info!("{} files written; start with {}", report.run.files.len() + 1, page.display());
+        Ok(if is_incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 }

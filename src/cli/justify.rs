@@ -7,14 +7,14 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::configured::Configured;
-use super::console::Verbosity;
+use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
 use super::{Exit, ProfileFlags, lists};
-use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
+use crate::report::sampling::HostRecord;
 use crate::run::compare::CompareOptions;
 use crate::run::justify::{JustifyOptions, justify};
 use crate::run::study::StudyOptions;
@@ -119,9 +119,7 @@ impl Justify {
         let folder = OutputDir::open(&self.out, DOSSIER_RECORD)?;
         let executor = opened.executor().with_recheck(config.compare.seed);
         let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;
-        for error in &dossier.left_out {
-            tracing::warn!("{error}; {}", error.help().unwrap_or_default());
-        }
+        console::warn(&dossier.left_out);
         let mut conformance = check_shipped_tables(dossier.parameterization.category, &profile)?;
         conformance.retain(|tally| tally.model.is_none_or(|of| of == model));
         let report = DossierReport {
@@ -129,26 +127,16 @@ impl Justify {
             rules: &options.rules,
             margin: options.compare.enough.margin,
             confidence: options.score.confidence,
-            data: facts.data.clone(),
-            is_synthetic: facts.synthetic,
-            scenarios_sha256: facts.scenarios_sha256.clone(),
+            provenance: &facts,
             profile: &profile,
             conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
             author: self.author.clone(),
             date: self.date.clone(),
-            command: command(),
-            host: opened.host(dossier.summary.rechecked_lanes, started),
+            command: console::command_line(),
+            host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started),
         };
-        let mut results = folder.results()?;
-        results.add("report.html", report.html()?.as_bytes())?;
-        results.add("hidden.csv", &report.hidden_csv()?)?;
-        if let Some(svg) = report.example() {
-            results.add("hidden.svg", svg.as_bytes())?;
-        }
-        let files = results.names();
-        results.publish(report.json(&files)?.as_bytes())?;
-        self.format.print(|| report.text(), || report.json(&files))?;
-        tracing::info!("results written to {}", self.out.display());
+        let files = report.write(folder.results()?)?;
+        self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
         Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
     }
@@ -173,10 +161,4 @@ fn date(text: &str) -> std::result::Result<String, String> {
 
 fn named(tally: &crate::interop::conformance::Tally) -> String {
     tally.model.map_or_else(|| tally.label.clone(), |model| format!("{}, {}", tally.label, model.name()))
-}
-
-/// What was typed, for whoever wants to repeat it.
-pub(super) fn command() -> String {
-    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
-    format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }

@@ -1,26 +1,22 @@
 //! `lanesweep map`: the outcome over two parameters of a category, per panel of others and model.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::dry_run::{BUDGET, DryRun, ForecastPart};
+use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::engine::{Backend, CpuBackend, Executor, Forecast, Verdicts, Wanted, forecast};
 use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
-use crate::run::grid::{
-    self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapParameter,
-    MapResult, PARAMETERS, presets::Presets,
-};
+use crate::run::grid::{self, Against, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
@@ -29,9 +25,6 @@ use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.
 const RECHECK_SEED: u64 = 1;
-
-/// Memory of the sheets that are being drawn, bytes: those of the presets, measured.
-const BYTES_OF_SHEETS: u64 = 3 << 20;
 
 /// Map outcomes over two parameters, and where two models or profiles differ
 ///
@@ -151,24 +144,20 @@ impl Map {
         let against = options.against.clone();
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
-        let wide = self.reference.then(CpuBackend::reference);
-        let backend: &dyn Backend = match &wide {
-            Some(wide) => wide,
-            None => opened.backend(),
-        };
+        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
         if self.dry_run {
-            return forecast_map(&map, backend, self.format);
+            let run = map.forecast(opened.backend())?;
+            return DryRun { run, backend: opened.backend().describe(), before_s: None }.print(self.format);
         }
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
-        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
+        let executor = opened.executor().with_recheck(RECHECK_SEED);
         let bar = console::progress(verbosity, map.cell_count(), "sweeping");
         let started = Instant::now();
         let MapResult { grids, summary } = map.run(&executor, |cells| bar.inc(cells))?;
         bar.finish_and_clear();
         let host = MapHost {
-            backend: backend.describe(),
-            device: opened.device(),
+            backend: opened.backend().describe(),
+            device: opened.device().cloned(),
             sweep: SweepRecord {
                 rechecked_lanes: summary.rechecked_lanes,
                 recheck_seed: RECHECK_SEED,
@@ -206,163 +195,25 @@ impl Map {
                 }
             },
             None => {
-                let parts = match &self.distribution {
-                    Some(path) => self.of_distribution(path, category)?,
-                    None => self.own_grid(category)?,
+                let read = |path: &PathBuf| {
+                    variations(&read_distribution(path)?, &Names { category, renames: &self.rename, path })
                 };
-                self.judge(&parts)?;
+                let text = GridText {
+                    x: self.x.clone(),
+                    y: self.y.clone(),
+                    panel: self.panel.clone(),
+                    set: self.set.clone(),
+                    native_gap: self.native_gap,
+                    closing_only: self.closing,
+                };
+                let parts = text.parts(category, self.distribution.as_ref().map(read).transpose()?)?;
+                let mut doubts = Doubts::new(self.plausibility.policy());
+                parts.check_plausible(&mut doubts)?;
+                doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
                 Grid::new(parts).map(MapGrids::Own)
             }
         }
     }
-
-    /// Looks at every value, and tells what is doubtful.
-    fn judge(&self, parts: &GridParts) -> Result<()> {
-        let mut doubts = Doubts::new(self.plausibility.policy());
-        for axis in [&parts.x, &parts.y].into_iter().chain(&parts.panel_axes) {
-            axis.values.iter().try_for_each(|value| axis.parameter.judge(*value, &mut doubts))?;
-        }
-        parts.fixed.iter().try_for_each(|(parameter, value)| parameter.judge(*value, &mut doubts))?;
-        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        Ok(())
-    }
-
-    fn own_grid(&self, category: Category) -> Result<GridParts> {
-        let axis = |text: &Option<String>, flag: &str| {
-            let text = text.as_deref().ok_or_else(|| {
-                let problem = "it is missing".to_owned();
-                Error::usage(Place::item(flag), problem, "give both --x and --y, or --preset")
-            })?;
-            GridAxis::parse(category, text, flag)
-        };
-        Ok(GridParts {
-            name: category.key().to_owned(),
-            category,
-            x: axis(&self.x, "--x")?,
-            y: axis(&self.y, "--y")?,
-            panel_axes: self
-                .panel
-                .iter()
-                .map(|text| GridAxis::parse(category, text, "--panel"))
-                .collect::<Result<_>>()?,
-            fixed: self.fixed(category)?,
-            style: CaseStyle::Plain,
-            native_gap: self.native_gap,
-            closing_only: self.closing,
-            panel_rows: None,
-        })
-    }
-
-    fn fixed(&self, category: Category) -> Result<Vec<(&'static MapParameter, f64)>> {
-        let fixed = |text: &String| -> Result<(&'static MapParameter, f64)> {
-            let axis = GridAxis::parse(category, text, "--set")?;
-            match axis.values[..] {
-                [value] => Ok((axis.parameter, value)),
-                _ => {
-                    let problem = format!("`{text}` has {} values", axis.len());
-                    Err(Error::usage(Place::item("--set"), problem, "give one, or make it an axis with --panel"))
-                }
-            }
-        };
-        self.set.iter().map(fixed).collect()
-    }
-
-    /// The grid of a file of distributions, with what the flags add.
-    fn of_distribution(&self, path: &Path, category: Category) -> Result<GridParts> {
-        let file = read_distribution(path)?;
-        let found = variations(&file, &Names { category, renames: &self.rename, path })?;
-        let mut left = found.axes;
-        let mut axis = |flag: &Option<String>, name: &str| -> Result<GridAxis> {
-            let named = |left: &mut Vec<GridAxis>, at: Option<usize>| at.map(|at| left.remove(at));
-            match flag.as_deref().map(str::trim) {
-                Some(text) if text.contains('=') => GridAxis::parse(category, text, name),
-                Some(key) => {
-                    let parameter = MapParameter::find(category, key, name)?;
-                    let at = left.iter().position(|axis| axis.parameter == parameter);
-                    named(&mut left, at).ok_or_else(|| {
-                        let problem = format!("the file has no separate distribution of `{key}`");
-                        Error::usage(Place::item(name), problem, format!("give its values: {name} {key}=FROM..TO/STEP"))
-                    })
-                }
-                None => {
-                    let several = left.iter().position(|axis| axis.len() > 1);
-                    let at = several.or(if left.is_empty() { None } else { Some(0) });
-                    named(&mut left, at).ok_or_else(|| {
-                        let problem = "the file has fewer than two parameters with separate distributions";
-                        let help = format!("a map has two axes: give one by {name} NAME=FROM..TO/STEP");
-                        Error::usage(Place::item(name), problem, help)
-                    })
-                }
-            }
-        };
-        // What --y names must not be taken for --x.
-        let (x, y) = if self.x.is_none() && self.y.is_some() {
-            let y = axis(&self.y, "--y")?;
-            (axis(&self.x, "--x")?, y)
-        } else {
-            let x = axis(&self.x, "--x")?;
-            (x, axis(&self.y, "--y")?)
-        };
-        let mut fixed = self.fixed(category)?;
-        fixed.extend(left.iter().filter(|axis| axis.len() == 1).map(|axis| (axis.parameter, axis.values[0])));
-        left.retain(|axis| axis.len() > 1);
-        left.extend(
-            self.panel.iter().map(|text| GridAxis::parse(category, text, "--panel")).collect::<Result<Vec<_>>>()?,
-        );
-        let mut rows = found.set_rows;
-        for axis in &left {
-            if rows.len().saturating_mul(axis.len()) > MAX_PANELS {
-                let help = format!("give fewer values: a sheet has at most {MAX_PANELS} panels");
-                return Err(Error::usage(Place::item("--distribution"), "too many panels", help));
-            }
-            let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();
-            rows = rows.iter().flat_map(|row| axis.values.iter().map(move |v| with(row, *v))).collect();
-        }
-        Ok(GridParts {
-            name: category.key().to_owned(),
-            category,
-            x,
-            y,
-            panel_axes: found.set_axes.into_iter().chain(left).collect(),
-            fixed,
-            style: CaseStyle::Plain,
-            native_gap: self.native_gap,
-            closing_only: self.closing,
-            panel_rows: Some(rows),
-        })
-    }
-}
-
-/// What the maps would be.
-fn forecast_map(map: &grid::Map, backend: &dyn Backend, format: FormatFlag) -> Result<Exit> {
-    let all = map.lane_count();
-    let mut whole = Forecast::default();
-    for plan in map.lane_plans() {
-        let budget = BUDGET.mul_f64(plan.lane_count() as f64 / all.max(1) as f64);
-        whole.add(&forecast(plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
-    }
-    let part = |(other, plan): (Option<&str>, &GridPlan)| ForecastPart {
-        of: plan.grid.name().to_owned(),
-        what: other.map_or(String::new(), |name| format!("under {name}")),
-        units: plan.grid.cell_count() as u64,
-        lanes: plan.lane_count(),
-    };
-    let parts = map.plans().map(part).collect();
-    DryRun {
-        data: "the grids' own cases".to_owned(),
-        parts,
-        units: "cells",
-        is_at_most: false,
-        // A verdict per cell and model, and the sheets drawn of them.
-        more_bytes: all * (size_of::<Verdicts>() as u64 + 1) + BYTES_OF_SHEETS,
-        more: "verdicts and sheets",
-        forecast: Some(whole),
-        backend: backend.describe(),
-        before: None,
-        besides: "drawing and writing the sheets",
-    }
-    .print(format)?;
-    Ok(Exit::Ok)
 }
 
 fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {

@@ -5,18 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Exit;
-use super::format::FormatFlag;
-use super::sample_run;
-use super::study_run::{Host, TablesFlag, finish_study};
+use super::format::{FormatFlag, TablesFlag};
+use crate::Result;
 use crate::interop::cluster::quoted_word;
-use crate::report::run_record::Timings;
-use crate::run::parts::{PLAN_FILE, Shard, kind_of};
-use crate::run::sampling::Sample;
-use crate::run::study::Study;
-use crate::support::files::check_folder;
-use crate::support::readable::counted;
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
-use crate::{Error, Place, Result};
+use crate::report::run_record::StudyHost;
+use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::report::study::StudyReport;
+use crate::run::merge::{Merged, merge};
+use crate::run::parts::PLAN_FILE;
 
 /// Merge the parts of a run into its result
 ///
@@ -37,58 +33,22 @@ pub struct Merge {
 }
 
 impl Merge {
-    /// Why there is nothing to merge.
-    fn no_parts(&self) -> Error {
-        let has = |name: &str| self.dir.join(name).exists();
-        let names = || std::fs::read_dir(&self.dir).into_iter().flatten().flatten().map(|entry| entry.file_name());
-        let (problem, help) = if !self.dir.is_dir() {
-            ("there is no such folder", "check the path for typing errors")
-        } else if has("run.json") || has("estimate.json") {
-            ("there is nothing to merge: this is the result of an unsplit run", "give the folder of a run in parts")
-        } else if names().any(|name| name.to_string_lossy().ends_with(".journal")) {
-            ("there is nothing to merge: an unsplit run was interrupted here", "run its command again: it continues")
-        } else {
-            ("there is nothing to merge: plan.json is missing", "give the folder of the parts")
-        };
-        Error::input(Place::file(&self.dir), problem, help)
-    }
-
     pub fn run(&self) -> Result<Exit> {
-        let plan = self.dir.join(PLAN_FILE);
-        check_folder(&self.dir)?;
-        if !plan.exists() {
-            return Err(self.no_parts());
-        }
-        let kind = kind_of(&plan)?;
-        let [plan_word, out] = [&plan, &self.dir].map(|path| quoted_word(&path.display().to_string()));
-        let again = |verb: &'static str| {
-            move |shard: Shard| format!("lanesweep {verb} --plan {plan_word} --shard {shard} --out {out}")
-        };
-        match kind.as_str() {
-            Study::KIND => merge_study(
-                &OutputDir::open(&self.dir, STUDY_RECORD)?,
-                &again("study"),
-                (self.format, self.tables.tables),
-            ),
-            kind if Sample::is_kind(kind) => {
-                sample_run::merge(&OutputDir::open(&self.dir, ESTIMATE_RECORD)?, &again("sample"), self.format)
+        let [plan, out] = [&self.dir.join(PLAN_FILE), &self.dir].map(|path| quoted_word(&path.display().to_string()));
+        let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
+        let (folder, merged) = merge(&self.dir, &again)?;
+        match merged {
+            Merged::Study(study, result) => {
+                let report = StudyReport::of(&study, &result.counts, None, StudyHost::of_parts(&result))?;
+                self.tables.finish(report, folder.results()?, study.facts().incomplete, self.format)
             }
-            other => {
-                let help = "give the folder (--out) of a run in parts";
-                Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
+            Merged::Sample(sample, result) => {
+                let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
+                let mut file = EstimateFile::of_sample(&sample, &result, host)?;
+                file.write(folder.results()?, &sample, &result)?;
+                self.format.print_results(|| file.text(), || file.json(), &self.dir)?;
+                Ok(Exit::Ok)
             }
         }
     }
-}
-
-fn merge_study(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: (FormatFlag, bool)) -> Result<Exit> {
-    let (study, result) = Study::merge_or(folder.dir(), again)?;
-    let host = Host {
-        backend: format!("{} merged", counted(result.parts, "part")),
-        device: None,
-        swept: result.summary,
-        timings: Timings::default(),
-        settings: Vec::new(),
-    };
-    finish_study(&study, &result.counts, None, host, folder.results()?, format)
 }

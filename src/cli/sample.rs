@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::ProfileFlags;
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
@@ -15,7 +15,7 @@ use crate::cli::settings::SampleSettings;
 pub(super) use crate::cli::settings::{
     EstimatorKind as EstimatorFlag, IntervalKind as IntervalFlag, PointKind as PointsFlag,
 };
-use crate::engine::Headway;
+use crate::engine::{Headway, OpenBackend};
 use crate::interop::openscenario::Rename;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -149,7 +149,7 @@ impl Sample {
         self.seed
     }
 
-    pub(super) fn open(&self) -> Result<Opened> {
+    pub(super) fn open(&self) -> Result<OpenBackend> {
         self.backend.open()
     }
 

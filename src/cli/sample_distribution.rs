@@ -8,19 +8,18 @@ use super::Exit;
 use super::console::{self, Verbosity};
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
-use super::sample_lanes;
-use crate::engine::{Headway, LanePlan, LaneRunner};
+use crate::engine::Headway;
 use crate::interop::openscenario::{DistributionSamples, SampledFile};
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
-use crate::report::sampling_tables::{WorstRow, convergence_csv};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;
-use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
+use crate::run::sampling::{CrudeOptions, TallyOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::hex::sha256;
 use crate::support::plausibility::Doubts;
 use crate::support::readable;
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
 /// Samples what a file says.
@@ -93,7 +92,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         seed,
         given: Vec::new(),
     };
-    let host = opened.host(crude.summary.rechecked_lanes, started);
+    let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started);
     let record = record(&sampled, &samples);
     let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
     file.plan_sha256 = Some(plan.hash().to_owned());
@@ -103,9 +102,16 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         draws.rejected_share = (tries - count) as f64 / tries as f64;
     }
     file.draws = Some(draws);
-    write(folder.results()?, &sampled, &samples, &plan, &crude, &counting, &mut file)?;
-    flags.format.print(|| file.text(), || file.json())?;
-    tracing::info!("results written to {}", flags.out.display());
+    let mut results = folder.results()?;
+    results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
+    let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
+    file.add_worst(&mut results, &plan, &crude.tally, &counting, &names, |key| {
+        let point = samples.draw(seed, key.unit, &plan.profile)?.values;
+        Ok((point, samples.has_distance().then(|| "sampled".to_owned())))
+    })?;
+    results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
+    file.publish(results, Vec::new())?;
+    flags.format.print_results(|| file.text(), || file.json(), &flags.out)?;
     Ok(Exit::Ok)
 }
 
@@ -145,48 +151,4 @@ fn record(sampled: &SampledFile, samples: &DistributionSamples) -> DensityRecord
             left_out: 0,
         },
     }
-}
-
-/// Tables, page and record.
-fn write(
-    mut results: Results,
-    sampled: &SampledFile,
-    samples: &DistributionSamples,
-    plan: &LanePlan,
-    crude: &CrudeRun,
-    counting: &TallyOptions,
-    file: &mut EstimateFile,
-) -> Result<()> {
-    results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
-    if counting.worst > 0 {
-        let runner = LaneRunner::<f32>::new(plan);
-        let missing = |lane: u64| Error::Internal(format!("lane {lane} is not in the plan"));
-        let mut found = Vec::new();
-        for (model, lanes) in crude.tally.worst.iter().enumerate() {
-            for (at, &lane) in lanes.iter().enumerate() {
-                let key = plan.key(lane.lane).ok_or_else(|| missing(lane.lane))?;
-                let point = samples.draw(file.seed, key.unit, &plan.profile)?.values;
-                found.push((model, at + 1, lane, key, point, runner.run(&key).widen()));
-            }
-        }
-        let mut rows: Vec<WorstRow> = Vec::new();
-        for (model, rank, lane, key, point, outcome) in &found {
-            let headway =
-                if samples.has_distance() { "sampled".to_owned() } else { plan.headways[key.headway].to_string() };
-            rows.push(WorstRow {
-                rank: *rank,
-                lane: *lane,
-                key: plan.key_text(key),
-                sample: key.unit,
-                model: plan.models[*model],
-                headway,
-                point: Vec::clone(point),
-                outcome,
-            });
-        }
-        let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        sample_lanes::add_worst(&mut results, &rows, &names, counting.criterion, file)?;
-    }
-    results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
-    sample_lanes::publish_estimates(results, file, Vec::new())
 }

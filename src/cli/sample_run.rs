@@ -3,25 +3,25 @@
 use std::time::Instant;
 
 use super::Exit;
-use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_checks::{guard, only_crude};
 use super::sample_distribution;
-use super::sample_forecast::forecast_sample;
-use super::sample_lanes::{self, RowTable};
-use crate::engine::Executor;
-use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
-use crate::run::parts::{PLAN_FILE, Shard};
+use crate::engine::{Chunk, Executor, OpenBackend};
+use crate::report::lanes;
+use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::run::parts::PLAN_FILE;
 use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::{self, SampleKind, SampleResult, conditional, proposal_text};
+use crate::run::sampling::{self, SampleKind, SampleResult, conditional};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
+use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
 
 /// A condition that so few scenarios are near is outside the data.
@@ -82,12 +82,13 @@ impl Sample {
     fn run_sample(
         &self,
         sample: sampling::Sample,
-        opened: &Opened,
+        opened: &OpenBackend,
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
         if self.dry_run {
-            return forecast_sample(&sample, opened, self.format);
+            let (run, backend) = (sample.forecast(&opened.executor())?, opened.backend().describe());
+            return DryRun { run, backend, before_s: None }.print(self.format);
         }
         if self.shards.plan_only || self.shards.is_part() {
             sample.write_plan(&self.out)?;
@@ -101,7 +102,7 @@ impl Sample {
             let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
-            return write(&sample, result, opened.host(0, started), results, self.format);
+            return write(&sample, &result, HostRecord::of(opened, 0, started), results, self.format);
         }
         let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
@@ -117,7 +118,7 @@ impl Sample {
     fn run_split(
         &self,
         sample: &sampling::Sample,
-        opened: &Opened,
+        opened: &OpenBackend,
         executor: &Executor,
         started: Instant,
         verbosity: Verbosity,
@@ -133,27 +134,31 @@ impl Sample {
         let missing = run.missing()?;
         tracing::info!("{} samples on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
-        let rows = self.rows.as_deref().filter(|_| !is_empty);
-        let mut rows = rows.and_then(|path| Some(RowTable::create(path, sample.lane_plan()?, sample.density())));
+        let (density, lane_plan) = (sample.density(), sample.lane_plan());
+        let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
+        let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density)).transpose()?;
         let bar = console::progress(verbosity, missing, "sampling");
-        let mut table = rows.take().transpose()?;
-        let sampled = match &mut table {
-            Some(table) => run.sample(executor, &mut |samples| bar.inc(samples), Some(&mut |chunk| table.add(chunk))),
-            None => run.sample(executor, &mut |samples| bar.inc(samples), None),
+        let mut progress = |samples| bar.inc(samples);
+        let sampled = match table.as_mut().zip(lane_plan) {
+            Some((table, plan)) => {
+                let mut each = |chunk: &Chunk| lanes::write_sampled_chunk(table, plan, density, chunk);
+                run.sample(executor, &mut progress, Some(&mut each))
+            }
+            None => run.sample(executor, &mut progress, None),
         };
         bar.finish_and_clear();
         sampled?;
-        let rows = table.map(RowTable::stage).transpose()?;
+        let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;
             run.write_part()?;
             return Ok(Exit::Ok);
         }
         let result = run.take_result()?;
-        let host = opened.host(result.rechecked_lanes, started);
+        let host = HostRecord::of(opened, result.rechecked_lanes, started);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
-        let exit = write(sample, result, host, results, self.format)?;
+        let exit = write(sample, &result, host, results, self.format)?;
         run.close()?;
         Ok(exit)
     }
@@ -178,39 +183,17 @@ fn warn(planned: &CrudePlan) -> Result<()> {
     Ok(())
 }
 
-/// Makes the result of the parts in a folder; `again` gives the command that makes a shard.
-pub(super) fn merge(folder: &OutputDir, again: &dyn Fn(Shard) -> String, format: FormatFlag) -> Result<Exit> {
-    let (sample, result) = sampling::Sample::merge_or(folder.dir(), again)?;
-    let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
-    write(&sample, result, host, folder.results()?, format)
-}
-
-/// Tables, figures, the record.
+/// Writes and prints the result.
 fn write(
     sample: &sampling::Sample,
-    result: SampleResult,
+    result: &SampleResult,
     host: HostRecord,
-    mut results: Results,
+    results: Results,
     format: FormatFlag,
 ) -> Result<Exit> {
-    let (out, density) = (results.dir().to_path_buf(), sample.density());
-    let mut file = EstimateFile::new(density, RunFacts::of(sample), result.rows, host)?;
-    let mut figures = Vec::new();
-    if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
-        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting(), &mut file)?;
-        file.plan_sha256 = Some(planned.plan.hash().to_owned());
-        file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
-    }
-    file.levels = result.levels;
-    if sample.has_given_proposals() {
-        // A proposal in this folder may be one that was given.
-        results.keep(|name| name.starts_with("proposal-"))?;
-    }
-    for (model, proposal) in &result.proposals {
-        results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;
-    }
-    sample_lanes::write_estimates(results, density, &mut file, figures)?;
-    format.print(|| file.text(), || file.json())?;
-    tracing::info!("results written to {}", out.display());
+    let out = results.dir().to_path_buf();
+    let mut file = EstimateFile::of_sample(sample, result, host)?;
+    file.write(results, sample, result)?;
+    format.print_results(|| file.text(), || file.json(), &out)?;
     Ok(Exit::Ok)
 }

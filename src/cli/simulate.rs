@@ -15,7 +15,7 @@ use crate::model::criterion::Criterion;
 use crate::report::records;
 use crate::report::trace::{self, TraceFigure, TraceSeries};
 use crate::run::reopen::{Reopened, TracedLane};
-use crate::support::files::{make_folder, write_atomically};
+use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::readable::value;
 use crate::support::run_dir::is_listed;
 use crate::{Error, Place, Result};
@@ -94,9 +94,7 @@ impl Simulate {
         let named: Vec<(String, &Trace)> = lanes.traced.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect();
         if let Some(path) = &self.plot {
             // Before the table: a reader of stdout that ends early must not cost the figure.
-            if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-                make_folder(dir)?;
-            }
+            make_folder_of(path)?;
             write_atomically(path, figure(&lanes, self.plot_end).svg().as_bytes())?;
         }
         self.format.print(|| trace::table(&named).csv(), || document(&lanes, &named))?;

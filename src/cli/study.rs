@@ -5,31 +5,28 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun};
-use super::format::FormatFlag;
+use super::dry_run::DryRun;
+use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
-use crate::model::criterion::Criterion;
+use crate::engine::{Headway, OpenBackend};
 use crate::model::profile::Profile;
-use crate::report::lanes::Digits;
-use crate::report::run_record::Timings;
+use crate::report::lanes::{self, table_format};
+use crate::report::reference::ReferenceComparison;
+use crate::report::run_record::{StudyHost, Timings};
+use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
+use crate::run::study::{self, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::traffic::Source;
-
-/// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
-const FORECAST_BYTES: u64 = 64 << 20;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -136,10 +133,10 @@ impl Study {
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
-            let opened = self.backend.open()?;
+            let mut opened = self.backend.open()?;
             let study = study::Study::read(path, self.shards.shard)?;
             if study.facts().reference {
-                self.backend.none_but("--reference")?;
+                opened = self.backend.reference()?;
             }
             if self.dry_run {
                 return self.forecast(&study, &opened, None);
@@ -148,7 +145,7 @@ impl Study {
         }
         if self.shards.plan_only {
             if self.reference {
-                self.backend.none_but("--reference")?;
+                self.backend.reference()?;
             }
             let (study, _) = self.prepare(configured, verbosity)?;
             study.write_plan(&self.out)?;
@@ -156,7 +153,7 @@ impl Study {
             return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
@@ -214,56 +211,28 @@ impl Study {
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
-        for left_out in study.cases().left_out() {
-            tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
-        }
+        console::warn(study.cases().left_out());
         Ok((study, timings))
     }
 
     /// What the run would be.
-    fn forecast(&self, study: &study::Study, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
-        let plan = study.plan();
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
-        let mut forecast =
-            forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
-        forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
-        forecast.lanes = plan.lane_count();
-        // The counts of every unit, in the ledger and joined.
-        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
-        let of_unit = size_of::<Confusion<u32>>() as u64;
-        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
-        DryRun {
-            data: study.facts().data.clone(),
-            parts: dry_run::parts(plan),
-            units: "scenarios",
-            is_at_most: false,
-            more_bytes: plan.blocks.iter().map(counts).sum::<u64>()
-                + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
-            more: "counts and the series of a window",
-            forecast: Some(forecast),
-            backend: backend.describe(),
-            before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
-            besides: "scores, figures, the plan file; --rows and --compare-reference",
-        }
-        .print(self.format)?;
-        Ok(Exit::Ok)
+    fn forecast(&self, study: &study::Study, opened: &OpenBackend, before_s: Option<f64>) -> Result<Exit> {
+        let backend = opened.backend();
+        DryRun { run: study.forecast(backend)?, backend: backend.describe(), before_s }.print(self.format)
     }
 
     /// From a plan to a report, or to a part of one.
     fn sweep(
         &self,
         study: &study::Study,
-        opened: &Opened,
+        opened: &OpenBackend,
         configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Exit> {
         let plan = study.plan();
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(study.facts().score.seed);
+        let backend = opened.backend();
+        let executor = opened.executor().with_recheck(study.facts().score.seed);
         if self.shards.is_part() {
             study.write_plan(&self.out)?;
         }
@@ -285,24 +254,24 @@ impl Study {
         let StudyResult { counts, summary: mut swept, .. } = run.take_result()?;
         let mut results = run.results()?;
         if let Some(path) = &self.rows {
-            let digits = if study.facts().reference { Digits::Binary64 } else { Digits::Binary32 };
-            let (again, table) = write_lanes(path, study.cases(), &executor, digits, study.facts().synthetic)?;
+            let (again, table) = lanes::write_study(path, study, &executor)?;
             swept.add(&again);
             results.join(table);
         }
-        let comparison = self.compare_reference.then(|| compare_reference(study.cases())).transpose()?;
-        let host = Host {
+        let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
+        let host = StudyHost {
             backend: match (executor.fallback, swept.redone_lanes) {
                 (Some(stand_in), 1..) => format!("{}; after its failure {}", backend.describe(), stand_in.describe()),
                 _ => backend.describe(),
             },
-            device: opened.device(),
+            device: opened.device().cloned(),
             swept,
             timings,
             settings: configured.record(),
         };
         self.leave_plan(study, &mut results)?;
-        let exit = finish_study(study, &counts, comparison, host, results, (self.format, self.tables.tables))?;
+        let report = StudyReport::of(study, &counts, comparison, host)?;
+        let exit = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
         Ok(exit)
     }
@@ -331,7 +300,7 @@ impl Study {
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;
-        lane_format(lanes)?;
+        table_format(lanes)?;
         self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
     }
 }

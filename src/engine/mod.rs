@@ -19,6 +19,7 @@ pub mod gpu;
 mod lane;
 pub(crate) mod lane_case;
 mod lane_step;
+mod open;
 mod outcome;
 mod packed_counts;
 mod partial;
@@ -48,6 +49,9 @@ pub use lane::{Observer, Silent, Step, run_lane};
 pub(crate) use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther};
 pub use lane_step::Seen;
+#[cfg(not(feature = "gpu"))]
+pub(crate) use open::no_gpu;
+pub use open::{DeviceRecord, OpenBackend};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Partial, UnitCounts};
 pub use plan::{Block, CLOSE_HEADWAY_S, CaseSource, Headway, LaneKey, LanePlan};

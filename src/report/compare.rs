@@ -12,12 +12,14 @@ use super::tables::{WIDTH, aligned, table, wrap};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
+use crate::run::compare::Compare;
 use crate::run::sampling::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate,
 };
 use crate::run::score::f1;
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
+use crate::support::run_dir::Results;
 use crate::traffic::Driven;
 use crate::{Error, Result};
 
@@ -63,6 +65,57 @@ pub struct CompareFile {
 }
 
 impl CompareFile {
+    /// Of a comparison and its rates.
+    pub fn of(
+        compare: &Compare,
+        categories: Vec<CategoryComparison>,
+        left_out: Vec<String>,
+        host: HostRecord,
+    ) -> CompareFile {
+        let (plan, options, provenance) = (compare.lane_plan(), compare.options(), compare.provenance().clone());
+        CompareFile {
+            lanesweep_comparison: 1,
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            data: provenance.data,
+            synthetic: provenance.synthetic,
+            scenarios_sha256: provenance.scenarios_sha256,
+            driven: provenance.driven,
+            profile: plan.profile.name.clone(),
+            models: plan.models.clone(),
+            headways: plan.headways.iter().map(Headway::to_string).collect(),
+            samples: options.samples,
+            seed: options.seed,
+            level: Compare::LEVEL,
+            enough: options.enough,
+            study_plan_sha256: plan.hash().to_owned(),
+            left_out,
+            categories,
+            files: Vec::new(),
+            host,
+        }
+    }
+
+    /// Puts tables, figures and page into their folder, the record last.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&mut self, mut results: Results) -> Result<()> {
+        results.add("compare.csv", &self.csv()?)?;
+        results.add("compare.txt", self.text().as_bytes())?;
+        let mut figures = Vec::new();
+        for comparison in &self.categories {
+            for criterion in Criterion::ALL {
+                let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
+                let svg = rates(self, comparison, criterion).figure().svg();
+                results.add(&name, svg.as_bytes())?;
+                figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
+            }
+        }
+        results.add("report.html", self.html(figures)?.as_bytes())?;
+        self.files = results.names();
+        results.publish(self.json()?.as_bytes())
+    }
+
     /// As JSON. What is not finite is null.
     ///
     /// # Errors

@@ -12,6 +12,8 @@ use crate::run::justify::{Conclusion, Dossier, Finding, REGULATION, Rules, Score
 use crate::run::sampling::RateRecord;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
+use crate::support::run_dir::Results;
+use crate::traffic::DataProvenance;
 use crate::{Error, Result};
 
 /// Hidden failures on the page at most; `hidden.csv` has all.
@@ -27,12 +29,8 @@ pub struct DossierReport<'a> {
     pub margin: f64,
     /// Confidence of the intervals.
     pub confidence: f64,
-    /// What the scenarios are.
-    pub data: String,
-    /// The data are the program's own.
-    pub is_synthetic: bool,
-    /// SHA-256 of the scenarios.
-    pub scenarios_sha256: String,
+    /// What the scenarios are of.
+    pub provenance: &'a DataProvenance,
     /// Profile.
     pub profile: &'a Profile,
     /// Conformance tables of this category and profile that ship with the program: what, rows, passes.
@@ -48,6 +46,21 @@ pub struct DossierReport<'a> {
 }
 
 impl DossierReport<'_> {
+    /// Puts page, table and figure into their folder, the record last; returns the names of the files beside it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`].
+    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+        results.add("report.html", self.html()?.as_bytes())?;
+        results.add("hidden.csv", &self.hidden_csv()?)?;
+        if let Some(svg) = self.example() {
+            results.add("hidden.svg", svg.as_bytes())?;
+        }
+        let files = results.names();
+        results.publish(self.json(&files)?.as_bytes())?;
+        Ok(files)
+    }
+
     pub(super) fn findings(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let header = ["quantity", "rule", "result", "value", "interval", "more data"];
         let row = |finding: &Finding| {
@@ -156,7 +169,8 @@ impl DossierReport<'_> {
             TraceSeries { name: key.to_string(), trace: parameterized },
         ];
         let title = format!("Hidden failure: {}, headway {}", hidden.scenario, hidden.headway);
-        let subtitle = format!("{}, profile {}; {}", self.dossier.model.name(), self.profile.name, self.data);
+        let subtitle =
+            format!("{}, profile {}; {}", self.dossier.model.name(), self.profile.name, self.provenance.data);
         Some(TraceFigure { title, subtitle: Some(subtitle), series, until_s: None }.svg())
     }
 
@@ -178,7 +192,7 @@ impl DossierReport<'_> {
         };
         format!(
             "{}\n{}\n{need}\n{}{hidden}\nThe alternatives\n{}",
-            self.data,
+            self.provenance.data,
             sentences.join("\n"),
             rows(self.findings(), 3),
             rows(self.alternatives(), 2)
@@ -260,9 +274,9 @@ impl DossierReport<'_> {
             self.conformance.iter().map(|(what, rows, passes)| json!({"what": what, "rows": rows, "passes": passes}));
         records::document(&json!({
             "program": program(),
-            "data": self.data,
-            "synthetic": self.is_synthetic,
-            "scenarios_sha256": self.scenarios_sha256,
+            "data": self.provenance.data,
+            "synthetic": self.provenance.synthetic,
+            "scenarios_sha256": self.provenance.scenarios_sha256,
             "profile": self.profile,
             "parameterization": dossier.parameterization.key,
             "category": dossier.parameterization.category.key(),

@@ -12,13 +12,13 @@ impl DossierReport<'_> {
     /// [`Error::Internal`] where the template does not fit: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let mut warnings = Vec::new();
-        if self.is_synthetic {
+        if self.provenance.synthetic {
             warnings.push("SYNTHETIC DATA: nothing on this page is a statement about real traffic.".to_owned());
         }
         let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             program: program(),
-            lead: format!("{}. {} {}", self.answer(), self.recall(), self.data),
+            lead: format!("{}. {} {}", self.answer(), self.recall(), self.provenance.data),
             warnings,
             sections: vec![
                 self.conclusion_section(),
@@ -189,8 +189,8 @@ impl DossierReport<'_> {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
                 ("program".to_owned(), format!("{}, engine {}", program(), crate::engine::ENGINE_VERSION)),
-                ("data".to_owned(), self.data.clone()),
-                ("SHA-256 of the scenarios".to_owned(), self.scenarios_sha256.clone()),
+                ("data".to_owned(), self.provenance.data.clone()),
+                ("SHA-256 of the scenarios".to_owned(), self.provenance.scenarios_sha256.clone()),
                 ("SHA-256 of the plan".to_owned(), self.dossier.plan_sha256.clone()),
                 ("SHA-256 of the density".to_owned(), density),
                 ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),

@@ -1,14 +1,64 @@
 //! One row per lane: verdicts, continuous values and times. The lanes of a study have the columns of the golden lanes,
 //! those of a sampling run their point; void samples have no row.
 
+use std::path::Path;
+
 use rayon::prelude::*;
 
-use crate::engine::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
+use crate::engine::{
+    Chunk, Constants, Executor, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start, SweepSummary, Wanted,
+};
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
+use crate::run::study::Study;
 use crate::stats::density::DensityModel;
-use crate::support::table::{Cell, Column, ColumnKind, TableWriter};
+use crate::support::atomic_file::StagedFile;
+use crate::support::files::make_folder_of;
+use crate::support::table::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter};
 use crate::{Error, Result};
+
+/// Writes one row per lane of a study, chunk by chunk, so that memory does not grow with the lanes. The table gets its
+/// name with the study's other results.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Usage`] for a name that is no table's; of the lanes.
+pub(crate) fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
+    make_folder_of(path)?;
+    let (plan, facts) = (study.plan(), study.facts());
+    let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };
+    let mut table = create(path, "lanes", plan, facts.synthetic, columns(digits))?;
+    let swept = study
+        .cases()
+        .sweep(0..plan.unit_count(), Wanted::Outcomes, executor, |plan, chunk| write_chunk(&mut table, plan, &chunk))?;
+    Ok((swept, table.stage()?))
+}
+
+/// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Usage`] for a name that is no table's.
+pub fn sampled_table(path: &Path, plan: &LanePlan, density: &DensityModel) -> Result<TableWriter> {
+    create(path, "samples", plan, density.provenance.synthetic, sampled_columns(density))
+}
+
+/// The format of a table of lanes by its file's name.
+///
+/// # Errors
+/// [`Error::Usage`] for a name that is no table's.
+pub fn table_format(path: &Path) -> Result<TableFormat> {
+    TableFormat::of(path, &TableFormat::EVERY, "option `rows`")
+}
+
+fn create(
+    path: &Path,
+    table: &'static str,
+    plan: &LanePlan,
+    synthetic: bool,
+    columns: Vec<Column>,
+) -> Result<TableWriter> {
+    let (profile, plan_sha256) = (Some(plan.profile.name.clone()), Some(plan.hash().to_owned()));
+    TableWriter::create(path, table_format(path)?, columns, &TableFacts { table, profile, plan_sha256, synthetic })
+}
 
 /// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -28,6 +28,7 @@ pub mod records;
 pub mod reference;
 pub mod run_record;
 pub mod sampling;
+mod sampling_files;
 mod sampling_page;
 pub mod sampling_tables;
 pub mod study;

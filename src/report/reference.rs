@@ -2,8 +2,10 @@
 //! threshold each lies.
 
 use super::records::{Table, whole, words};
-use crate::engine::{Chunk, LanePlan, Outcome};
+use crate::Result;
+use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
 use crate::model::criterion::Criterion;
+use crate::run::study::{StudyCases, WINDOW};
 use crate::support::readable::{count, count_of};
 use crate::support::table::Cell;
 
@@ -32,6 +34,24 @@ pub struct ReferenceComparison {
 }
 
 impl ReferenceComparison {
+    /// Runs every lane of a study in f32 and in f64, chunk by chunk.
+    ///
+    /// # Errors
+    /// Of the lanes.
+    pub fn of_study(study: &StudyCases) -> Result<ReferenceComparison> {
+        let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
+        let mut comparison = ReferenceComparison::default();
+        study.in_windows(0..study.outline().unit_count(), WINDOW, |plan, window| {
+            let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
+            for units in chunks(plan, window) {
+                let reference = wide.run(units.clone(), Wanted::Outcomes)?;
+                comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
+            }
+            Ok(())
+        })?;
+        Ok(comparison)
+    }
+
     /// Takes two chunks of the same units into account.
     pub fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
         let thresholds = (plan.profile.criteria.ttc_threshold_s, plan.profile.criteria.btn_threshold);

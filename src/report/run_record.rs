@@ -3,12 +3,14 @@
 
 use serde::Serialize;
 
-use crate::engine::Headway;
+use crate::engine::{Block, DeviceRecord, ENGINE_VERSION, Headway, SweepSummary};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::sampling::{Sample, SampleHeadways, SampleKind};
-use crate::run::score::ScoreOptions;
+use crate::run::score::{ScoreOptions, ScoreTable, f1};
+use crate::run::study::{CategoryFacts, Study, StudyResult};
 use crate::scenario::parameterization::ParameterizationOptions;
+use crate::support::readable::counted;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Error, Result};
 
@@ -44,30 +46,6 @@ pub struct Timings {
     pub sweep_s: f64,
     /// Scores and claims.
     pub score_s: f64,
-}
-
-/// The device that computed the lanes, where one did.
-#[derive(Debug, Clone, Serialize)]
-pub struct DeviceRecord {
-    /// Name.
-    pub name: String,
-    /// Interface: Vulkan, Metal, DX12, GL.
-    pub api: &'static str,
-    /// Driver and its version.
-    pub driver: String,
-    /// Place on the PCI bus, where it is known.
-    pub pci_bus_id: Option<String>,
-    /// Float operations reached the driver as written.
-    pub exact_path: bool,
-}
-
-impl DeviceRecord {
-    /// In one line, as pages show it.
-    pub(super) fn line(&self) -> String {
-        let path = if self.exact_path { "exact path" } else { "plain path" };
-        let at = self.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
-        format!("{} ({}, {}{at}, {path})", self.name, self.api, self.driver)
-    }
 }
 
 /// How the sweep went.
@@ -142,7 +120,67 @@ pub struct RunRecord {
     pub timings: Timings,
 }
 
+/// What belongs to the machine and the command, not to the result of a study.
+pub struct StudyHost {
+    /// What computed the lanes.
+    pub backend: String,
+    /// The device, where one did.
+    pub device: Option<DeviceRecord>,
+    /// How the sweep went.
+    pub swept: SweepSummary,
+    /// Seconds of the parts of the run.
+    pub timings: Timings,
+    /// What was configured.
+    pub settings: Vec<SettingRecord>,
+}
+
+impl StudyHost {
+    /// Of merged parts, which had machines and commands of their own.
+    pub fn of_parts(result: &StudyResult) -> StudyHost {
+        StudyHost {
+            backend: format!("{} merged", counted(result.parts, "part")),
+            device: None,
+            swept: result.summary,
+            timings: Timings::default(),
+            settings: Vec::new(),
+        }
+    }
+}
+
 impl RunRecord {
+    /// Of a study and its scores.
+    pub fn of(study: &Study, scores: &ScoreTable, host: StudyHost) -> RunRecord {
+        let (plan, facts) = (study.plan(), study.facts().clone());
+        RunRecord {
+            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            engine: ENGINE_VERSION,
+            data: facts.data,
+            synthetic: facts.synthetic,
+            backend: host.backend,
+            device: host.device,
+            sweep: SweepRecord {
+                rechecked_lanes: host.swept.rechecked_lanes,
+                recheck_seed: facts.score.seed,
+                redone_lanes: host.swept.redone_lanes,
+                device_s: host.swept.device_s,
+            },
+            plan_sha256: plan.hash().to_owned(),
+            scenario_file_sha256: facts.scenario_file_sha256,
+            left_out: facts.left_out,
+            notes: facts.notes,
+            recordings: facts.recordings,
+            categories: category_records(study, scores),
+            lanes: plan.lane_count(),
+            profile: plan.profile.clone(),
+            mining: facts.mining,
+            parameterization: facts.parameterization,
+            score: facts.score,
+            settings: host.settings,
+            files: Vec::new(),
+            timings: host.timings,
+        }
+    }
+
     /// As JSON.
     pub fn to_json(&self) -> Result<Vec<u8>> {
         let mut text =
@@ -150,6 +188,25 @@ impl RunRecord {
         text.push(b'\n');
         Ok(text)
     }
+}
+
+fn category_records(study: &Study, scores: &ScoreTable) -> Vec<CategoryRecord> {
+    let plan = study.plan();
+    let record = |(block, of): (&Block, &CategoryFacts)| {
+        let scored = scores.categories.iter().find(|c| c.category == block.category);
+        let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
+        CategoryRecord {
+            category: block.category.key(),
+            found: of.found,
+            kept: of.kept,
+            variants: block.variants.clone(),
+            lanes: plan.lanes_per_unit(block) * block.units.len(),
+            capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
+            undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
+            svd_explained: of.svd_explained.clone(),
+        }
+    };
+    plan.blocks.iter().zip(&study.facts().categories).map(record).collect()
 }
 
 /// What a run was asked for.

@@ -1,15 +1,15 @@
 //! A sampling run as files and as text.
 
 use std::fmt::Write;
+use std::time::Instant;
 
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
-use super::run_record::DeviceRecord;
 pub use super::run_record::RunFacts;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::engine::generated::ATTEMPTS;
-use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
+use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
@@ -108,6 +108,17 @@ pub struct HostRecord {
 }
 
 impl HostRecord {
+    /// Of what computed a run that began at this instant.
+    pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant) -> Self {
+        HostRecord {
+            backend: opened.backend().describe(),
+            device: opened.device().cloned(),
+            rechecked_lanes,
+            seconds: started.elapsed().as_secs_f64(),
+            threads: rayon::current_num_threads(),
+        }
+    }
+
     /// Of the parts of a run that were merged.
     pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Self {
         let threads = rayon::current_num_threads();

@@ -5,20 +5,21 @@ use super::plot::Figure;
 use super::radar::{RadarChart, RadarSeries};
 use super::records::document;
 use super::reference::ReferenceComparison;
-use super::run_record::RunRecord;
+use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
     HeadwayFailures, distributions, f1_by_parameters, legend_name, modes, recall_and_precision,
 };
 use super::{csv, tables};
 use crate::Result;
-use crate::engine::{CLOSE_HEADWAY_S, Headway};
+use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
-    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, f1, published_failures, published_lvd_f1,
+    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, best_parameterizations, f1, judge_claims,
+    published_failures, published_lvd_f1,
 };
-use crate::run::study::ParameterHistogram;
+use crate::run::study::{CategoryFacts, ParameterHistogram, Study};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
@@ -58,6 +59,36 @@ pub struct StudyReport {
 }
 
 impl StudyReport {
+    /// Of the counts of all lanes.
+    ///
+    /// # Errors
+    /// As [`Study::score`].
+    pub fn of(
+        study: &Study,
+        counts: &Partial,
+        comparison: Option<ReferenceComparison>,
+        mut host: StudyHost,
+    ) -> Result<StudyReport> {
+        let (plan, facts) = (study.plan(), study.facts());
+        let started = std::time::Instant::now();
+        let scores = study.score(counts)?;
+        host.timings.score_s = started.elapsed().as_secs_f64();
+        let run = RunRecord::of(study, &scores, host);
+        let claims = judge_claims(&scores, plan, counts);
+        let best = best_parameterizations(&scores, plan, counts, Criterion::Collision);
+        let picture = |(block, of): (usize, &CategoryFacts)| {
+            Ok(CategoryPictures {
+                headways: HeadwayFailures::of(plan, counts, block)?,
+                parameters: of.parameters.clone(),
+                modes: of.modes.clone(),
+                svd_explained: of.svd_explained.clone(),
+                close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
+            })
+        };
+        let pictures = facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
+        Ok(StudyReport { scores, claims, best, pictures, run, published: facts.published, comparison })
+    }
+
     /// All tables, so many columns wide at most; only an unbroken word of the data's description (a path) can be
     /// longer.
     pub fn text(&self, width: usize) -> String {

@@ -111,6 +111,16 @@ impl<'a> Compare<'a> {
         Ok(Compare { scenarios, facts, profile, options, plan })
     }
 
+    /// What the scenarios are of.
+    pub fn provenance(&self) -> &DataProvenance {
+        self.facts
+    }
+
+    /// What is compared.
+    pub fn options(&self) -> &CompareOptions {
+        &self.options
+    }
+
     /// The lanes of S and S'.
     pub fn lane_plan(&self) -> &LanePlan {
         &self.plan

@@ -2,15 +2,17 @@
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
 //! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
-//! [`close_following`] tells how many failures come from headways below 0.5 s.
+//! [`forecast`] says before a run how large it will be. [`close_following`] tells how many failures come from headways below 0.5 s.
 //! [`reopen`] runs single lanes of a finished run again.
-//! [`parts`] splits, journals and merges them; [`score`] turns a study's counts into recall, precision and F1.
+//! [`parts`] splits and journals them, [`merge`](mod@merge) joins their parts; [`score`] turns a study's counts into recall, precision and F1.
 
 pub mod check;
 pub mod close_following;
 pub mod compare;
+pub mod forecast;
 pub mod grid;
 pub mod justify;
+pub mod merge;
 pub mod parts;
 #[cfg(test)]
 mod plan_mutations;

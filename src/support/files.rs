@@ -43,6 +43,14 @@ pub fn make_folder(dir: &Path) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create the folder", e))
 }
 
+/// The same for the folder of a file.
+///
+/// # Errors
+/// As [`make_folder`].
+pub fn make_folder_of(file: &Path) -> Result<()> {
+    file.parent().filter(|dir| !dir.as_os_str().is_empty()).map_or(Ok(()), make_folder)
+}
+
 /// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old content or the
 /// new one, never a part.
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {

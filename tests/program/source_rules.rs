@@ -22,7 +22,11 @@ fn toml_file(name: &str) -> toml::Table {
 fn every_combination_of_features_is_built() {
     let manifest = toml_file("Cargo.toml");
     let features: Vec<&str> = manifest["features"].as_table().expect("features").keys().map(String::as_str).collect();
-    assert_eq!(features, ["cli", "default", "gpu", "parquet"], "lint the combinations with each new feature in .ci/run");
+    assert_eq!(
+        features,
+        ["cli", "default", "gpu", "parquet"],
+        "lint the combinations with each new feature in .ci/run"
+    );
     let run = std::fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
     assert!(run.contains("for features in \"\" gpu,parquet cli,gpu cli,parquet; do"), "a combination is not built");
 }

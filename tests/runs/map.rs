@@ -26,6 +26,11 @@ fn value(category: Category, key: &str, value: f64) -> (&'static MapParameter, f
     (MapParameter::find(category, key, "--set").unwrap(), value)
 }
 
+/// Does a model collide, cell by cell?
+fn failed(map: &GridMap, model: usize) -> Vec<bool> {
+    (0..map.cell_count()).map(|cell| map.verdicts(model, cell).failed(Criterion::Collision)).collect()
+}
+
 fn parts(category: Category, x: &str, y: &str) -> GridParts {
     GridParts {
         name: category.key().to_owned(),
@@ -282,8 +287,8 @@ fn crash_shares_of_the_jrc_are_known_as_far_as_rounding_does_not_decide() {
         };
         for (at, &model) in preset.models.iter().enumerate() {
             let Some(known) = preset.known(model) else { continue };
-            let of_moved: Vec<Vec<bool>> = moved.iter().map(|m| m.failed(at, Criterion::Collision)).collect();
-            let ours = nominal.failed(at, Criterion::Collision);
+            let of_moved: Vec<Vec<bool>> = moved.iter().map(|m| failed(m, at)).collect();
+            let ours = failed(&nominal, at);
             let cells = || (0..ours.len()).map(|cell| (ours[cell], of_moved.iter().map(move |m| m[cell])));
             let always = cells().filter(|(ours, others)| *ours && others.clone().all(|f| f)).count();
             let ever = cells().filter(|(ours, others)| *ours || others.clone().any(|f| f)).count();
@@ -776,7 +781,7 @@ fn named_options_explain_every_cell_between_the_readings() {
             let presets = Presets::Jrc.of(category, profile).unwrap();
             let of = |preset: presets::Preset| {
                 let map = swept(&GridPlan::new(preset.grid, profile, &ModelId::ALL).unwrap());
-                (0..ModelId::ALL.len()).flat_map(|model| map.failed(model, Criterion::Collision)).collect::<Vec<_>>()
+                (0..ModelId::ALL.len()).flat_map(|model| failed(&map, model)).collect::<Vec<_>>()
             };
             presets.into_iter().flat_map(of).collect()
         });

@@ -9,10 +9,11 @@ use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
 use lanesweep::stats::density::{Mixture, normal_quantile};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, MonteCarlo, Pilot,
-    StandardNormal, StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy,
-    from_counts, from_pilot, monte_carlo, subset,
+    BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, Pilot, StandardNormal,
+    StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy, from_counts,
+    from_pilot, subset,
 };
+use lanesweep::stats::random::Stream;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -102,8 +103,12 @@ fn binomial_intervals_hold() {
             [(BinomialInterval::Wilson, "Wilson"), (BinomialInterval::ClopperPearson, "Clopper-Pearson")]
         {
             let row = repeat(&format!("{name}, linear {beta}, d = {dimensions}"), tail(beta), REPEATS, |seed| {
-                let options = MonteCarlo { interval, ..MonteCarlo::new(seed, samples) };
-                monte_carlo(&density, &linear(beta), &options).expect("an estimate")
+                let stream = Stream { seed, purpose: 0 };
+                let points: Vec<Vec<f64>> = (0..samples).map(|index| density.attempt(&stream, index, 0)).collect();
+                let values = linear(beta).evaluate(&points).expect("values");
+                let failures = values.iter().filter(|value| **value <= 0.0).count() as u64;
+                let counts = Counts { runs: samples, failures, voids: 0, tries: samples };
+                from_counts(&counts, interval, 0.95, StopReason::Samples)
             });
             match interval {
                 BinomialInterval::Wilson => {
@@ -124,6 +129,7 @@ fn importance_sampling_intervals_hold() {
         let limit = |points: &[Vec<f64>]| limit.evaluate(points);
         let row = repeat(name, truth, REPEATS, |seed| {
             from_pilot(density, &limit, &silverman, &Pilot::guarded(5000), &Importance::new(seed, 5000))
+                .map(|found| found.0)
                 .expect("an estimate")
         });
         misses.want(row.coverage >= 0.92, &row, "92 %");

@@ -20,7 +20,7 @@ use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{BandwidthRule, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
     BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
-    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset, wilson,
+    balance_heuristic, cross_entropy, defended, from_pilot, subset, wilson,
 };
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
@@ -76,10 +76,9 @@ fn estimates(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f
     let importance = Importance { level: LEVEL, ..Importance::new(4, n) };
     let mut all = Vec::new();
     let mut proposals = Vec::new();
-    for (name, pilot) in
-        [("importance, guarded", Pilot::guarded(10_000)), ("importance, author's", Pilot::author(10_000))]
-    {
-        let (estimate, proposal) = from_pilot_with_proposal(&nominal, &lanes, &fit, &pilot, &importance).unwrap();
+    let author = Pilot { broad: 0.0, defence: 0.0, ..Pilot::guarded(10_000) };
+    for (name, pilot) in [("importance, guarded", Pilot::guarded(10_000)), ("importance, author's", author)] {
+        let (estimate, proposal) = from_pilot(&nominal, &lanes, &fit, &pilot, &importance).unwrap();
         all.push((name.to_owned(), estimate));
         proposals.push(proposal);
     }

@@ -98,7 +98,7 @@ fn the_default_recordings_look_like_published_motorway_traffic() {
     let options = some_of_the_default();
     let counted = Counted::of(&options);
     let t = counted.traffic(&options);
-    println!("{}", options.describe());
+    println!("{options:?}");
     let mut table = Table::new("Traffic of the default recordings");
     let (car, truck) = (class_index(VehicleClass::Car), class_index(VehicleClass::Truck));
 

@@ -129,7 +129,7 @@ fn speeds_and_accelerations_are_bounded_and_positions_are_their_integrals() {
     // Half of the last written digit of a position, of a speed over one step, and the same again.
     let digits = 0.005;
     for recording in default_recordings() {
-        let dt = recording.sample_time_s();
+        let dt = 1.0 / recording.frame_rate_hz;
         for t in &recording.tracks {
             assert!(t.v_s_mps.iter().all(|v| (0.0..=60.0).contains(v)), "speed of {}/{}", recording.id, t.id);
             // Known to be wrong: noise lifts some cars in a lane change above 3.0 m/s². The fraction is bounded below.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use lanesweep::scenario::{Category, Scenario, read_scenarios, write_scenarios};
-use lanesweep::traffic::mining::{Mined, MiningOptions, mine};
+use lanesweep::traffic::mining::{Mined, MiningOptions, count, mine};
 use lanesweep::traffic::trajectory::highd::{HighdFiles, read};
 
 fn mined(dir: &Path, id: &str) -> Mined {
@@ -81,13 +81,13 @@ fn sumo_scenarios_equal_those_of_a_second_implementation_field_by_field() {
 fn sumo_counts_equal_those_of_a_second_implementation() {
     let Some(dir) = common::sumo_recordings() else { return };
     let all: Vec<Mined> = ["01", "02", "03", "04"].iter().map(|id| mined(&dir, id)).collect();
-    let count = |category| {
-        let counts = all.iter().map(|m| m.count(category));
+    let found_and_kept = |category| {
+        let counts = all.iter().map(|m| count(&m.scenarios, category));
         counts.fold((0, 0), |sum, c| (sum.0 + c.found, sum.1 + c.kept))
     };
-    assert_eq!(count(Category::CutIn), (26, 3));
-    assert_eq!(count(Category::CutOut), (34, 9));
-    assert_eq!(count(Category::Lvd), (249, 43));
+    assert_eq!(found_and_kept(Category::CutIn), (26, 3));
+    assert_eq!(found_and_kept(Category::CutOut), (34, 9));
+    assert_eq!(found_and_kept(Category::Lvd), (249, 43));
 }
 
 #[test]

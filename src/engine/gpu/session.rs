@@ -15,7 +15,7 @@ use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::records::StartRecord;
 use super::ring::{Answer, Job, RING};
 use super::shader::{self, Specialization};
-use crate::engine::{Backend, Chunk, Constants, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use crate::engine::{Backend, Chunk, Constants, DeviceRecord, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
@@ -288,6 +288,21 @@ impl GpuBackend {
         &self.card
     }
 
+    /// Description of the device for the record of a run.
+    pub fn record(&self) -> DeviceRecord {
+        DeviceRecord {
+            name: self.card.name.clone(),
+            api: self.card.api.label(),
+            driver: self.driver(),
+            pci_bus_id: self.card.pci_bus_id.clone(),
+            exact_path: self.exact,
+        }
+    }
+
+    fn driver(&self) -> String {
+        [&self.card.driver[..], &self.card.driver_info].join(" ").trim().to_owned()
+    }
+
     /// Float operations reach the driver unchanged, so that equality is guaranteed and not only checked.
     pub fn is_exact(&self) -> bool {
         self.exact
@@ -309,8 +324,7 @@ impl Drop for GpuBackend {
 impl Backend for GpuBackend {
     fn describe(&self) -> String {
         let path = if self.exact { "exact" } else { "plain" };
-        let driver = [&self.card.driver[..], &self.card.driver_info].join(" ").trim().to_owned();
-        format!("GPU {} ({}, {driver}), binary32, {path} path", self.card.name, self.card.api)
+        format!("GPU {} ({}, {}), binary32, {path} path", self.card.name, self.card.api, self.driver())
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {

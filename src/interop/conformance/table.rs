@@ -83,11 +83,6 @@ impl Table {
         self.columns.contains_key(column)
     }
 
-    /// Names of all columns, in no order.
-    pub fn columns(&self) -> impl Iterator<Item = &str> {
-        self.columns.keys().map(String::as_str)
-    }
-
     /// The rows in the file's order.
     pub fn rows(&self) -> impl Iterator<Item = Row<'_>> {
         (0..self.rows.len()).map(|index| Row { table: self, index })

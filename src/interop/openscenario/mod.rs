@@ -37,7 +37,7 @@ pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPL
 pub use scenario_file::scenario_file;
 pub use scenario_reader::read_scenario;
 pub use sizes::{KnownSizes, sizes_of_case};
-pub use variations::{Variations, variations};
+pub use variations::variations;
 
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));

@@ -60,11 +60,6 @@ impl Road {
     pub fn reference_y_m(&self) -> f64 {
         (f64::from(self.left_lanes) + 0.5) * self.lane_width_m
     }
-
-    /// The ego's lane as OpenDRIVE counts it.
-    pub fn ego_lane(&self) -> i32 {
-        -(self.left_lanes as i32 + 1)
-    }
 }
 
 /// The road's file.

@@ -2,20 +2,9 @@
 
 use super::distribution_file::{Deterministic, DistributionFile, Distributions};
 use super::parameters::Names;
-use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter};
+use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter, Variations};
 use crate::support::repeats::{GIVE_ONCE, repeated};
 use crate::{Error, Place, Result};
-
-/// What a deterministic file varies.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Variations {
-    /// Parameters of their own, in the file's order; values rise.
-    pub axes: Vec<GridAxis>,
-    /// Parameters that belong together; values are those of all rows.
-    pub set_axes: Vec<GridAxis>,
-    /// Their rows: every combination of the file's value sets. One empty row where there are none.
-    pub set_rows: Vec<Vec<f64>>,
-}
 
 /// The variations of a file.
 ///

@@ -16,8 +16,6 @@ pub enum Relation {
     AtLeast,
     /// At most as large.
     AtMost,
-    /// Below it.
-    Below,
 }
 
 impl Relation {
@@ -27,7 +25,6 @@ impl Relation {
             Relation::Above => ">",
             Relation::AtLeast => "≥",
             Relation::AtMost => "≤",
-            Relation::Below => "<",
         }
     }
 
@@ -38,7 +35,6 @@ impl Relation {
             Relation::Above => value > threshold + EPSILON,
             Relation::AtLeast => value >= threshold - EPSILON,
             Relation::AtMost => value <= threshold + EPSILON,
-            Relation::Below => value < threshold - EPSILON,
         }
     }
 }

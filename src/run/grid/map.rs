@@ -202,11 +202,6 @@ impl GridMap {
         self.verdicts[model][cell]
     }
 
-    /// Does a model fail, cell by cell?
-    pub fn failed(&self, model: usize, criterion: Criterion) -> Vec<bool> {
-        self.verdicts[model].iter().map(|v| v.failed(criterion)).collect()
-    }
-
     /// Cells in which a model fails.
     pub fn failures(&self, model: usize, criterion: Criterion) -> u64 {
         self.verdicts[model].iter().filter(|v| v.failed(criterion)).count() as u64

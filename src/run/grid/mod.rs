@@ -7,6 +7,7 @@
 mod axis;
 #[allow(clippy::module_inception)]
 mod grid;
+mod grid_text;
 mod held;
 pub mod jrc_case;
 mod map;
@@ -20,6 +21,7 @@ mod run;
 pub use axis::{GridAxis, MAX_VALUES};
 pub(crate) use grid::check_complete;
 pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
+pub use grid_text::{GridText, Variations};
 pub use map::{Agreement, GridMap, boundary, count, runs};
 pub use outcome::CellOutcome;
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};

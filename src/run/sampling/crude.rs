@@ -65,8 +65,6 @@ pub struct CrudeRun {
     pub rows: Vec<EstimateRow>,
     /// How they came about; empty for a range that does not begin at 0.
     pub convergence: Vec<Checkpoint>,
-    /// What ended it.
-    pub stopped: StopReason,
     /// How the sweep went.
     pub summary: SweepSummary,
 }
@@ -166,7 +164,7 @@ pub fn sample_into(
         }
         if let Some(stopped) = stopped(options, counting.criterion, &rows, at, range.end, started) {
             let rows = rows_of(plan, &tally, options, stopped);
-            return Ok(CrudeRun { tally, rows, convergence, stopped, summary });
+            return Ok(CrudeRun { tally, rows, convergence, summary });
         }
     }
 }
@@ -200,7 +198,7 @@ pub fn crude_of_segments(
         convergence.clear();
     }
     let rows = rows_of(plan, &tally, options, StopReason::Samples);
-    Ok(CrudeRun { tally, rows, convergence, stopped: StopReason::Samples, summary: SweepSummary::default() })
+    Ok(CrudeRun { tally, rows, convergence, summary: SweepSummary::default() })
 }
 
 fn rows_of(plan: &LanePlan, tally: &SampleTally, options: &CrudeOptions, stopped: StopReason) -> Vec<EstimateRow> {

@@ -12,7 +12,7 @@ use crate::model::profile::Profile;
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{
     CrossEntropy, Defended, Density, Estimate, Importance, Pilot, Subset, Technique, balance_heuristic, cross_entropy,
-    defended, from_pilot_with_proposal, importance, subset,
+    defended, from_pilot, importance, subset,
 };
 
 /// Draws that the valid share of each of several proposals is counted on.
@@ -95,7 +95,7 @@ impl Sequential {
             }
             Estimator::Pilot(pilot) => {
                 let fit = |points: &[Vec<f64>]| fitted(&self.density, points);
-                let (estimate, proposal) = from_pilot_with_proposal(nominal, lanes, &fit, pilot, &importance_options)?;
+                let (estimate, proposal) = from_pilot(nominal, lanes, &fit, pilot, &importance_options)?;
                 Ok((estimate, None, Some(proposal)))
             }
             Estimator::Given { proposals, defence } => {

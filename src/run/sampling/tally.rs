@@ -339,11 +339,6 @@ impl SampleTally {
         self.worst_limit
     }
 
-    /// Hash of the plan.
-    pub fn plan_sha256(&self) -> &str {
-        &self.plan_sha256
-    }
-
     /// The samples counted, as disjoint intervals, ascending.
     pub fn covered(&self) -> &[Range<u64>] {
         &self.covered

@@ -31,7 +31,7 @@ pub use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DensityModel, FitOptions, Fitted, Provenance};
 pub use model_file::{MAX_FILE_BYTES, read_density, write_density};
 pub(crate) use normal::Draws;
-pub use normal::{normal_cdf, normal_density, normal_quantile};
+pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};
 pub use representativeness::{BETA, MAX_SET, REPETITIONS, Representativeness, metric};
 pub use scaling::{quantile, scale_of, standard_deviation};

@@ -190,15 +190,6 @@ impl DensityModel {
     pub fn mixture(&self) -> Result<Mixture> {
         self.kde.mixture()
     }
-
-    /// log of f̂/P_valid; −∞ outside the valid region.
-    pub fn log_truncated_density(&self, point: &[f64]) -> f64 {
-        if self.space.is_valid(point) {
-            self.kde.log_density(point) - libm::log(self.valid.estimate)
-        } else {
-            f64::NEG_INFINITY
-        }
-    }
 }
 
 /// The decomposition, where the parameterization needs one.

@@ -17,7 +17,6 @@ mod monte_carlo;
 mod problem;
 mod ratio;
 mod stop;
-mod strata;
 mod subset;
 mod summary;
 mod trust;
@@ -28,16 +27,15 @@ pub use blocks::{BLOCK, BlockSums, Join};
 pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
-    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_pilot_with_proposal,
-    from_weight_sums, importance, importance_sums, pilot_proposal, worst_share,
+    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
+    importance_sums, pilot_proposal, worst_share,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
-pub use monte_carlo::{BinomialInterval, Counts, MonteCarlo, from_counts, monte_carlo, monte_carlo_counts};
+pub use monte_carlo::{BinomialInterval, Counts, from_counts};
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use stop::{Checkpoints, StopReason, StopRule};
-pub use strata::{Stratum, stratified};
 pub use subset::{Subset, SubsetLevel, SubsetRun, subset};
 pub use summary::{Estimate, WeightFigures};
 pub use trust::{Trust, Verdict, Warning};

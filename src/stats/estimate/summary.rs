@@ -10,7 +10,7 @@ use super::trust::{Trust, Warning};
 /// A probability of failure with all that is known of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// Estimator: `monte_carlo`, `stratified`, `importance`, `importance_self_normalised`, `cross_entropy`,
+    /// Estimator: `monte_carlo`, `importance`, `importance_self_normalised`, `cross_entropy`,
     /// `subset`, `balance`.
     pub method: String,
     /// The estimate, in [0, 1].

@@ -11,9 +11,9 @@ use super::options::MiningOptions;
 use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Implausible;
 use crate::support::readable;
+use crate::traffic::trajectory::Recording;
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::traffic::trajectory::highd::{self, FileChecksum};
-use crate::traffic::trajectory::{EgoView, Recording};
 use crate::{Error, Result};
 
 /// Results of one recording.
@@ -174,10 +174,10 @@ fn summary(
 /// Time and distance of all ego data sets, from each ego's first sample to its last with tags: the exposure.
 fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
     let mut sum = [0.0; 2];
-    for (index, ego) in recording.tracks.iter().enumerate() {
-        let Some(view) = EgoView::of(recording, index, &options.ego_view) else { continue };
-        sum[0] += view.last_sample() as f64 / recording.frame_rate_hz;
-        sum[1] += ego.s_m[view.last_sample()] - ego.s_m[0];
+    for ego in &recording.tracks {
+        let Some(last) = options.ego_view.last_sample(ego) else { continue };
+        sum[0] += last as f64 / recording.frame_rate_hz;
+        sum[1] += ego.s_m[last] - ego.s_m[0];
     }
     sum
 }

@@ -1,10 +1,10 @@
 //! The ego-centric data set: one ego, the part of its track in the data set, the vehicles in range, and the leader.
-//! Its extent is that of [`EgoView`]; neighbours come from the frame index.
+//! Its extent is that of [`EgoViewOptions`](crate::traffic::trajectory::EgoViewOptions); neighbours come from the frame index.
 
 use super::frame_index::FrameIndex;
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
-use crate::traffic::trajectory::{Carriageway, EgoView, NO_LANE, Recording, Track};
+use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
 
 /// A recording with its activities and neighbours, which are computed once.
 pub(super) struct RecordingTags<'a> {
@@ -52,8 +52,7 @@ impl<'a> DataSet<'a> {
     /// The data set of the track with index `ego_index`; `None` if the vehicle travels less than the end cut.
     pub fn new(recording_tags: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
         let ego = &recording_tags.recording.tracks[ego_index];
-        let samples =
-            EgoView::of(recording_tags.recording, ego_index, &recording_tags.options.ego_view)?.last_sample() + 1;
+        let samples = recording_tags.options.ego_view.last_sample(ego)? + 1;
         let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
         let mut set = DataSet { recording_tags, ego_index, ego, carriageway, samples, leader: Vec::new() };
         set.leader = (0..samples).map(|k| set.leader_at(k)).collect();
@@ -73,9 +72,8 @@ impl<'a> DataSet<'a> {
         leaders
     }
 
-    /// The vehicle with track `other` is within range (along the road, centre to centre, as in
-    /// [`EgoView`]) at the ego's sample `k`, the
-    /// other's sample `j`.
+    /// The vehicle with track `other` is within range (along the road, centre to centre) at the ego's sample `k`, the other's sample
+    /// `j`.
     pub fn in_range(&self, k: usize, other: &Track, j: usize) -> bool {
         (other.s_m[j] - self.ego.s_m[k]).abs() <= self.recording_tags.options.ego_view.range_m + TOLERANCE
     }

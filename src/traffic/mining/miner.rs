@@ -5,7 +5,7 @@ use super::options::{MiningOptions, TOLERANCE, samples};
 use super::search::{self, Item, Match};
 use super::tags::Tags;
 use super::{cut_in, cut_out, lvd};
-use crate::scenario::{Category, Scenario};
+use crate::scenario::Scenario;
 use crate::traffic::trajectory::Recording;
 
 /// Scenarios of a recording.
@@ -24,17 +24,6 @@ pub struct CategoryCount {
     pub found: u64,
     /// Kept by the paper's filters.
     pub kept: u64,
-}
-
-impl Mined {
-    /// Found and kept scenarios of a category.
-    pub fn count(&self, category: Category) -> CategoryCount {
-        let of = self.scenarios.iter().filter(|s| s.category == category);
-        of.fold(CategoryCount::default(), |sum, s| CategoryCount {
-            found: sum.found + 1,
-            kept: sum.kept + u64::from(s.kept),
-        })
-    }
 }
 
 /// Finds every cut-in, cut-out and leader deceleration of a recording. The result

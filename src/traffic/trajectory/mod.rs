@@ -9,5 +9,5 @@ pub mod generator;
 pub mod highd;
 mod recording;
 
-pub use ego::{EgoView, EgoViewOptions, Encounter, LIMIT_TOLERANCE_M, Sighting};
+pub use ego::{EgoViewOptions, LIMIT_TOLERANCE_M};
 pub use recording::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};

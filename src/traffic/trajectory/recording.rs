@@ -139,9 +139,4 @@ impl Recording {
     pub fn track(&self, id: u32) -> Option<&Track> {
         self.tracks.binary_search_by_key(&id, |t| t.id).ok().map(|i| &self.tracks[i])
     }
-
-    /// Time between two samples, s.
-    pub fn sample_time_s(&self) -> f64 {
-        1.0 / self.frame_rate_hz
-    }
 }

@@ -73,15 +73,6 @@ impl GeneratorOptions {
         self.behaviour.validate()
     }
 
-    /// The notice of every output made from these recordings.
-    pub fn describe(&self) -> String {
-        format!(
-            "SYNTHETIC recordings: {} of {} s at {} Hz, seed {}, lane changes and hard brakings {} times as frequent \
-             as published for highD; not a measurement of real traffic",
-            self.recordings, self.duration_s, self.frame_rate_hz, self.seed, self.event_rate_factor
-        )
-    }
-
     /// Simulation steps per sample: the minimum with a step of at most 0.04 s.
     pub(super) fn steps_per_sample(&self) -> usize {
         // The small term keeps 25 Hz at one step although 0.04 is not exact in binary.

@@ -1,0 +1,147 @@
+//! The files of a sampling run: tables and figures of its counts, the page, the record last.
+
+use sha2::{Digest, Sha256};
+
+use super::convergence::ConvergenceFigure;
+use super::failure_map::FailureMap;
+use super::html::PageFigure;
+use super::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
+use super::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use crate::engine::{LaneKey, LanePlan, LaneRunner};
+use crate::run::sampling::{CrudeRun, Sample, SampleKind, SampleResult, SampleTally, TallyOptions, proposal_text};
+use crate::stats::density::DensityModel;
+use crate::support::hex::hex;
+use crate::support::run_dir::Results;
+use crate::{Error, Result};
+
+impl EstimateFile {
+    /// Of a run and its result.
+    ///
+    /// # Errors
+    /// As [`DensityModel::content_sha256`].
+    pub fn of_sample(sample: &Sample, result: &SampleResult, host: HostRecord) -> Result<EstimateFile> {
+        let mut file = EstimateFile::new(sample.density(), RunFacts::of(sample), result.rows.clone(), host)?;
+        if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
+            file.plan_sha256 = Some(plan.hash().to_owned());
+            file.draws = Some(DrawRecord::of(&crude.tally, plan));
+        }
+        file.levels = result.levels.clone();
+        Ok(file)
+    }
+
+    /// Puts every file of the run into its folder, the record last.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<()> {
+        let (density, mut figures) = (sample.density(), Vec::new());
+        if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
+            figures = self.crude_files(&mut results, &planned.plan, density, crude, &planned.counting())?;
+        }
+        if sample.has_given_proposals() {
+            // A proposal in this folder may be one that was given.
+            results.keep(|name| name.starts_with("proposal-"))?;
+        }
+        for (model, proposal) in &result.proposals {
+            results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;
+        }
+        results.add("density.json", &density.to_json()?)?;
+        self.publish(results, figures)
+    }
+
+    /// Convergence, worst lanes and maps; returns the figures.
+    fn crude_files(
+        &mut self,
+        results: &mut Results,
+        plan: &LanePlan,
+        density: &DensityModel,
+        run: &CrudeRun,
+        counting: &TallyOptions,
+    ) -> Result<Vec<PageFigure>> {
+        let mut figures = Vec::new();
+        if !run.convergence.is_empty() {
+            results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
+            let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
+            let svg = ConvergenceFigure::of(density, &run.convergence, level).figure().svg();
+            results.add("convergence.svg", svg.as_bytes())?;
+            figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
+        }
+        let Some(generator) = plan.generator() else {
+            return Err(Error::Internal("the plan has no generator".to_owned()));
+        };
+        let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
+        self.add_worst(results, plan, &run.tally, counting, &names, |key| {
+            let drawn = generator.draw(key.unit).values;
+            let point: Vec<f64> = drawn[..names.len()].iter().map(|&v| f64::from(v)).collect();
+            let headway = density.space.thw_s(&point).map(|thw_s| format!("{thw_s}s"));
+            Ok((point, headway))
+        })?;
+        if let Some(map) = &run.tally.map {
+            for (model, id) in plan.models.iter().enumerate() {
+                let figure = FailureMap::of(density, map, model, *id, counting.criterion);
+                let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
+                results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
+                results.add(&format!("{name}.svg"), svg.as_bytes())?;
+                figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
+            }
+        }
+        Ok(figures)
+    }
+
+    /// Adds the table of the worst lanes, where they were counted, and its checksum to the record. `drawn` gives the point
+    /// of a lane's sample, and its headway where that is drawn too.
+    ///
+    /// # Errors
+    /// Of `drawn`; [`Error::Io`].
+    pub fn add_worst(
+        &mut self,
+        results: &mut Results,
+        plan: &LanePlan,
+        tally: &SampleTally,
+        counting: &TallyOptions,
+        names: &[String],
+        drawn: impl Fn(&LaneKey) -> Result<(Vec<f64>, Option<String>)>,
+    ) -> Result<()> {
+        if counting.worst == 0 {
+            return Ok(());
+        }
+        let (runner, mut rows) = (LaneRunner::<f32>::new(plan), Vec::new());
+        for (model, lanes) in plan.models.iter().zip(&tally.worst) {
+            for (rank, lane) in (1..).zip(lanes) {
+                let missing = || Error::Internal(format!("lane {} is not in the plan", lane.lane));
+                let key = plan.key(lane.lane).ok_or_else(missing)?;
+                let (point, headway) = drawn(&key)?;
+                rows.push(WorstRow {
+                    rank,
+                    lane: *lane,
+                    key: plan.key_text(&key),
+                    sample: key.unit,
+                    model: *model,
+                    headway: headway.unwrap_or_else(|| plan.headways[key.headway].to_string()),
+                    point,
+                    outcome: runner.run(&key).widen(),
+                });
+            }
+        }
+        let table = worst_csv(&rows, names, counting.criterion)?;
+        self.worst_sha256 = Some(hex(&Sha256::digest(&table)));
+        results.add("worst.csv", &table)
+    }
+
+    /// Adds table and page of the estimates; then everything gets its name, with the record.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn publish(&mut self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<()> {
+        if let Some(figure) = self.headways_figure() {
+            let svg = figure.svg();
+            results.add("headways.svg", svg.as_bytes())?;
+            results.add("headways.csv", &figure.csv()?)?;
+            figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
+        }
+        results.add("estimates.csv", &self.csv()?)?;
+        results.add("report.html", self.html(figures)?.as_bytes())?;
+        self.files = results.names();
+        results.publish(self.json()?.as_bytes())
+    }
+}

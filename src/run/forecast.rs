@@ -1,0 +1,287 @@
+//! What a run will be, before it is run: its lanes, the memory that it adds, the time of its lanes.
+
+use std::time::{Duration, Instant};
+
+use super::compare::Compare;
+use super::grid::{GridPlan, Map};
+use super::parts::Ledger;
+use super::sampling::weighted_plan::WeightedPlan;
+use super::sampling::{Estimator, Sample, SampleKind, SampleTally, TallyOptions};
+use super::study::{Study, WINDOW};
+use crate::Result;
+use crate::engine::{
+    Backend, Block, Confusion, Executor, Forecast, LanePlan, Outcome, Partial, Verdicts, Wanted, forecast,
+};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::stats::estimate::{CrossEntropy, Subset};
+
+/// Time that lanes are run for to know their speed.
+const BUDGET: Duration = Duration::from_millis(200);
+
+/// Series that the forecast of a study makes, beside one scenario of each category: enough to know the speed of the lanes.
+const STUDY_SERIES_BYTES: u64 = 64 << 20;
+/// Memory of the counts of every checkpoint of a sampling run and of its figures, bytes, measured.
+const SAMPLE_COUNTS_BYTES: u64 = 6 << 20;
+/// Memory of a weighted sample while it is judged (point, case, motion, outcome), bytes, measured.
+const BYTES_PER_SAMPLE: u64 = 280;
+/// Memory of the counts of a comparison's sampled lanes and of its figures, bytes, measured.
+const COMPARE_COUNTS_BYTES: u64 = 8 << 20;
+/// Memory of a map's sheets that are being drawn, bytes: those of the presets, measured.
+const SHEETS_BYTES: u64 = 3 << 20;
+
+/// Points that an adaptive estimator holds at once, at most.
+pub const MAX_HELD: u64 = 10_000_000;
+
+/// A part of a run's lanes.
+pub struct ForecastPart {
+    /// Category, grid or model.
+    pub of: String,
+    /// Variant, density or estimator.
+    pub what: String,
+    /// Its units.
+    pub units: u64,
+    /// Its lanes.
+    pub lanes: u64,
+}
+
+/// What a run will be.
+pub struct RunForecast {
+    /// What it runs on.
+    pub data: String,
+    /// Its lanes.
+    pub parts: Vec<ForecastPart>,
+    /// What a part's units are: `scenarios`, `samples`, `cells`.
+    pub units: &'static str,
+    /// The lanes are the most that there can be.
+    pub is_at_most: bool,
+    /// Bytes that the run will hold beyond what is held now.
+    pub more_bytes: u64,
+    /// What those are.
+    pub more: &'static str,
+    /// Time of the lanes. None where they follow from one another.
+    pub lanes: Option<Forecast>,
+    /// What comes on top of the lanes' time.
+    pub besides: &'static str,
+}
+
+/// The lanes of a plan by category and variant.
+fn parts(plan: &LanePlan) -> Vec<ForecastPart> {
+    let of_block = |block: &'_ Block| {
+        let lanes = block.units.len() * (plan.headways.len() * plan.models.len()) as u64;
+        let (of, units) = (block.category.label().to_owned(), block.units.len());
+        let part = move |what: &String| ForecastPart { of: of.clone(), what: what.clone(), units, lanes };
+        block.variants.iter().map(part).collect::<Vec<_>>()
+    };
+    plan.blocks.iter().flat_map(of_block).collect()
+}
+
+/// Parts of the driver models, each with so many samples.
+fn parts_of_models(models: &[ModelId], what: &str, samples: u64) -> Vec<ForecastPart> {
+    let part = |model: &ModelId| ForecastPart {
+        of: model.name().to_owned(),
+        what: what.to_owned(),
+        units: samples,
+        lanes: samples,
+    };
+    models.iter().map(part).collect()
+}
+
+fn counted(plan: &LanePlan, backend: &dyn Backend) -> Result<Forecast> {
+    forecast(plan, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(plan, &chunk).map(drop))
+}
+
+impl Study {
+    /// What the study will be.
+    ///
+    /// # Errors
+    /// Of the lanes that are run.
+    pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
+        let plan = self.plan();
+        let some = self.cases().thinned(WINDOW, STUDY_SERIES_BYTES)?;
+        let mut forecast = counted(&some, backend)?;
+        forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
+        forecast.lanes = plan.lane_count();
+        // The counts of every unit, in the ledger and joined.
+        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
+        let of_unit = size_of::<Confusion<u32>>() as u64;
+        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
+        Ok(RunForecast {
+            data: self.facts().data.clone(),
+            parts: parts(plan),
+            units: "scenarios",
+            is_at_most: false,
+            more_bytes: plan.blocks.iter().map(counts).sum::<u64>()
+                + self.cases().window_bytes().saturating_sub(2 * STUDY_SERIES_BYTES),
+            more: "counts and the series of a window",
+            lanes: Some(forecast),
+            besides: "scores, figures, the plan file; option `rows` and option `compare_reference`",
+        })
+    }
+}
+
+impl Compare<'_> {
+    /// What the comparison will be. Sampled lanes are taken to cost what those of their category's scenarios do.
+    ///
+    /// # Errors
+    /// Of the lanes that are run.
+    pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
+        let (plan, options) = (self.lane_plan(), self.options());
+        let mut parts = parts(plan);
+        let mut whole = counted(plan, backend)?;
+        let per_lane_s = whole.seconds / whole.lanes.max(1) as f64;
+        let lanes = options.samples.saturating_mul((plan.headways.len() * plan.models.len()) as u64);
+        for id in &options.parameterizations {
+            let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
+            parts.push(ForecastPart { of, what, units: options.samples, lanes });
+            whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
+        }
+        Ok(RunForecast {
+            data: self.provenance().data.clone(),
+            parts,
+            units: "cases",
+            is_at_most: false,
+            more_bytes: COMPARE_COUNTS_BYTES,
+            more: "counts per scenario and figures",
+            lanes: Some(whole),
+            besides: "fitting the densities",
+        })
+    }
+}
+
+impl Map {
+    /// What the maps will be.
+    ///
+    /// # Errors
+    /// Of the lanes that are run.
+    pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
+        let all = self.lane_count();
+        let mut whole = Forecast::default();
+        for plan in self.lane_plans() {
+            let budget = BUDGET.mul_f64(plan.lane_count() as f64 / all.max(1) as f64);
+            whole.add(&forecast(plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
+        }
+        let part = |(other, plan): (Option<&str>, &GridPlan)| ForecastPart {
+            of: plan.grid.name().to_owned(),
+            what: other.map_or(String::new(), |name| format!("under {name}")),
+            units: plan.grid.cell_count() as u64,
+            lanes: plan.lane_count(),
+        };
+        Ok(RunForecast {
+            data: "the grids' own cases".to_owned(),
+            parts: self.plans().map(part).collect(),
+            units: "cells",
+            is_at_most: false,
+            // A verdict per cell and model, and the sheets drawn of them.
+            more_bytes: all * (size_of::<Verdicts>() as u64 + 1) + SHEETS_BYTES,
+            more: "verdicts and sheets",
+            lanes: Some(whole),
+            besides: "drawing and writing the sheets",
+        })
+    }
+}
+
+impl Sample {
+    /// What the sampling run will be.
+    ///
+    /// # Errors
+    /// Of the lanes that are run.
+    pub fn forecast(&self, executor: &Executor) -> Result<RunForecast> {
+        let run = RunForecast {
+            data: self.density().provenance.data.clone(),
+            parts: Vec::new(),
+            units: "samples",
+            is_at_most: false,
+            more_bytes: 0,
+            more: "",
+            lanes: None,
+            besides: "",
+        };
+        let (estimator, lanes, models) = match &self.0 {
+            SampleKind::Crude(planned, stop) => {
+                let (plan, counting) = (&planned.plan, planned.counting());
+                // Few lanes are valued.
+                let verdicts = TallyOptions { worst: 0, ..counting.clone() };
+                let forecast = forecast(plan, executor.backend, Wanted::Verdicts, BUDGET, |chunk| {
+                    SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
+                })?;
+                let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
+                return Ok(RunForecast {
+                    parts: parts(plan),
+                    is_at_most: stop.relative_half_width.is_some() || stop.time_limit.is_some(),
+                    more_bytes: SAMPLE_COUNTS_BYTES + forecast.lanes_at_once * bytes_of_lane,
+                    more: "lanes at once, counts and figures, however many samples",
+                    lanes: Some(forecast),
+                    besides: "figures; option `rows`",
+                    ..run
+                });
+            }
+            SampleKind::Weighted(planned) => {
+                let facts = &planned.facts;
+                let weighed = weighed(planned, executor)?;
+                return Ok(RunForecast {
+                    parts: parts_of_models(
+                        &facts.models,
+                        &format!("headway {}", planned.headway_name()),
+                        facts.samples,
+                    ),
+                    more_bytes: weighed.lanes_at_once * BYTES_PER_SAMPLE,
+                    more: "the samples that are judged at once",
+                    lanes: Some(weighed),
+                    ..run
+                });
+            }
+            SampleKind::Pilot(planned, pilot) => {
+                ("is", planned.facts.samples.saturating_add(pilot.runs), &planned.facts.models)
+            }
+            SampleKind::Sequential(run) => {
+                let (samples, seed) = (run.options.stop.samples, run.options.seed);
+                let lanes = match &run.options.estimator {
+                    Estimator::Subset => {
+                        let options = Subset::new(seed, samples);
+                        options.samples_per_level.saturating_mul(options.levels as u64)
+                    }
+                    Estimator::CrossEntropy { .. } => {
+                        let options = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
+                        samples.saturating_add(options.samples_per_level.saturating_mul(options.levels as u64))
+                    }
+                    Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
+                    Estimator::Crude { .. } | Estimator::Given { .. } => samples,
+                };
+                (run.options.estimator.key(), lanes, &run.options.models)
+            }
+        };
+        // At most: how many levels there are is seen on the way.
+        Ok(RunForecast {
+            parts: parts_of_models(models, &format!("estimator {estimator}"), lanes),
+            is_at_most: true,
+            // The points of a level or pilot, with their limit states and the fit's responsibilities.
+            more_bytes: lanes.min(MAX_HELD) * (self.density().space.parameters().len() as u64 + 8) * 8,
+            more: "the points that are held at once",
+            ..run
+        })
+    }
+}
+
+/// Drawing and weighing cost more than the lanes, so all of it is measured.
+fn weighed(planned: &WeightedPlan, executor: &Executor) -> Result<Forecast> {
+    let facts = &planned.facts;
+    let most = facts.samples.min(planned.chunk_samples());
+    let (mut samples, mut took) = (most.min(256), 0.0);
+    loop {
+        let started = Instant::now();
+        planned.sample(&mut Ledger::new(0..samples, &[]), executor, |_| ())?;
+        let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
+        if samples >= most || took + last >= BUDGET.as_secs_f64() / 2.0 {
+            break;
+        }
+        samples = (2 * samples).min(most);
+    }
+    let models = facts.models.len() as u64;
+    Ok(Forecast {
+        lanes: facts.samples.saturating_mul(models),
+        seconds: took / samples as f64 * facts.samples as f64,
+        measured_lanes: samples * models,
+        lanes_at_once: most,
+    })
+}

@@ -1,0 +1,133 @@
+//! A grid from the words of a user, and from the variations of a file of distributions.
+
+use super::axis::GridAxis;
+use super::grid::{CaseStyle, GridParts, MAX_PANELS};
+use super::parameter::MapParameter;
+use crate::scenario::Category;
+use crate::support::plausibility::Doubts;
+use crate::{Error, Place, Result};
+
+/// A grid in words: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
+#[derive(Debug, Clone, Default)]
+pub struct GridText {
+    /// Across; with variations also a name among them.
+    pub x: Option<String>,
+    /// Up, as `x`.
+    pub y: Option<String>,
+    /// Axes of the panels.
+    pub panel: Vec<String>,
+    /// `NAME=VALUE`: values that are the same in every cell.
+    pub set: Vec<String>,
+    /// Each model starts at its own distance.
+    pub native_gap: bool,
+    /// Panels in which the ego is not faster than the other vehicle are left out.
+    pub closing_only: bool,
+}
+
+/// What a file of distributions varies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variations {
+    /// Parameters of their own, in the file's order; values rise.
+    pub axes: Vec<GridAxis>,
+    /// Parameters that belong together; values are those of all rows.
+    pub set_axes: Vec<GridAxis>,
+    /// Their rows: every combination of the file's value sets. One empty row where there are none.
+    pub set_rows: Vec<Vec<f64>>,
+}
+
+impl GridText {
+    /// The grid. Of variations the first two parameters with several values are the axes, unless `x` and `y` name others;
+    /// the others make the panels.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the option of what is missing, is no axis, or makes too many panels.
+    pub fn parts(&self, category: Category, variations: Option<Variations>) -> Result<GridParts> {
+        let is_of_file = variations.is_some();
+        let none = Variations { axes: Vec::new(), set_axes: Vec::new(), set_rows: vec![Vec::new()] };
+        let Variations { axes: mut left, set_axes, set_rows: mut rows } = variations.unwrap_or(none);
+        let mut axis = |text: &Option<String>, name: &str| -> Result<GridAxis> {
+            let wrong = |problem: String, help: String| Error::usage(Place::item(name), problem, help);
+            match text.as_deref().map(str::trim) {
+                Some(text) if text.contains('=') || !is_of_file => GridAxis::parse(category, text, name),
+                None if !is_of_file => {
+                    let help = "give both option `x` and option `y`, or option `preset`";
+                    Err(wrong("it is missing".to_owned(), help.to_owned()))
+                }
+                Some(key) => {
+                    let parameter = MapParameter::find(category, key, name)?;
+                    let at = left.iter().position(|axis| axis.parameter == parameter);
+                    at.map(|at| left.remove(at)).ok_or_else(|| {
+                        let problem = format!("the file has no separate distribution of `{key}`");
+                        wrong(problem, format!("give its values: {name} {key}=FROM..TO/STEP"))
+                    })
+                }
+                None => {
+                    let several = left.iter().position(|axis| axis.len() > 1);
+                    let at = several.or(if left.is_empty() { None } else { Some(0) });
+                    at.map(|at| left.remove(at)).ok_or_else(|| {
+                        let problem = "the file has fewer than two parameters with separate distributions";
+                        let help = format!("a map has two axes: give one by {name} NAME=FROM..TO/STEP");
+                        wrong(problem.to_owned(), help)
+                    })
+                }
+            }
+        };
+        // What `y` names must not be taken for `x`.
+        let (x, y) = if self.x.is_none() && self.y.is_some() {
+            let y = axis(&self.y, "option `y`")?;
+            (axis(&self.x, "option `x`")?, y)
+        } else {
+            let x = axis(&self.x, "option `x`")?;
+            (x, axis(&self.y, "option `y`")?)
+        };
+        let mut fixed = self.set.iter().map(|text| value(category, text)).collect::<Result<Vec<_>>>()?;
+        fixed.extend(left.iter().filter(|axis| axis.len() == 1).map(|axis| (axis.parameter, axis.values[0])));
+        left.retain(|axis| axis.len() > 1);
+        let panel = |text: &String| GridAxis::parse(category, text, "option `panel`");
+        left.extend(self.panel.iter().map(panel).collect::<Result<Vec<_>>>()?);
+        for axis in left.iter().filter(|_| is_of_file) {
+            if rows.len().saturating_mul(axis.len()) > MAX_PANELS {
+                let help = format!("give fewer values: a sheet has at most {MAX_PANELS} panels");
+                return Err(Error::usage(Place::option("distribution"), "too many panels", help));
+            }
+            let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();
+            rows = rows.iter().flat_map(|row| axis.values.iter().map(move |v| with(row, *v))).collect();
+        }
+        Ok(GridParts {
+            name: category.key().to_owned(),
+            category,
+            x,
+            y,
+            panel_axes: set_axes.into_iter().chain(left).collect(),
+            fixed,
+            style: CaseStyle::Plain,
+            native_gap: self.native_gap,
+            closing_only: self.closing_only,
+            panel_rows: is_of_file.then_some(rows),
+        })
+    }
+}
+
+fn value(category: Category, text: &str) -> Result<(&'static MapParameter, f64)> {
+    let axis = GridAxis::parse(category, text, "option `set`")?;
+    match axis.values[..] {
+        [value] => Ok((axis.parameter, value)),
+        _ => {
+            let problem = format!("`{text}` has {} values", axis.len());
+            Err(Error::usage(Place::option("set"), problem, "give one, or make it an axis with option `panel`"))
+        }
+    }
+}
+
+impl GridParts {
+    /// Looks at every value, and collects what is doubtful.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a value that no road has, where those are refused.
+    pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
+        for axis in [&self.x, &self.y].into_iter().chain(&self.panel_axes) {
+            axis.values.iter().try_for_each(|value| axis.parameter.judge(*value, doubts))?;
+        }
+        self.fixed.iter().try_for_each(|(parameter, value)| parameter.judge(*value, doubts))
+    }
+}
