@@ -1,7 +1,7 @@
 //! Every kernel as a Vulkan driver compiles it: registers, spills, instructions and machine code. No lane runs, so a
 //! driver without its chip is sufficient (`.ci/compilers` names Mesa's).
 //!
-//! `cargo bench --bench pipelines -- --out FOLDER [--profile NAME]... [--unchecked]` writes every kernel as WGSL with
+//! `cargo bench --bench pipelines -- --out FOLDER [--profile NAME]...` writes every kernel as WGSL with
 //! its constants, SPIR-V, HLSL and MSL to FOLDER, and below it the machine code of each device that gives it. CSV rows go to stdout: one per
 //! device, kernel and statistic of the driver. All profiles are compiled unless some are named; a kernel that two
 //! profiles share is compiled once. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps the lanes of a study and their warps make instead.
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use common::paper_size_scenarios;
-use lanesweep::engine::gpu::{Checks, exact_spirv, shader};
+use lanesweep::engine::gpu::{exact_spirv, shader};
 use lanesweep::engine::{Constants, CpuBackend, Executor, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -53,9 +53,8 @@ fn main() {
     if args.iter().any(|arg| arg == "--steps") {
         return print_steps();
     }
-    let checks = if args.iter().any(|arg| arg == "--unchecked") { Checks::Unchecked } else { Checks::Checked };
     let out = PathBuf::from(*values("--out").last().expect("--out FOLDER"));
-    let mut kernels = kernels(&profiles, checks, args.iter().any(|arg| arg == "--values"));
+    let mut kernels = kernels(&profiles, args.iter().any(|arg| arg == "--values"));
     if let Some(defect) = values("--plant").last() {
         plant(&mut kernels, defect);
     }
@@ -70,10 +69,10 @@ fn main() {
 }
 
 /// The generator, and every model with the constants of every profile and category. A cut-out has a second vehicle.
-fn kernels(profiles: &[&str], checks: Checks, values: bool) -> Vec<Kernel> {
+fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
     let mut all: Vec<Kernel> = Vec::new();
     let mut add = |name: String, entry, source: String, constants: Vec<(&'static str, f64)>, bindings| {
-        let words = exact_spirv(&source, entry, &constants, checks).expect("SPIR-V");
+        let words = exact_spirv(&source, entry, &constants).expect("SPIR-V");
         if !all.iter().any(|known| known.words == words) {
             all.push(Kernel { name, entry, source, constants, bindings, words });
         }
@@ -119,7 +118,7 @@ fn plant(kernels: &mut Vec<Kernel>, defect: &str) {
          @compute @workgroup_size(64) fn lanes(@builtin(local_invocation_index) inside: u32) {{\n\
          let n = inside * count;\n{source}}}\n"
     );
-    let words = exact_spirv(&source, shader::ENTRY, &[], Checks::Checked).expect("SPIR-V");
+    let words = exact_spirv(&source, shader::ENTRY, &[]).expect("SPIR-V");
     let name = format!("planted.{defect}");
     kernels.push(Kernel { name, entry: shader::ENTRY, source, constants: Vec::new(), bindings: 3, words });
 }

@@ -6,7 +6,7 @@ use std::io::Write;
 
 use lanesweep::engine::Backend;
 #[cfg(feature = "gpu")]
-use lanesweep::engine::gpu::{Adapters, Api, DeviceKind, GpuBackend, GpuOptions};
+use lanesweep::engine::gpu::{Adapters, Api, DeviceKind, GpuBackend, GpuOptions, Tampering};
 
 /// The devices of this machine and the index of its software Vulkan (Mesa's llvmpipe: on Debian, libvulkan1 and
 /// mesa-vulkan-drivers); where there is none, says so loudly and gives `None`: the test returns. With the
@@ -24,9 +24,48 @@ pub fn software_device() -> Option<(Adapters, usize)> {
 
 /// The software device, open.
 #[cfg(feature = "gpu")]
-pub fn software_backend() -> Option<Box<dyn Backend>> {
+pub fn open(options: GpuOptions) -> Option<GpuBackend> {
+    tampered(options, Tampering::default())
+}
+
+/// The same with a disturbance.
+#[cfg(feature = "gpu")]
+pub fn tampered(options: GpuOptions, tampering: Tampering) -> Option<GpuBackend> {
     let (adapters, index) = software_device()?;
-    Some(Box::new(GpuBackend::open(&adapters, index, GpuOptions::default()).unwrap()))
+    Some(GpuBackend::open_tampered(&adapters, index, options, tampering).unwrap())
+}
+
+/// A text of the shaders that is replaced.
+#[cfg(feature = "gpu")]
+pub fn patched(from: &str, to: &str) -> Option<GpuBackend> {
+    let shader_patch = Some((from.to_owned(), to.to_owned()));
+    tampered(GpuOptions::default(), Tampering { shader_patch, ..Default::default() })
+}
+
+/// The device is lost for good before a job.
+#[cfg(feature = "gpu")]
+pub fn lost_at(at_job: u64) -> Tampering {
+    let before_job = move |job, device: &wgpu::Device| {
+        if job == at_job {
+            device.destroy();
+        }
+        Ok(())
+    };
+    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
+}
+
+/// The device has no memory for a job.
+#[cfg(feature = "gpu")]
+pub fn out_of_memory_at(at_job: u64) -> Tampering {
+    let before_job =
+        move |job, _: &wgpu::Device| if job == at_job { Err("it has no memory for this job") } else { Ok(()) };
+    Tampering { before_job: Some(std::sync::Arc::new(before_job)), ..Default::default() }
+}
+
+/// The software device as a backend.
+#[cfg(feature = "gpu")]
+pub fn software_backend() -> Option<Box<dyn Backend>> {
+    Some(Box::new(open(GpuOptions::default())?))
 }
 
 /// The same of a program without GPUs: none, said as loudly.

@@ -9,6 +9,7 @@ pub mod device;
 pub mod lane_sets;
 pub mod page;
 pub mod plans;
+pub mod program;
 pub mod reliability;
 pub mod small;
 #[cfg(feature = "parquet")]

@@ -1,8 +1,8 @@
 //! Plans and uses of a device that the study never makes: subsets of the models in any order, blocks without
 //! units and of the same category, sessions side by side, and going on after an error.
 
-use crate::common::device::software_device;
-use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
+use crate::common::device::{open, out_of_memory_at, tampered};
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{Backend, Block, CaseSource, CpuBackend, Headway, LaneCase, LanePlan, Wanted, same_words};
 use lanesweep::model::driver::ModelId;
@@ -10,11 +10,6 @@ use lanesweep::model::profile::Profile;
 use lanesweep::scenario::Tables;
 
 const ALL_WANTED: [Wanted; 2] = [Wanted::Verdicts, Wanted::Outcomes];
-
-fn open(options: GpuOptions) -> Option<GpuBackend> {
-    let (adapters, index) = software_device()?;
-    Some(GpuBackend::open(&adapters, index, options).unwrap())
-}
 
 fn random(lanes: u64, seed: u64, models: &[ModelId]) -> LanePlan {
     let options =
@@ -142,8 +137,8 @@ fn after_a_job_without_memory_nothing_wrong_is_computed() {
     let expected =
         CpuBackend::lane_arithmetic().prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap();
     for at_job in [0, 1, 2] {
-        let fault = Some(Fault { at_job, kind: FaultKind::OutOfMemory });
-        let Some(gpu) = open(GpuOptions { fault, first_lanes: 1000, ..Default::default() }) else { return };
+        let options = GpuOptions { first_lanes: 1000, ..Default::default() };
+        let Some(gpu) = tampered(options, out_of_memory_at(at_job)) else { return };
         let mut session = gpu.prepare(&plan).unwrap();
         let mut failed = 0;
         for round in 0..3 {

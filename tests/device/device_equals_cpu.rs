@@ -2,9 +2,9 @@
 //! run-time checks; and a wrong shader is found. The software Vulkan stands for a device here; `lanesweep
 //! verify` asks the same of any other.
 
-use crate::common::device::software_device;
+use crate::common::device::{open, patched, tampered};
 use crate::common::lane_sets::{forms, random, small_study, small_study_of, thresholds};
-use lanesweep::engine::gpu::{Checks, GpuBackend, GpuOptions};
+use lanesweep::engine::gpu::{GpuOptions, Tampering};
 use lanesweep::engine::verify::{Comparison, compare, self_check};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Headway, LanePlan, Wanted, same_words};
 use lanesweep::model::driver::ModelId;
@@ -12,11 +12,6 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::{CaseStyle, Grid, GridAxis, GridParts, GridPlan, MapParameter};
 use lanesweep::run::study::StudyOptions;
 use lanesweep::scenario::Category;
-
-fn open(options: GpuOptions) -> Option<GpuBackend> {
-    let (adapters, index) = software_device()?;
-    Some(GpuBackend::open(&adapters, index, options).unwrap())
-}
 
 fn run(backend: &dyn Backend, plan: &LanePlan, wanted: Wanted) -> Chunk {
     let chunk = backend.prepare(plan).unwrap().run(0..plan.unit_count(), wanted).unwrap();
@@ -115,14 +110,6 @@ fn the_cut_into_jobs_and_into_calls_changes_no_word() {
 }
 
 #[test]
-fn shaders_without_run_time_checks_give_the_same_words() {
-    let Some(gpu) = open(GpuOptions { checks: Checks::Unchecked, ..Default::default() }) else { return };
-    let profile = Profile::load("paper").unwrap();
-    assert_equal("unchecked", &compare("random", &random(&profile, 2000), &gpu, |_| ()).unwrap());
-    assert_equal("unchecked", &compare("thresholds", &thresholds(&profile, 4), &gpu, |_| ()).unwrap());
-}
-
-#[test]
 fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
     let profile = Profile::load("paper").unwrap();
     let (many, few) = (random(&profile, 3000), random(&profile, 7));
@@ -140,8 +127,7 @@ fn an_invocation_that_computes_many_lanes_writes_the_same_words() {
 
 /// What `verify` says of a device whose shaders have one text replaced.
 fn shader_patch(from: &str, to: &str) -> Option<Comparison> {
-    let shader_patch = Some((from.to_owned(), to.to_owned()));
-    let gpu = open(GpuOptions { shader_patch, ..Default::default() })?;
+    let gpu = patched(from, to)?;
     let profile = Profile::load("paper").unwrap();
     let mut found = compare("random", &random(&profile, 4000), &gpu, |_| ()).unwrap();
     let thresholds = compare("thresholds", &thresholds(&profile, 8), &gpu, |_| ()).unwrap();
@@ -191,15 +177,13 @@ fn the_quick_self_check_finds_a_wrong_shader_and_no_other() {
     let Some(gpu) = open(GpuOptions::default()) else { return };
     let good = self_check(&gpu).unwrap();
     assert!(good.lanes > 8000 && good.differing == 0, "{good:?}");
-    let shader_patch = Some(("(v_ego - state.v_before)".to_owned(), "(state.v_before - v_ego)".to_owned()));
-    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    let Some(gpu) = patched("(v_ego - state.v_before)", "(state.v_before - v_ego)") else { return };
     assert!(self_check(&gpu).unwrap().differing > 0);
 }
 
 #[test]
 fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
-    let shader_patch = Some(("select(launch.lanes, ".to_owned(), "select(launch.lanes - 1u, ".to_owned()));
-    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    let Some(gpu) = patched("select(launch.lanes, ", "select(launch.lanes - 1u, ") else { return };
     let plan = random(&Profile::load("paper").unwrap(), 400);
     let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), Wanted::Verdicts).unwrap_err();
     assert!(error.to_string().contains("of 400 lanes") || error.to_string().contains("lanes of"), "{error}");
@@ -209,7 +193,8 @@ fn a_device_that_leaves_lanes_out_is_an_error_and_no_result() {
 /// promised there, and what the drivers at hand do is printed.
 #[test]
 fn the_self_check_finds_what_the_plain_path_changes() {
-    let Some(gpu) = open(GpuOptions { plain: true, ..Default::default() }) else { return };
+    let plain = Tampering { plain: true, ..Default::default() };
+    let Some(gpu) = tampered(GpuOptions::default(), plain) else { return };
     assert!(!gpu.is_exact());
     let profile = Profile::load("paper").unwrap();
     let found = compare("random", &random(&profile, 20_000), &gpu, |_| ()).unwrap();

@@ -3,19 +3,14 @@
 
 use std::time::Duration;
 
-use crate::common::device::software_device;
+use crate::common::device::{lost_at, open, out_of_memory_at, patched, tampered};
 use lanesweep::Error;
-use lanesweep::engine::gpu::{Fault, FaultKind, GpuBackend, GpuOptions};
+use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{
     Backend, CpuBackend, Executor, LanePlan, Partial, RecheckOptions, SweepSummary, Verdicts, Wanted,
 };
 use lanesweep::model::profile::Profile;
-
-fn open(options: GpuOptions) -> Option<GpuBackend> {
-    let (adapters, index) = software_device()?;
-    Some(GpuBackend::open(&adapters, index, options).unwrap())
-}
 
 fn plan() -> LanePlan {
     let options = RandomOptions { lanes_per_model_and_category: 40_000, ..Default::default() };
@@ -56,8 +51,7 @@ fn a_device_that_is_lost_at_any_job_leaves_complete_numbers() {
     let plan = plan();
     let expected = expected(&plan);
     for at_job in [0, 3] {
-        let fault = Some(Fault { at_job, kind: FaultKind::Lost });
-        let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+        let Some(gpu) = tampered(GpuOptions::default(), lost_at(at_job)) else { return };
         let (verdicts, summary) = swept(&plan, &gpu);
         assert!(verdicts == expected, "lost at job {at_job}");
         assert!(summary.redone_lanes > 0 && summary.lanes == plan.lane_count(), "{summary:?}");
@@ -69,8 +63,7 @@ fn a_device_that_is_lost_at_any_job_leaves_complete_numbers() {
 #[test]
 fn a_device_without_memory_leaves_complete_numbers() {
     let plan = plan();
-    let fault = Some(Fault { at_job: 1, kind: FaultKind::OutOfMemory });
-    let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+    let Some(gpu) = tampered(GpuOptions::default(), out_of_memory_at(1)) else { return };
     let (verdicts, summary) = swept(&plan, &gpu);
     assert!(verdicts == expected(&plan) && summary.redone_lanes > 0, "{summary:?}");
 }
@@ -87,11 +80,10 @@ fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
 #[test]
 fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
     let plan = plan();
-    let shader_patch = Some(("turn < MAX_TURNS; turn++".to_owned(), "turn < 100u; turn++".to_owned()));
-    let options = GpuOptions { shader_patch, ..Default::default() };
-    let Some(gpu) = open(options.clone()) else { return };
+    let few_turns = || patched("turn < MAX_TURNS; turn++", "turn < 100u; turn++");
+    let Some(gpu) = few_turns() else { return };
     for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
-        let Some(gpu) = open(options.clone()) else { return };
+        let Some(gpu) = few_turns() else { return };
         let error = gpu.prepare(&plan).unwrap().run(0..plan.unit_count(), wanted).unwrap_err();
         assert!(error.to_string().contains("it completed") && error.to_string().contains("lanes of"), "{error}");
     }
@@ -116,8 +108,7 @@ fn lanes_of_more_steps_than_a_device_runs_are_computed_all_the_same() {
 #[test]
 fn without_a_stand_in_the_failure_is_the_users_to_know() {
     let plan = plan();
-    let fault = Some(Fault { at_job: 0, kind: FaultKind::Lost });
-    let Some(gpu) = open(GpuOptions { fault, ..Default::default() }) else { return };
+    let Some(gpu) = tampered(GpuOptions::default(), lost_at(0)) else { return };
     let error = Executor::new(&gpu).sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).unwrap_err();
     assert!(matches!(&error, Error::Device { .. }), "{error}");
     assert!(error.help().unwrap().contains("option `backend = cpu`"));
@@ -127,11 +118,8 @@ fn without_a_stand_in_the_failure_is_the_users_to_know() {
 fn a_wrong_lane_stops_the_run_and_is_named() {
     let plan = plan();
     // One model's verdict bit, always.
-    let shader_patch = Some((
-        "select(0u, 2u, state.record.ttc.failed)".to_owned(),
-        "select(2u, 0u, state.record.ttc.failed)".to_owned(),
-    ));
-    let Some(gpu) = open(GpuOptions { shader_patch, ..Default::default() }) else { return };
+    let (right, wrong) = ("select(0u, 2u, state.record.ttc.failed)", "select(2u, 0u, state.record.ttc.failed)");
+    let Some(gpu) = patched(right, wrong) else { return };
     let cpu = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&gpu).with_fallback(Some(&cpu)).with_recheck(1);
     for wanted in [Wanted::Verdicts, Wanted::Outcomes] {

@@ -17,7 +17,7 @@
 
 use crate::common::device::software_device;
 use bytemuck::{Pod, Zeroable};
-use lanesweep::engine::gpu::{Checks, exact_spirv, shader::ENTRY};
+use lanesweep::engine::gpu::{exact_spirv, shader::ENTRY};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
@@ -61,7 +61,7 @@ struct Question {
 #[derive(Clone, Copy)]
 enum Path {
     /// As SPIR-V without contraction: the way of the sweeps.
-    Exact(Checks),
+    Exact,
     /// As WGSL, translated by wgpu: the way on other interfaces.
     Plain,
 }
@@ -81,7 +81,7 @@ impl Divider {
     fn new(source: &str, path: Path) -> Option<Divider> {
         let (adapters, index) = software_device()?;
         let adapter = adapters.take(index).unwrap();
-        let is_exact = matches!(path, Path::Exact(_));
+        let is_exact = matches!(path, Path::Exact);
         assert!(adapters.cards()[index].exact_path || !is_exact, "the software Vulkan has no exact path");
         let mut required_features = wgpu::Features::empty();
         required_features.set(wgpu::Features::PASSTHROUGH_SHADERS, is_exact);
@@ -89,8 +89,8 @@ impl Divider {
             wgpu::DeviceDescriptor { required_features, required_limits: adapter.limits(), ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
         let module = match path {
-            Path::Exact(checks) => {
-                let words = exact_spirv(source, ENTRY, &[], checks).unwrap();
+            Path::Exact => {
+                let words = exact_spirv(source, ENTRY, &[]).unwrap();
                 let entry = wgpu::PassthroughShaderEntryPoint { name: ENTRY.into(), workgroup_size: (WORKGROUP, 1, 1) };
                 // SAFETY: valid SPIR-V of naga, whose bindings are those of `layout`.
                 unsafe {
@@ -319,12 +319,7 @@ fn assert_correct(path: Path, pairs: usize) {
 
 #[test]
 fn the_quotient_is_correctly_rounded_on_the_path_of_the_sweeps() {
-    assert_correct(Path::Exact(Checks::Checked), 4_000_000);
-}
-
-#[test]
-fn the_quotient_is_correctly_rounded_without_run_time_checks() {
-    assert_correct(Path::Exact(Checks::Unchecked), 1_000_000);
+    assert_correct(Path::Exact, 4_000_000);
 }
 
 #[test]
@@ -336,7 +331,7 @@ fn the_quotient_is_correctly_rounded_as_plain_wgsl() {
 #[test]
 #[ignore = "a longer run of the same"]
 fn twenty_million_quotients_are_correctly_rounded_from_every_guess() {
-    assert_correct(Path::Exact(Checks::Checked), 20_000_000);
+    assert_correct(Path::Exact, 20_000_000);
 }
 
 #[test]
@@ -352,7 +347,7 @@ fn a_defect_of_the_correction_is_seen() {
     ] {
         assert!(EXACT.contains(right), "{right}");
         let source = format!("{}{KERNEL}", EXACT.replace(right, wrong));
-        let Some(divider) = Divider::new(&source, Path::Exact(Checks::Checked)) else { return };
+        let Some(divider) = Divider::new(&source, Path::Exact) else { return };
         let seen = compare(&divider, 1);
         assert!(seen.wrong.iter().sum::<usize>() > 0, "{right} became {wrong}, and nothing was seen");
     }

@@ -3,7 +3,7 @@
 // SPIR-V is handed to the driver unseen, as src/engine/gpu/device.rs does with the shaders of this crate.
 #![allow(unsafe_code)]
 
-use lanesweep::engine::gpu::{Checks, exact_spirv, shader::ENTRY};
+use lanesweep::engine::gpu::{exact_spirv, shader::ENTRY};
 
 use crate::common::device::software_device;
 
@@ -14,7 +14,7 @@ pub const WORKGROUP: u32 = 64;
 #[derive(Debug, Clone, Copy)]
 pub enum Path {
     /// As SPIR-V without contraction: the way of the sweeps.
-    Exact(Checks),
+    Exact,
     /// As WGSL, translated by wgpu: the way on other interfaces.
     Plain,
 }
@@ -32,7 +32,7 @@ impl Kernel {
     pub fn new(source: &str, inputs: u32, path: Path) -> Option<Kernel> {
         let (adapters, index) = software_device()?;
         let adapter = adapters.take(index).unwrap();
-        let is_exact = matches!(path, Path::Exact(_));
+        let is_exact = matches!(path, Path::Exact);
         assert!(adapters.cards()[index].exact_path || !is_exact, "the software Vulkan has no exact path");
         let mut required_features = wgpu::Features::empty();
         required_features.set(wgpu::Features::PASSTHROUGH_SHADERS, is_exact);
@@ -40,8 +40,8 @@ impl Kernel {
             wgpu::DeviceDescriptor { required_features, required_limits: adapter.limits(), ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
         let module = match path {
-            Path::Exact(checks) => {
-                let words = exact_spirv(source, ENTRY, &[], checks).unwrap();
+            Path::Exact => {
+                let words = exact_spirv(source, ENTRY, &[]).unwrap();
                 let entry = wgpu::PassthroughShaderEntryPoint { name: ENTRY.into(), workgroup_size: (WORKGROUP, 1, 1) };
                 // SAFETY: valid SPIR-V of naga, whose bindings are those of `layout`.
                 unsafe {

@@ -6,7 +6,7 @@
 #![allow(unsafe_code)]
 
 use crate::kernel::{Kernel, Path, WORKGROUP};
-use lanesweep::engine::gpu::{Checks, shader::RANDOM};
+use lanesweep::engine::gpu::shader::RANDOM;
 use lanesweep::stats::random::{AliasTable, Sobol, Stream, choose, normal_table, standard_normal, unit_uniform};
 
 const BINDINGS: &str = "
@@ -148,18 +148,11 @@ fn a_million() -> Vec<u64> {
 
 #[test]
 fn a_million_indices_in_eight_dimensions_have_the_bits_of_rust() {
-    let Some(kernel) = Kernel::new(&source(OF_INDICES), 4, Path::Exact(Checks::Checked)) else { return };
+    let Some(kernel) = Kernel::new(&source(OF_INDICES), 4, Path::Exact) else { return };
     let indices = a_million();
     assert!(indices.len() * BATCH as usize >= 1_000_000);
     let (wrong, first) = differing(&kernel, &indices);
     println!("{} indices, {DIMENSIONS} dimensions: {wrong:?} words differ", indices.len() * BATCH as usize);
-    assert_eq!(wrong, [0; 7], "{first:?}");
-}
-
-#[test]
-fn they_have_them_without_run_time_checks() {
-    let Some(kernel) = Kernel::new(&source(OF_INDICES), 4, Path::Exact(Checks::Unchecked)) else { return };
-    let (wrong, first) = differing(&kernel, &[0, (1 << 32) - 99]);
     assert_eq!(wrong, [0; 7], "{first:?}");
 }
 
@@ -174,7 +167,7 @@ fn as_plain_wgsl_the_words_are_the_same_and_deviates_at_most_rounded_apart() {
 
 #[test]
 fn the_ends_of_every_cubic_have_the_bits_of_rust() {
-    let Some(kernel) = Kernel::new(&source(OF_WORDS), 4, Path::Exact(Checks::Checked)) else { return };
+    let Some(kernel) = Kernel::new(&source(OF_WORDS), 4, Path::Exact) else { return };
     let mut words: Vec<u32> = vec![];
     for octave in 0..32_u32 {
         for step in 0..16_u64 {
@@ -208,7 +201,7 @@ fn a_defect_of_a_fragment_is_seen() {
         let source = source(OF_INDICES);
         assert_eq!(source.matches(right).count(), 1, "{right}");
         let broken = source.replace(right, wrong);
-        let Some(kernel) = Kernel::new(&broken, 4, Path::Exact(Checks::Checked)) else { return };
+        let Some(kernel) = Kernel::new(&broken, 4, Path::Exact) else { return };
         let (found, _) = differing(&kernel, &[(1 << 32) - 99]);
         assert!(found[kind] > 0, "{right} is {wrong:?}: {found:?}");
     }

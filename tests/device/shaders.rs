@@ -12,7 +12,7 @@ use lanesweep::engine::generated::{
     self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
 };
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
-use lanesweep::engine::gpu::{Checks, Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
+use lanesweep::engine::gpu::{Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
 use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
@@ -114,16 +114,13 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
             for paired in [false, true] {
                 let constants =
                     shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
-                let sizes = [Checks::Checked, Checks::Unchecked].map(|checks| {
-                    let words = exact_spirv(&source, shader::ENTRY, &constants, checks);
-                    words.unwrap_or_else(|e| panic!("{model:?}, {place}, paired {paired}, {checks:?}: {e}")).len()
-                });
-                assert!(sizes[0] > sizes[1], "{model:?}, {place}: the checks add nothing");
-                compiled += 2;
+                let words = exact_spirv(&source, shader::ENTRY, &constants);
+                assert!(words.is_ok_and(|words| !words.is_empty()), "{model:?}, {place}, paired {paired}");
+                compiled += 1;
             }
         }
     }
-    assert_eq!(compiled, MODELS * Profile::names().count() * Category::ALL.len() * 4);
+    assert_eq!(compiled, MODELS * Profile::names().count() * Category::ALL.len() * 2);
 }
 
 #[test]
@@ -176,7 +173,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     }
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
-    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &[], Checks::Checked);
+    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &[]);
     assert!(words.is_ok_and(|w| !w.is_empty()));
 }
 

@@ -4,57 +4,32 @@
 //! byte. What the machine does not allow (mounts, another user) is skipped loudly.
 #![cfg(unix)]
 
-use crate::common;
+use crate::common::{self, page};
 mod machine;
 mod workers;
 
+use crate::common::program::{
+    self, command, done, ended, files, limited, names, start, unbroken, wait_for_run, without_times,
+};
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_lanesweep");
-
-/// Longest wait for anything here; an unloaded machine needs a second or two.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Text without the drawing, which breaks long lines, also after a hyphen or a slash.
-fn flat(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    let words: Vec<&str> = text.split_whitespace().filter(|word| *word != "│").collect();
-    words.join(" ").replace("- ", "-").replace("/ ", "/")
-}
 
 /// Runs a command of the program in a folder: exit code and stderr.
 fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String) {
-    let output = Command::new(PROGRAM).env("NO_COLOR", "1").current_dir(dir).args(args).output().unwrap();
-    (output.status.code().unwrap_or(-1), flat(&output.stderr))
+    let (code, _, err) = program::lanesweep(dir, args);
+    (code, unbroken(err.as_bytes()))
 }
 
-fn done(dir: &Path, args: &[&str]) {
-    let (code, said) = lanesweep(dir, args);
-    assert_eq!(code, 0, "{args:?}: {said}");
-}
-
-/// Every file of a finished run but its record, which holds times; nothing hidden or half-written may be left.
-fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        let name = PathBuf::from(path.file_name().unwrap());
-        let is_record = ["run.json", "estimate.json", "report.html"].iter().any(|record| name == Path::new(record));
-        files.push((name, if is_record { Vec::new() } else { std::fs::read(&path).unwrap() }));
-    }
-    files.sort();
-    files
-}
-
+/// Nothing hidden or half-written may be left in the folder of a finished run.
 fn same(found: &Path, undisturbed: &Path, what: &str) {
-    let (found, expected) = (results(found), results(undisturbed));
-    let names = |files: &[(PathBuf, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    assert_eq!(names(&found), names(&expected), "{what}");
-    for ((name, found), (_, expected)) in found.iter().zip(&expected) {
-        assert!(found == expected, "{what}: {} differs", name.display());
-    }
+    let [found, expected] = [found, undisturbed].map(|dir| {
+        let mut files = without_times(files(dir));
+        if let Some(page) = files.get_mut("report.html") {
+            *page = page::without_host(std::str::from_utf8(page).unwrap()).into_bytes();
+        }
+        files
+    });
+    program::same(&found, &expected, what);
 }
 
 /// A folder with scenarios and a density.
@@ -120,17 +95,10 @@ fn at_a_limit_of_the_size_of_files_the_run_says_so_and_ends_well_without_it() {
         let whole = shared().join(name);
         // In blocks of 512 or 1024 bytes, as the shell counts: less than a table of the study, than a sample's journal.
         let blocks = if name == "study" { "1" } else { "8" };
-        let script = format!("ulimit -f {blocks} && exec \"$0\" \"$@\"");
         let command = [run, &["--out", name]].concat();
-        let limited = Command::new("sh")
-            .current_dir(bench.path())
-            .env("NO_COLOR", "1")
-            .args(["-c", &script, PROGRAM])
-            .args(&command)
-            .output()
-            .unwrap();
-        let said = flat(&limited.stderr);
-        assert_eq!(limited.status.code(), Some(6), "{name}: {:?} {said}", limited.status);
+        let (code, _, err) = limited(bench.path(), &format!("ulimit -f {blocks}"), &command);
+        let said = unbroken(err.as_bytes());
+        assert_eq!(code, 6, "{name}: {said}");
         assert!(said.contains("File too large") && said.contains("ulimit -f"), "{said}");
         done(bench.path(), &command);
         same(&bench.path().join(name), &whole, name);
@@ -145,13 +113,13 @@ fn a_full_standard_output_is_told_and_the_result_is_whole() {
     let bench = Bench::new();
     for (name, run) in RUNS {
         let whole = shared().join(name);
-        let command = [run, &["--out", name]].concat();
+        let args = [run, &["--out", name]].concat();
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let output = Command::new(PROGRAM).current_dir(bench.path()).args(&command).stdout(full).output().unwrap();
-        let said = flat(&output.stderr);
+        let output = command(bench.path(), &args).stdout(full).output().unwrap();
+        let said = unbroken(&output.stderr);
         assert_eq!(output.status.code(), Some(6), "{said}");
         assert!(said.contains("standard output") && said.contains("No space left"), "{said}");
-        done(bench.path(), &command);
+        done(bench.path(), &args);
         same(&bench.path().join(name), &whole, name);
     }
 }
@@ -164,36 +132,17 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
     let out = bench.path().join("out");
     let (mut told, mut made_again) = (0, 0);
     for round in 0..2 {
-        let mut child = Command::new(PROGRAM)
-            .current_dir(bench.path())
-            .args([&long[..], &["--out", "out"]].concat())
-            .env("NO_COLOR", "1")
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let started = Instant::now();
+        let mut run = start(bench.path(), &[&long[..], &["--out", "out"]].concat());
         // Before its journal is begun, and after.
-        let awaited = |entry: &str| match round % 2 {
-            0 => entry == "run.lock",
-            _ => entry.ends_with(".journal"),
-        };
-        while !std::fs::read_dir(&out)
-            .into_iter()
-            .flatten()
-            .flatten()
-            .any(|e| awaited(&e.file_name().to_string_lossy()))
-        {
-            assert!(started.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "nothing is being written");
-            std::thread::sleep(Duration::from_millis(2));
-        }
+        let awaited = |entry: &String| if round == 0 { entry == "run.lock" } else { entry.ends_with(".journal") };
+        wait_for_run(&mut run, "something is being written", || names(&out).iter().any(awaited));
         std::fs::remove_dir_all(&out).unwrap();
-        let ended = child.wait_with_output().unwrap();
-        let said = flat(&ended.stderr);
-        match ended.status.code() {
+        let (code, err) = ended(run);
+        let said = unbroken(err.as_bytes());
+        match code {
             // It came to its end before the next record was due.
-            Some(0) => made_again += 1,
-            Some(6) => {
+            0 => made_again += 1,
+            6 => {
                 assert!(said.contains("out vanished") && said.contains("begins anew"), "{said}");
                 assert!(!said.contains("are done and kept"), "{said}");
                 assert!(!out.exists(), "a folder that is taken away is not made again by a journal");

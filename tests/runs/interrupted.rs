@@ -7,17 +7,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::common::program::{self, PATIENCE, done, kill, limited, send, start, wait_for_run, wait_until};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Session, Verdicts, Wanted};
 use lanesweep::model::profile::Profile;
 use lanesweep::support::interrupt;
-
-/// Longest wait for anything here; an unloaded machine needs a second or two.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-fn send(signal: &str, pid: u32) {
-    assert!(Command::new("kill").args([format!("-{signal}"), pid.to_string()]).status().unwrap().success());
-}
 
 /// The hidden, unfinished files of a folder.
 fn unfinished(dir: &Path) -> Vec<PathBuf> {
@@ -25,21 +19,10 @@ fn unfinished(dir: &Path) -> Vec<PathBuf> {
     entries.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
-fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !is_so() {
-        assert!(start.elapsed() < PATIENCE, "{what}: not within {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-fn ended(child: &mut Child) -> Option<i32> {
-    let mut status = None;
-    wait_until("the process ends", || {
-        status = child.try_wait().unwrap();
-        status.is_some()
-    });
-    status.unwrap().code()
+/// Exit code and stderr of a run that ends within the patience of the tests.
+fn ended(mut run: Child) -> (i32, String) {
+    wait_until("the process ends", || run.try_wait().unwrap().is_some());
+    program::ended(run)
 }
 
 /// Estimates of a folder, without what belongs to the machine.
@@ -53,17 +36,26 @@ fn estimates(dir: &Path) -> serde_json::Value {
 #[test]
 fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
-    let lanesweep = |args: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
-        command.current_dir(dir.path()).args(["-q", "--threads", "1"]).args(args).stdout(Stdio::null());
-        command
-    };
-    let fit = ["fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2", "--config"];
-    let fit = [&fit[..], &["fit.valid_draws=1000", "--no-comparison", "--out", "d.json"]].concat();
-    assert!(lanesweep(&fit).status().unwrap().success());
-    let run = ["sample", "d.json", "--estimator", "is", "--models", "FSM,RSS", "--thw", "0.6", "--samples", "200000"];
+    let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000 \
+               --no-comparison --out d.json";
+    done(dir.path(), &fit.split_whitespace().collect::<Vec<_>>());
+    let run = [
+        "-q",
+        "--threads",
+        "1",
+        "sample",
+        "d.json",
+        "--estimator",
+        "is",
+        "--models",
+        "FSM,RSS",
+        "--thw",
+        "0.6",
+        "--samples",
+        "200000",
+    ];
     let run = |out| [&run[..], &["--backend", "cpu", "--out", out]].concat();
-    assert!(lanesweep(&run("whole")).status().unwrap().success());
+    done(dir.path(), &run("whole"));
     let (killed, pilot) = (dir.path().join("killed"), dir.path().join("killed/pilot.json"));
     let journal = || {
         let names = std::fs::read_dir(&killed).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -71,7 +63,7 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
     };
     let (mut kills, mut found) = (0, Vec::new());
     loop {
-        let mut child = lanesweep(&run("killed")).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = start(dir.path(), &run("killed"));
         let before = journal().and_then(|path| std::fs::metadata(path).ok()).map_or(0, |file| file.len());
         let mut status = None;
         wait_until("the journal grows, or the run ends", || {
@@ -83,8 +75,7 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
             assert!(status.success());
             break;
         }
-        send("KILL", child.id());
-        child.wait().unwrap();
+        kill(child);
         kills += 1;
         found.push(std::fs::read(&pilot).unwrap());
     }
@@ -97,35 +88,20 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
 }
 
 /// A study that is sent `signal` while it writes its lanes.
-fn study_interrupted_by(signal: &str) -> Option<i32> {
+fn study_interrupted_by(signal: &str) -> i32 {
     let dir = tempfile::tempdir().unwrap();
     let lanes = dir.path().join("lanes.csv");
     std::fs::write(&lanes, "of an earlier run").unwrap();
-    let mut study = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .args([
-            "-q",
-            "--threads",
-            "1",
-            "study",
-            "--reference",
-            "--synth-recordings",
-            "2",
-            "--config",
-            "generator.duration_s=300",
-        ])
-        .args([Path::new("--out"), &dir.path().join("out"), Path::new("--rows"), &lanes])
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
-    wait_until("rows are being written", || {
-        assert!(study.try_wait().unwrap().is_none(), "the study ended before it was interrupted");
+    let study = "-q --threads 1 study --reference --synth-recordings 2 --config generator.duration_s=300 --out out --rows lanes.csv";
+    let mut study = start(dir.path(), &study.split(' ').collect::<Vec<_>>());
+    wait_for_run(&mut study, "rows are being written", || {
         let in_middle = |path: &PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
         unfinished(dir.path()).iter().any(in_middle)
     });
     let name = unfinished(dir.path())[0].file_name().unwrap().to_str().unwrap().to_owned();
     assert!(name.starts_with(".lanesweep-lanes.csv-"), "{name}");
     send(signal, study.id());
-    let code = ended(&mut study);
+    let (code, _) = ended(study);
     assert_eq!(unfinished(dir.path()), Vec::<PathBuf>::new(), "after {signal}");
     assert_eq!(std::fs::read_to_string(&lanes).unwrap(), "of an earlier run", "what was there stays");
     assert!(!dir.path().join("out/run.lock").exists(), "the lock goes, whatever else stays");
@@ -156,11 +132,10 @@ fn a_dry_run_makes_the_series_of_few_of_many_long_scenarios() {
     let dir = tempfile::tempdir().unwrap();
     let scenarios = long_scenarios(dir.path());
     // All series have 1.7 GB at this time step, those of one scenario 0.2 GB.
-    let script =
-        "ulimit -v 700000; exec \"$0\" -q --threads 1 study --dry-run --backend cpu --dt 0.0001 --scenarios \"$1\"";
-    let run = Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_lanesweep")]).arg(scenarios).output().unwrap();
-    let (said, told) = (String::from_utf8_lossy(&run.stderr), String::from_utf8_lossy(&run.stdout));
-    assert_eq!(run.status.code(), Some(0), "{said}");
+    let run = "-q --threads 1 study --dry-run --backend cpu --dt 0.0001 --scenarios";
+    let run = [&run.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
+    let (code, told, said) = limited(dir.path(), "ulimit -v 700000", &run);
+    assert_eq!(code, 0, "{said}");
     // What the run itself will hold is told all the same.
     let peak = told.split("Memory  about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().replace(',', "");
     assert!(peak.parse::<f64>().unwrap() > 1000.0, "{told}");
@@ -170,26 +145,20 @@ fn a_dry_run_makes_the_series_of_few_of_many_long_scenarios() {
 fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
     let dir = tempfile::tempdir().unwrap();
     // The first chunk alone, a scenario, takes 15 s.
-    let mut study = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .args(["-q", "--threads", "1", "study", "--reference", "--dt", "0.0001", "--scenarios"])
-        .args([&long_scenarios(dir.path()), Path::new("--out"), &dir.path().join("out")])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    wait_until("the folder is locked", || {
-        assert!(study.try_wait().unwrap().is_none(), "the study ended before it was interrupted");
-        dir.path().join("out/run.lock").exists()
-    });
+    let scenarios = long_scenarios(dir.path());
+    let study = "-q --threads 1 study --reference --dt 0.0001 --out out --scenarios";
+    let study = [&study.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
+    let mut study = start(dir.path(), &study);
+    wait_for_run(&mut study, "the folder is locked", || dir.path().join("out/run.lock").exists());
     // The first chunk begins.
     std::thread::sleep(Duration::from_millis(500));
     send("TERM", study.id());
     let sent = Instant::now();
-    let code = ended(&mut study);
+    let (code, said) = ended(study);
     let waited = sent.elapsed();
-    let said = std::io::read_to_string(study.stderr.take().unwrap()).unwrap();
     // A second for a machine that is busy with other tests.
     assert!(waited < Duration::from_secs(6), "{waited:?}: {said}");
-    assert!(code == Some(75) && said.contains("the same command continues"), "{code:?}: {said}");
+    assert!(code == 75 && said.contains("the same command continues"), "{code:?}: {said}");
     assert!(!dir.path().join("out/run.lock").exists(), "the lock goes");
 }
 
@@ -197,28 +166,22 @@ fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
 fn a_run_without_a_journal_that_is_interrupted_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    let mut compare = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .args(["-q", "--threads", "1", "compare", "--backend", "cpu", "--synth-recordings", "2", "--samples", "1e8"])
-        .args([Path::new("--out"), &out])
-        .spawn()
-        .unwrap();
-    wait_until("the folder is locked", || {
-        assert!(compare.try_wait().unwrap().is_none(), "the comparison ended before it was interrupted");
-        out.join("run.lock").exists()
-    });
+    let compare = "-q --threads 1 compare --backend cpu --synth-recordings 2 --samples 1e8 --out out";
+    let mut compare = start(dir.path(), &compare.split(' ').collect::<Vec<_>>());
+    wait_for_run(&mut compare, "the folder is locked", || out.join("run.lock").exists());
     send("INT", compare.id());
-    assert_eq!((ended(&mut compare), out.exists()), (Some(128 + 2), false));
+    assert_eq!((ended(compare).0, out.exists()), (128 + 2, false));
 }
 
 #[test]
 fn a_study_that_is_interrupted_leaves_no_half_written_file() {
-    assert_eq!(study_interrupted_by("TERM"), Some(128 + 15));
-    assert_eq!(study_interrupted_by("INT"), Some(128 + 2));
+    assert_eq!(study_interrupted_by("TERM"), 128 + 15);
+    assert_eq!(study_interrupted_by("INT"), 128 + 2);
     // What a closed terminal sends; a test that was itself started by `nohup` hands that down.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
     match ignored {
-        Some(mask) if mask & 1 == 0 => assert_eq!(study_interrupted_by("HUP"), Some(128 + 1)),
+        Some(mask) if mask & 1 == 0 => assert_eq!(study_interrupted_by("HUP"), 128 + 1),
         _ => eprintln!("SKIPPED: needs Linux, and SIGHUP not ignored"),
     }
 }
@@ -238,7 +201,8 @@ fn a_resumable_run_notes_the_first_signal_and_ends_at_once_by_the_second() {
     assert_eq!(lines.next().as_deref(), Some("ending after the present chunk; again to end at once"));
     assert_eq!(lines.next().as_deref(), Some("noted"));
     send("TERM", run.id());
-    assert_eq!(ended(&mut run), Some(143));
+    wait_until("the process ends", || run.try_wait().unwrap().is_some());
+    assert_eq!(run.wait().unwrap().code(), Some(143));
 }
 
 const RESUMABLE_RUN: &str = "LANESWEEP_TEST_RESUMABLE_RUN";

@@ -5,18 +5,15 @@
 //! `LANESWEEP_KILLS=300 cargo test --release --test runs kills:: -- --nocapture`.
 #![cfg(unix)]
 
-use crate::common::page;
+use crate::common::program::{self, Files, ended, flat, kill, names, same, without_times};
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 /// Lists the files of a folder's runs.
 const LIST: &str = "lanesweep-files.json";
-
-/// Names and content of a folder's results.
-type Files = BTreeMap<String, Vec<u8>>;
 
 /// A verb at work on the folder `out`.
 struct Verb {
@@ -148,37 +145,17 @@ const VERBS: [Verb; 18] = [
     ),
 ];
 
-fn program(dir: &Path, line: &str) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .current_dir(dir)
-        .env("NO_COLOR", "1")
-        .args(["-q"])
-        .args(line.split(' '))
-        .args(if line.starts_with("study --plan") || line.starts_with("sample") || line.starts_with("map") {
-            &["--backend", "cpu"][..]
-        } else {
-            &[]
-        })
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
-fn ended(child: Child) -> (i32, String) {
-    let Output { status, stderr, .. } = child.wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    (status.code().unwrap_or(-1), said)
+fn start(dir: &Path, line: &str) -> Child {
+    let mut args = [&["-q"][..], &line.split(' ').collect::<Vec<_>>()].concat();
+    if line.starts_with("study --plan") || line.starts_with("sample") || line.starts_with("map") {
+        args.extend(["--backend", "cpu"]);
+    }
+    program::start(dir, &args)
 }
 
 fn done(dir: &Path, line: &str) {
-    let (code, said) = ended(program(dir, line));
+    let (code, said) = ended(start(dir, line));
     assert_eq!(code, 0, "{line}: {said}");
-}
-
-fn names(dir: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
-    entries.map(|entry| entry.file_name().into_string().unwrap()).collect()
 }
 
 /// Not a result: the plan, and what is there only while a run is at work.
@@ -192,39 +169,11 @@ fn is_switching(dir: &Path) -> bool {
     std::fs::read_to_string(dir.join(LIST)).is_ok_and(|text| text.contains("\"is_complete\":false"))
 }
 
+/// The results of a folder.
 fn files(dir: &Path) -> Files {
-    let results = names(dir).into_iter().filter(|name| !is_beside(name));
-    results.map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
-}
-
-/// Without times.
-fn settled(files: Files) -> Files {
-    let settle = |(name, mut content): (String, Vec<u8>)| {
-        if ["run.json", "estimate.json", "map.json", "compare.json", "dossier.json"].contains(&name.as_str()) {
-            let mut record: serde_json::Value = serde_json::from_slice(&content).unwrap();
-            for checks in ["/sweep", "/host", "/host/sweep"] {
-                for time in ["device_s", "seconds", "plan_s", "sweep_s"] {
-                    record.pointer_mut(checks).and_then(|checks| checks.as_object_mut()?.remove(time));
-                }
-            }
-            for host in ["timings", "settings"] {
-                record.as_object_mut().unwrap().remove(host);
-            }
-            content = record.to_string().into_bytes();
-        }
-        if name == "report.html" {
-            content = page::without_times(&String::from_utf8(content).unwrap()).into_bytes();
-        }
-        (name, content)
-    };
-    files.into_iter().map(settle).collect()
-}
-
-fn same(found: &Files, expected: &Files, what: &str) {
-    assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>(), "{what}");
-    for (name, content) in found {
-        assert!(content == &expected[name], "{what}: {name} differs");
-    }
+    let mut files = program::files(dir);
+    files.retain(|name, _| !is_beside(name));
+    files
 }
 
 /// `out` as a copy of another folder, or empty.
@@ -285,22 +234,22 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
     furnish(dir);
     let mut undisturbed: BTreeMap<(usize, bool), (Duration, Files)> = BTreeMap::new();
     let (mut alive, mut continued, mut switching, mut recorded) = (0, 0, 0, 0);
-    for kill in 0..kills {
-        let (at, round) = (kill % VERBS.len(), kill / VERBS.len());
+    for at_kill in 0..kills {
+        let (at, round) = (at_kill % VERBS.len(), at_kill / VERBS.len());
         let verb = &VERBS[at];
         let is_over_older = verb.older.is_some() && (at + round / 2) % 2 == 0;
         let parts = (verb.name == "merge").then(|| "parts".to_owned());
         let from = base(dir, verb, is_over_older).or(parts);
-        let what = format!("kill {kill} of {}, over an older run: {is_over_older}", verb.name);
+        let what = format!("kill {at_kill} of {}, over an older run: {is_over_older}", verb.name);
         let (took, expected) = undisturbed.entry((at, is_over_older)).or_insert_with(|| {
             put(dir, from.as_deref());
             let started = Instant::now();
             done(dir, verb.run);
-            (started.elapsed(), settled(files(&dir.join("out"))))
+            (started.elapsed(), without_times(files(&dir.join("out"))))
         });
         put(dir, from.as_deref());
         let before = files(&dir.join("out"));
-        let mut child = program(dir, verb.run);
+        let mut child = start(dir, verb.run);
         if round % 2 == 0 && verb.record.is_some() {
             // As soon as the files get their names, or shortly after.
             let started = Instant::now();
@@ -308,16 +257,13 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
                 && child.try_wait().unwrap().is_none()
                 && started.elapsed() < Duration::from_secs(60)
             {}
-            std::thread::sleep(Duration::from_micros(kill as u64 * 377 % 3000));
+            std::thread::sleep(Duration::from_micros(at_kill as u64 * 377 % 3000));
         } else {
             // A low-discrepancy sequence of moments over the whole run.
-            let share = (kill as f64 * 0.618_033_988_749_895 + 0.5).fract();
+            let share = (at_kill as f64 * 0.618_033_988_749_895 + 0.5).fract();
             std::thread::sleep(Duration::from_secs_f64(took.as_secs_f64() * share));
         }
-        alive += usize::from(child.try_wait().unwrap().is_none());
-        // Has no effect where it has ended already.
-        child.kill().unwrap();
-        child.wait().unwrap();
+        alive += usize::from(kill(child));
 
         let out = dir.join("out");
         continued += usize::from(names(&out).iter().any(|name| name.ends_with(".journal")));
@@ -326,7 +272,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
             Some(record) if found.contains_key(record) => {
                 recorded += 1;
                 if found != before {
-                    same(&settled(found), expected, &what);
+                    same(&without_times(found), expected, &what);
                 }
             }
             Some(_) => switching += usize::from(is_switching(&out)),
@@ -338,7 +284,8 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
         }
         if verb.name == "synth" && !out.join("SYNTHETIC.txt").exists() {
             for reader in ["mine out", "study out --out elsewhere"] {
-                let (code, said) = ended(program(dir, reader));
+                let (code, said) = ended(start(dir, reader));
+                let said = flat(&said);
                 assert_eq!(code, 3, "{what}: {reader}: {said}");
                 assert!(said.contains("synth") || said.contains("no recording"), "{what}: {said}");
             }
@@ -347,14 +294,14 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
         if !is_whole_data {
             done(dir, verb.run);
         }
-        same(&settled(files(&out)), expected, &what);
+        same(&without_times(files(&out)), expected, &what);
         assert!(!out.join("pilot.json").exists(), "{what}: the run has ended, its pilot stays");
         assert_tidy(dir, &what);
-        if at + 1 == VERBS.len() || kill + 1 == kills {
+        if at + 1 == VERBS.len() || at_kill + 1 == kills {
             println!(
                 "{} kills of {} verbs: {alive} while running, {continued} with a journal, {switching} while files got \
                  their names, {recorded} with a record; all results identical",
-                kill + 1,
+                at_kill + 1,
                 VERBS.len()
             );
         }
@@ -380,18 +327,17 @@ fn scenarios_and_what_was_driven_for_them_are_of_one_run_after_a_kill() {
         done(dir, &mine(data));
         files(&dir.join("out"))
     });
-    for kill in 0..4 {
-        let (data, new, old) = if kill % 2 == 0 { ("a", 0, 1) } else { ("b", 1, 0) };
-        let mut child = program(dir, &mine(data));
+    for at_kill in 0..4 {
+        let (data, new, old) = if at_kill % 2 == 0 { ("a", 0, 1) } else { ("b", 1, 0) };
+        let mut child = start(dir, &mine(data));
         while names(&dir.join("out")).iter().all(|name| !name.ends_with(".part")) && child.try_wait().unwrap().is_none()
         {
         }
-        std::thread::sleep(Duration::from_micros(kill * 700));
-        child.kill().unwrap();
-        child.wait().unwrap();
+        std::thread::sleep(Duration::from_micros(at_kill * 700));
+        kill(child);
         let found = files(&dir.join("out"));
         if found.contains_key("s.exposure.json") {
-            assert!(found == expected[new] || found == expected[old], "kill {kill}: {:?}", found.keys());
+            assert!(found == expected[new] || found == expected[old], "kill {at_kill}: {:?}", found.keys());
         }
         done(dir, &mine(data));
         same(&files(&dir.join("out")), &expected[new], "mine");
@@ -410,15 +356,15 @@ fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
         .map(|verb| {
             put(dir, Some("parts"));
             done(dir, verb.run);
-            settled(files(&dir.join("out")))
+            without_times(files(&dir.join("out")))
         })
         .collect();
     let (mut pairs, mut busy, mut refused) = (0, 0, 0);
     let all = (0..VERBS.len()).flat_map(|a| (a..VERBS.len()).map(move |b| [a, b]));
     for at in all.step_by(every) {
         put(dir, Some("parts"));
-        let children = at.map(|k| program(dir, VERBS[k].run));
-        let codes = children.map(ended);
+        let children = at.map(|k| start(dir, VERBS[k].run));
+        let codes = children.map(ended).map(|(code, said)| (code, flat(&said)));
         let what = format!("{} and {}: {codes:?}", VERBS[at[0]].name, VERBS[at[1]].name);
         for (code, said) in &codes {
             match code {
@@ -437,7 +383,7 @@ fn of_two_processes_on_one_folder_each_ends_as_if_alone_or_is_refused() {
         }
         let ended: Vec<usize> = (0..2).filter(|&k| codes[k].0 == 0).map(|k| at[k]).collect();
         assert!(!ended.is_empty(), "{what}");
-        let found = settled(files(&dir.join("out")));
+        let found = without_times(files(&dir.join("out")));
         let is_one = |k: usize| found == alone[k];
         let both = || ended.iter().flat_map(|&k| alone[k].clone()).collect::<Files>();
         let is_replaced = ended.len() == 2 && VERBS[at[0]].record == VERBS[at[1]].record;

@@ -5,8 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::parts::{SAMPLE, STUDY, density, done, flat, lanesweep, results, weighted};
+use super::parts::{SAMPLE, STUDY, density, weighted};
 use crate::common::plans::mixed;
+use crate::common::program::{Files, done, files, flat, lanesweep, without_host};
 use lanesweep::run::parts::seal;
 use sha2::{Digest, Sha256};
 
@@ -126,9 +127,9 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
             let mut part: serde_json::Value = serde_json::from_str(&part).unwrap_or_default();
             part["content"]["lanes_redone_and_rechecked"] = 0.into();
             part["sha256"] = 0.into();
-            return (code, err, vec![("part".to_owned(), part.to_string())]);
+            return (code, err, Files::from([("part".to_owned(), part.to_string().into_bytes())]));
         }
-        (code, err, if code == 0 { results(dir.join(input.results).as_path()) } else { Vec::new() })
+        (code, err, if code == 0 { without_host(files(&dir.join(input.results))) } else { Files::new() })
     };
     let expected: Vec<_> = inputs.iter().map(outcome).collect();
     let mut codes: BTreeMap<(bool, i32), u64> = BTreeMap::new();

@@ -1,68 +1,13 @@
 //! Runs in parts: whatever the number and order of shards, and wherever a run was interrupted, the result is that of
 //! the undisturbed run, byte for byte; a folder that cannot give it says what is missing.
 
-use crate::common::page;
+use crate::common::program::{self, done, flat, kill, lanesweep, limited, start, wait_for_run, without_host};
 
 use std::path::Path;
 
-use assert_cmd::Command;
-
-/// Runs the program in a folder: exit code, stdout, stderr.
-pub fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
-}
-
-pub fn done(dir: &Path, args: &[&str]) -> String {
-    let (code, out, err) = lanesweep(dir, args);
-    assert_eq!(code, 0, "{args:?}: {err}");
-    out
-}
-
-pub fn flat(text: &str) -> String {
-    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
-}
-
-/// Names and content of a folder's results; of the records only what does not belong to the machine.
-pub fn results(dir: &Path) -> Vec<(String, String)> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if ["plan.json", "run-plan.json", "lanesweep-files.json"].contains(&name.as_str())
-            || (name.starts_with("part-") && name.ends_with(".json"))
-        {
-            continue;
-        }
-        let mut content = std::fs::read_to_string(&path).unwrap();
-        if ["run.json", "estimate.json"].contains(&name.as_str()) {
-            let mut record: serde_json::Value = serde_json::from_str(&content).unwrap();
-            for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
-                record.as_object_mut().unwrap().remove(host);
-            }
-            // A run in one piece leaves its plan.
-            if let Some(files) = record["files"].as_array_mut() {
-                files.retain(|file| file != "run-plan.json");
-            }
-            content = record.to_string();
-        }
-        if name == "report.html" {
-            content = page::without_host(&content);
-        }
-        files.push((name, content));
-    }
-    files.sort();
-    files
-}
-
 fn same(a: &Path, b: &Path) {
-    let (a, b) = (results(a), results(b));
-    let names = |list: &[(String, String)]| list.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    assert_eq!(names(&a), names(&b));
-    for ((name, one), (_, other)) in a.iter().zip(&b) {
-        assert!(one == other, "{name} differs");
-    }
+    let [found, expected] = [a, b].map(|dir| without_host(program::files(dir)));
+    program::same(&found, &expected, &format!("{} and {}", a.display(), b.display()));
 }
 
 pub const STUDY: [&str; 7] = ["-q", "study", "--synth-recordings", "2", "--published", "--backend", "cpu"];
@@ -131,7 +76,7 @@ fn samples_in_shards_are_the_run_in_one_piece_with_its_convergence() {
     }
     assert_eq!(done(dir, &["-q", "cluster", "merge", "seven"]), whole);
     same(&dir.join("whole"), &dir.join("seven"));
-    assert!(results(&dir.join("seven")).iter().any(|(name, _)| name == "convergence.svg"));
+    assert!(dir.join("seven/convergence.svg").exists());
 }
 
 #[test]
@@ -356,14 +301,11 @@ fn a_plan_of_many_scenarios_takes_little_memory() {
     }
     std::fs::write(dir.join("many.jsonl"), text).unwrap();
     // Addresses, not memory that is in use: the limit that a shell can set.
-    let limited = |args: &str| {
-        let script = format!("ulimit -v 400000 && exec \"$0\" -q --threads 1 study --backend cpu --out p {args}");
-        let program = env!("CARGO_BIN_EXE_lanesweep");
-        let run = std::process::Command::new("sh").current_dir(dir).args(["-c", &script, program]).output().unwrap();
-        assert!(run.status.success(), "{args}: {}", String::from_utf8_lossy(&run.stderr));
-    };
-    limited("--scenarios many.jsonl --plan-only");
-    limited("--plan p/plan.json --shard 7/400");
+    for args in ["--scenarios many.jsonl --plan-only", "--plan p/plan.json --shard 7/400"] {
+        let study = format!("-q --threads 1 study --backend cpu --out p {args}");
+        let (code, _, err) = limited(dir, "ulimit -v 400000", &study.split(' ').collect::<Vec<_>>());
+        assert_eq!(code, 0, "{args}: {err}");
+    }
     let bytes = std::fs::metadata(dir.join("p/plan.json")).unwrap().len();
     assert!(bytes < 8000 * 3000, "{bytes} bytes");
 }
@@ -413,22 +355,13 @@ fn two_processes_do_not_compute_the_same_part() {
     density(dir);
     let long =
         ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
-    let mut first = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .current_dir(dir)
-        .args(long)
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut first = start(dir, &long);
     let lock = dir.join("run/run.lock");
-    while !lock.exists() || std::fs::read_to_string(&lock).unwrap_or_default().is_empty() {
-        assert!(first.try_wait().unwrap().is_none(), "the first process has ended");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    wait_for_run(&mut first, "the lock is taken", || std::fs::read(&lock).is_ok_and(|pid| !pid.is_empty()));
     let (code, out, err) = lanesweep(dir, &long);
-    first.kill().unwrap();
-    first.wait().unwrap();
-    assert_eq!(code, 75, "{err}");
     let told = format!("another lanesweep process is writing this part or run (pid {})", first.id());
+    kill(first);
+    assert_eq!(code, 75, "{err}");
     assert!(flat(&err).contains(&told) && out.is_empty(), "{err}");
 }
 
@@ -439,20 +372,11 @@ fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
     density(dir);
     let run = ["-q", "sample", "densities/cut-in-2.json", "--backend", "cpu", "--samples", "100000000", "--out", "run"];
     let shard = |index: &'static str| [&run[..], &["--shard", index]].concat();
-    let mut first = std::process::Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .current_dir(dir)
-        .args(shard("0/2"))
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    while !dir.join("run/part-00000-of-00002.lock").exists() {
-        assert!(first.try_wait().unwrap().is_none(), "the first process has ended");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    let mut first = start(dir, &shard("0/2"));
+    wait_for_run(&mut first, "the lock is taken", || dir.join("run/part-00000-of-00002.lock").exists());
     let others = [&run[..], &["-q", "cluster", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
     let beside = lanesweep(dir, &[&shard("1/2")[..], &["--stop-after", "0.3"]].concat());
-    first.kill().unwrap();
-    first.wait().unwrap();
+    kill(first);
     for (code, _, err) in others {
         assert_eq!(code, 75, "{err}");
         assert!(flat(&err).contains("another lanesweep process"), "{err}");

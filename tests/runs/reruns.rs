@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::OnceLock;
 
-use assert_cmd::Command;
+use crate::common::program::{flat, lanesweep};
 use lanesweep::Place;
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, Wanted, words};
 use lanesweep::model::driver::{MODELS, ModelId};
@@ -21,12 +21,6 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 type Row = HashMap<String, String>;
 
-fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
-}
-
 fn done(dir: &Path, args: &[&str]) -> (String, String) {
     let (code, out, err) = lanesweep(dir, args);
     assert_eq!(code, 0, "{args:?}: {err}");
@@ -35,8 +29,8 @@ fn done(dir: &Path, args: &[&str]) -> (String, String) {
 
 fn refused(dir: &Path, args: &[&str], code: i32, said: &str) {
     let (found, out, err) = lanesweep(dir, args);
-    let flat = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-    assert!(found == code && out.is_empty() && flat.contains(said), "{args:?} gave {found}: {flat}");
+    let err = flat(&err);
+    assert!(found == code && out.is_empty() && err.contains(said), "{args:?} gave {found}: {err}");
 }
 
 /// A well-mixed number below `below` (SplitMix64).

@@ -6,7 +6,7 @@ use crate::common;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use assert_cmd::Command;
+use crate::common::program::lanesweep;
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, Headway, LanePlan, RecheckOptions, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
@@ -44,12 +44,6 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     let path = dir.path().join("density.json");
     write_density(&path, &density(Category::CutIn, "2")).unwrap();
     (dir, path)
-}
-
-fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("lanesweep").unwrap().current_dir(dir).args(args).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
 fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {

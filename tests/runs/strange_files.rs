@@ -2,7 +2,7 @@
 //! ends at once with the exit status of bad data and names the file.
 #![cfg(unix)]
 
-use crate::common;
+use crate::common::{self, program};
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -14,10 +14,7 @@ const AT_ONCE: Duration = Duration::from_secs(20);
 /// Exit code and stderr without the drawing; a program that does not end is an error.
 fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String) {
     let errors = dir.join("stderr.txt");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lanesweep"))
-        .current_dir(dir)
-        .env("NO_COLOR", "1")
-        .args(args)
+    let mut child = program::command(dir, args)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(std::fs::File::create(&errors).unwrap())
@@ -35,10 +32,9 @@ fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String) {
         }
         std::thread::sleep(Duration::from_millis(2));
     };
-    let text = std::fs::read_to_string(errors).unwrap();
     // The drawing breaks long lines, also after a hyphen.
-    let text = text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-    (status.code().unwrap_or(-1), text.replace("- ", "-"))
+    let text = program::flat(&std::fs::read_to_string(errors).unwrap()).replace("- ", "-");
+    (status.code().unwrap_or(-1), text)
 }
 
 fn pipe(path: &Path) {
@@ -248,12 +244,10 @@ fn files_beyond_what_their_kind_can_be_are_not_read_to_their_end() {
 fn plans_parts_journals_and_densities_that_are_zeros_or_cut_off_are_refused_without_being_read() {
     let dir = tempfile::tempdir().unwrap();
     let run = |args: &str| {
-        let script = "ulimit -v 400000; exec \"$0\" -q --threads 1 $1";
         let started = Instant::now();
-        let program = env!("CARGO_BIN_EXE_lanesweep");
-        let ran = Command::new("sh").current_dir(dir.path()).args(["-c", script, program, args]).output().unwrap();
-        let said = String::from_utf8_lossy(&ran.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-        (ran.status.code().unwrap_or(-1), said, started.elapsed())
+        let args = [&["-q", "--threads", "1"], &args.split(' ').collect::<Vec<_>>()[..]].concat();
+        let (code, _, err) = program::limited(dir.path(), "ulimit -v 400000", &args);
+        (code, program::flat(&err), started.elapsed())
     };
     let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --out d.json";
     let sample = "sample d.json --samples 1000 --thw 0.6 --models FSM --backend cpu --out out";
@@ -352,14 +346,6 @@ fn no_message_repeats_a_text_of_any_size() {
 /// An id that acts on a terminal, forges a line of a message, turns the direction of reading, and is a formula.
 const HOSTILE: &str = "=1+1\u{1b}[2J\u{9b}31m\u{202e}b\rc\u{7f}";
 
-/// Exit code, stdout and stderr as they are.
-fn raw(dir: &Path, args: &[&str]) -> (i32, String, String) {
-    let program = env!("CARGO_BIN_EXE_lanesweep");
-    let ran = Command::new(program).current_dir(dir).env("NO_COLOR", "1").args(args).output().unwrap();
-    let [out, err] = [ran.stdout, ran.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    (ran.status.code().unwrap_or(-1), out, err)
-}
-
 /// Golden scenarios, the first with this id.
 fn scenarios_with(dir: &Path, id: &str) {
     let text = std::fs::read_to_string(common::golden("paper_sumo_01_02_scenarios.jsonl")).unwrap();
@@ -392,7 +378,7 @@ fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
         (&["study", "--\u{1b}[2J\u{202e}"], 2),
     ];
     for (args, expected) in runs {
-        let (code, out, err) = raw(dir, args);
+        let (code, out, err) = program::lanesweep(dir, args);
         assert_eq!(code, expected, "{args:?}: {err}");
         let acts = |c: char| (c.is_control() && c != '\n') || ('\u{2028}'..='\u{202e}').contains(&c);
         assert!(!out.chars().chain(err.chars()).any(acts), "{args:?}: {out:?} {err:?}");
@@ -415,7 +401,8 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
     for id in ["=HYPERLINK(1)", "@a", "-2+3", "+x,y", "'=q"] {
         scenarios_with(dir, id);
         let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--rows", "lanes.csv", "--thw", "1.2"];
-        let (code, _, err) = raw(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
+        let (code, _, err) =
+            program::lanesweep(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
         assert_eq!(code, 0, "{err}");
         let table = std::fs::read_to_string(dir.join("lanes.csv")).unwrap();
         let fields = table.lines().flat_map(|line| line.split(','));
@@ -426,12 +413,12 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
         assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
         // Our readers take the apostrophe away: of lanes, and of scenarios.
         let (code, _, err) =
-            raw(dir, &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
+            program::lanesweep(dir, &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
         assert_eq!(code, 0, "{id}: {err}");
         let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
         std::fs::write(dir.join("cases.csv"), row).unwrap();
         let lane = format!("--lane={id}/S/1.2s/FSM");
-        let (code, _, err) = raw(dir, &["simulate", "--scenarios", "cases.csv", &lane]);
+        let (code, _, err) = program::lanesweep(dir, &["simulate", "--scenarios", "cases.csv", &lane]);
         assert_eq!(code, 0, "{id}: {err}");
     }
 }
@@ -440,7 +427,7 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
 fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
     let dir = tempfile::tempdir().unwrap();
     let part = ["-q", "study", "--synth-recordings", "1", "--config", "generator.duration_s=120", "--shard", "0/2"];
-    let (code, _, err) = raw(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
+    let (code, _, err) = program::lanesweep(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
     assert_eq!(code, 0, "{err}");
     let (code, said) = lanesweep(dir.path(), &["cluster", "merge", "it's; mine"]);
     assert_eq!(code, 3, "{said}");

@@ -1,7 +1,7 @@
 //! The open device: pipelines, shared tables and errors. Only its owner's thread uses it.
 
 // `create_shader_module_passthrough` passes SPIR-V to the driver unchecked; it is naga's output for shaders of this
-// crate, with decorations added. `create_shader_module_trusted` leaves out run-time checks.
+// crate, with decorations added.
 #![allow(unsafe_code)]
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,25 +9,17 @@ use std::time::Duration;
 
 use super::adapters::AdapterCard;
 use super::shader::{self, ENTRY, GENERATE, WORKGROUP};
-use super::spirv::{Checks, exact_spirv};
+use super::spirv::exact_spirv;
 use crate::model::driver::ModelId;
 use crate::{Error, Result};
 
 /// Options of a device.
 #[derive(Debug, Clone)]
 pub struct GpuOptions {
-    /// Run-time checks of the shaders.
-    pub checks: Checks,
     /// Time-out of a dispatch; after it the device counts as lost.
     pub timeout: Duration,
     /// Lanes per model of the first job; later ones follow the device's speed.
     pub first_lanes: u64,
-    /// Uses the plain path instead of the exact one, for tests.
-    pub plain: bool,
-    /// Replaces text of the shaders before compilation, so that tests can check that verification detects errors.
-    pub shader_patch: Option<(String, String)>,
-    /// Makes one job fail, for tests.
-    pub fault: Option<Fault>,
     /// Lanes that an invocation computes on average, at least 1; `None` follows the number of lanes, but on a software
     /// device it is 1.
     pub lanes_per_invocation: Option<u32>,
@@ -35,35 +27,23 @@ pub struct GpuOptions {
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        GpuOptions {
-            checks: Checks::Checked,
-            timeout: Duration::from_secs(60),
-            first_lanes: 1 << 14,
-            plain: false,
-            shader_patch: None,
-            fault: None,
-            lanes_per_invocation: None,
-        }
+        GpuOptions { timeout: Duration::from_secs(60), first_lanes: 1 << 14, lanes_per_invocation: None }
     }
 }
 
-/// A job that fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fault {
-    /// Index of the job since the device was opened.
-    pub at_job: u64,
-    /// Kind of failure.
-    pub kind: FaultKind,
+/// What a test does to a device, to see that it is noticed; nothing by default.
+#[derive(Clone, Default)]
+pub struct Tampering {
+    /// Uses the plain path instead of the exact one.
+    pub plain: bool,
+    /// Replaces text of the shaders before compilation.
+    pub shader_patch: Option<(String, String)>,
+    /// Is called before each job with its index since the device was opened. An error is the job's.
+    pub before_job: Option<BeforeJob>,
 }
 
-/// Kind of an injected failure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FaultKind {
-    /// The device is lost permanently.
-    Lost,
-    /// The device has no memory for this job.
-    OutOfMemory,
-}
+/// A call before a job.
+pub type BeforeJob = Arc<dyn Fn(u64, &wgpu::Device) -> std::result::Result<(), &'static str> + Send + Sync>;
 
 /// Key of a model's pipeline.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +62,7 @@ pub(super) struct Device {
     pub timestamps: bool,
     pub layout: wgpu::BindGroupLayout,
     pub options: GpuOptions,
+    pub tampering: Tampering,
     /// Bindings of the generator.
     pub generator_layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
@@ -95,8 +76,13 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::Device`] where the driver refuses.
-    pub fn open(adapter: &wgpu::Adapter, card: &AdapterCard, options: GpuOptions) -> Result<Device> {
-        let exact = card.exact_path && !options.plain;
+    pub fn open(
+        adapter: &wgpu::Adapter,
+        card: &AdapterCard,
+        options: GpuOptions,
+        tampering: Tampering,
+    ) -> Result<Device> {
+        let exact = card.exact_path && !tampering.plain;
         let mut features = wgpu::Features::empty();
         features.set(wgpu::Features::TIMESTAMP_QUERY, card.timestamps);
         features.set(wgpu::Features::PASSTHROUGH_SHADERS, exact);
@@ -151,6 +137,7 @@ impl Device {
             layout,
             generator_layout,
             options,
+            tampering,
             pipeline_layout,
             pipelines,
             generator: None,
@@ -205,12 +192,12 @@ impl Device {
         values: &[(&'static str, f64)],
         layout: &wgpu::PipelineLayout,
     ) -> Result<wgpu::ComputePipeline> {
-        if let Some((from, to)) = &self.options.shader_patch {
+        if let Some((from, to)) = &self.tampering.shader_patch {
             source = source.replace(from, to);
         }
         let label = Some(label);
         let module = if self.exact {
-            let words = exact_spirv(&source, entry, values, self.options.checks)?;
+            let words = exact_spirv(&source, entry, values)?;
             let entry =
                 wgpu::PassthroughShaderEntryPoint { name: entry.to_owned().into(), workgroup_size: (WORKGROUP, 1, 1) };
             // SAFETY: valid SPIR-V from naga, with the bindings of `entries` and decorations added.
@@ -224,15 +211,7 @@ impl Device {
             }
         } else {
             let source = wgpu::ShaderSource::Wgsl(source.into());
-            let descriptor = wgpu::ShaderModuleDescriptor { label, source };
-            match self.options.checks {
-                Checks::Checked => self.device.create_shader_module(descriptor),
-                // SAFETY: every loop of the shaders is bounded, every index comes from a record that the host
-                // made, every integer divisor is at least 1.
-                Checks::Unchecked => unsafe {
-                    self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
-                },
-            }
+            self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source })
         };
         // A passed-through module takes no constants; they are already resolved.
         let constants: &[(&str, f64)] = if self.exact { &[] } else { values };

@@ -18,9 +18,9 @@ mod visible;
 
 pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
 pub use choice::choose;
-pub use device::{Fault, FaultKind, GpuOptions};
+pub use device::{BeforeJob, GpuOptions, Tampering};
 pub use records::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};
 pub use session::GpuBackend;
-pub use spirv::{Checks, exact_spirv};
+pub use spirv::exact_spirv;
 pub use visible::{visible, visible_here};

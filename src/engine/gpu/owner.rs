@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use super::adapters::AdapterCard;
-use super::device::{Device, FaultKind, GpuOptions, PipelineSpec};
+use super::device::{Device, GpuOptions, PipelineSpec, Tampering};
 use super::generator::Inputs;
 use super::generator::{GeneratorSetup, generate};
 use super::records::StartRecord;
@@ -78,11 +78,12 @@ pub(super) fn start(
     adapter: wgpu::Adapter,
     card: AdapterCard,
     options: GpuOptions,
+    tampering: Tampering,
 ) -> Result<(Sender<Command>, OpenedDevice, JoinHandle<()>)> {
     let (sender, commands) = mpsc::channel();
     let (opened_sender, opened) = mpsc::channel();
     let name = card.name.clone();
-    let work = move || match Device::open(&adapter, &card, options) {
+    let work = move || match Device::open(&adapter, &card, options, tampering) {
         Ok(device) => {
             let _ = opened_sender.send(Ok(OpenedDevice { exact: device.exact }));
             DeviceOwner::new(device).serve(&commands);
@@ -198,8 +199,11 @@ impl DeviceOwner {
 
     fn submit(&mut self, session: u64, cases: Option<Cases>, job: Job) -> Result<(Slot, Flight)> {
         self.alive()?;
-        self.inject_fault()?;
         let device = &mut self.device;
+        if let Some(before_job) = &device.tampering.before_job {
+            before_job(self.jobs, &device.device).map_err(|problem| device.failed(problem))?;
+        }
+        self.jobs += 1;
         let inputs = self.sessions.get_mut(&session).ok_or_else(|| device.failed("the session is closed"))?;
         match cases {
             None => (),
@@ -249,22 +253,6 @@ impl DeviceOwner {
         match &self.dead {
             None => Ok(()),
             Some(why) => Err(self.device.failed(format!("it failed earlier ({why})"))),
-        }
-    }
-
-    /// The fault that a test injects.
-    fn inject_fault(&mut self) -> Result<()> {
-        let job = self.jobs;
-        self.jobs += 1;
-        match self.device.options.fault {
-            Some(fault) if fault.at_job == job => match fault.kind {
-                FaultKind::Lost => {
-                    self.device.device.destroy();
-                    Ok(())
-                }
-                FaultKind::OutOfMemory => Err(self.device.failed("it has no memory for this job")),
-            },
-            _ => Ok(()),
         }
     }
 }

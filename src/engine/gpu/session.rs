@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use rayon::prelude::*;
 
 use super::adapters::{AdapterCard, Adapters, DeviceKind};
-use super::device::{GpuOptions, PipelineSpec};
+use super::device::{GpuOptions, PipelineSpec, Tampering};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::records::StartRecord;
@@ -272,14 +272,28 @@ impl GpuBackend {
     ///
     /// # Errors
     /// [`crate::Error::Device`] if its driver refuses.
-    pub fn open(adapters: &Adapters, index: usize, mut options: GpuOptions) -> Result<GpuBackend> {
+    pub fn open(adapters: &Adapters, index: usize, options: GpuOptions) -> Result<GpuBackend> {
+        GpuBackend::open_tampered(adapters, index, options, Tampering::default())
+    }
+
+    /// The same with what a test does to the device.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::open`].
+    #[doc(hidden)]
+    pub fn open_tampered(
+        adapters: &Adapters,
+        index: usize,
+        mut options: GpuOptions,
+        tampering: Tampering,
+    ) -> Result<GpuBackend> {
         let adapter = adapters.take(index)?;
         let card = adapters.cards()[index].clone();
         if card.kind == DeviceKind::Software {
             // It has no warps that wait for their longest lane, and llvmpipe limits the turns of an invocation.
             options.lanes_per_invocation.get_or_insert(1);
         }
-        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone())?;
+        let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone(), tampering)?;
         Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })
     }
 

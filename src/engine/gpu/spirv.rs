@@ -7,16 +7,6 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use crate::{Error, Result};
 
-/// Run-time checks of a shader against invalid indices and endless loops.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Checks {
-    /// Indices are clamped and divisors tested, so that behaviour is always defined.
-    Checked,
-    /// No added checks: every loop is bounded by the step cap or a constant, every index comes from a host record,
-    /// every integer divisor is at least 1.
-    Unchecked,
-}
-
 /// SPIR-V opcodes that this file uses.
 mod op {
     pub const DECORATE: u32 = 71;
@@ -29,11 +19,12 @@ mod op {
     pub const HEADER: usize = 5;
 }
 
-/// Compiles the entry point of a pipeline's source with its constants.
+/// Compiles the entry point of a pipeline's source with its constants. Indices are clamped and divisors tested, so that
+/// behaviour is always defined.
 ///
 /// # Errors
 /// [`Error::Internal`] if naga refuses the source, which is an error of the shaders.
-pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)], checks: Checks) -> Result<Vec<u32>> {
+pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)]) -> Result<Vec<u32>> {
     let defect = |stage: &str, what: String| Error::Internal(format!("a shader does not {stage}: {what}"));
     let module = naga::front::wgsl::parse_str(source).map_err(|e| defect("parse", e.emit_to_string(source)))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
@@ -43,8 +34,7 @@ pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)], checks:
     let stage = Some((naga::ShaderStage::Compute, entry));
     let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, stage, &values)
         .map_err(|e| defect("take its constants", e.to_string()))?;
-    let checked = checks == Checks::Checked;
-    let policy = if checked { BoundsCheckPolicy::Restrict } else { BoundsCheckPolicy::Unchecked };
+    let policy = BoundsCheckPolicy::Restrict;
     let options = spv::Options {
         lang_version: (1, 3),
         flags: spv::WriterFlags::empty(),
@@ -57,7 +47,7 @@ pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)], checks:
         },
         // Every loop ends at a constant or at the step cap; a test reads the shaders for it.
         force_loop_bounding: false,
-        emit_int_div_checks: checked,
+        emit_int_div_checks: true,
         ..spv::Options::default()
     };
     let pipeline = spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: entry.to_owned() };
@@ -121,7 +111,7 @@ mod tests {
             for model in ModelId::ALL {
                 let resolved = Constants::resolve(&profile, Category::CutOut);
                 let constants = shader::constants(&resolved, model, every);
-                let words = exact_spirv(&shader::assemble(model), shader::ENTRY, &constants, Checks::Checked).unwrap();
+                let words = exact_spirv(&shader::assemble(model), shader::ENTRY, &constants).unwrap();
                 let floats = count(&words, |opcode, _| op::FLOAT.contains(&opcode));
                 let decorated = count(&words, |opcode, w| opcode == op::DECORATE && w[2] == op::NO_CONTRACTION);
                 assert!(floats > 40, "{name} {model:?}: only {floats} float operations");

@@ -1,11 +1,9 @@
 //! Kernel density estimate: isotropic Gaussian kernels on points divided by their scales, one bandwidth chosen by
 //! leave-one-out likelihood. Densities are over the parameters in their own units.
 
-use rayon::prelude::*;
-
 use super::bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut};
 use super::mixture::Mixture;
-use super::normal::{Draws, normal_cdf};
+use super::normal::Draws;
 use super::scaling::scale_of;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
@@ -109,58 +107,11 @@ impl Kde {
         Mixture::of_kernels(self.points.clone(), &self.spread())
     }
 
-    /// log f̂(x); −∞ only where it underflows the exponent of an f64.
-    pub fn log_density(&self, x: &[f64]) -> f64 {
-        let spread = self.spread();
-        let exponents: Vec<f64> = self
-            .points
-            .iter()
-            .map(|point| {
-                let squared = point.iter().zip(x).zip(&spread).map(|((p, x), s)| ((x - p) / s) * ((x - p) / s));
-                0.5 * squared.sum::<f64>()
-            })
-            .collect();
-        let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
-        let sum: f64 = exponents.iter().map(|e| libm::exp(least - e)).sum();
-        let logs: f64 = spread.iter().map(|s| libm::log(*s)).sum();
-        let d = spread.len() as f64;
-        let constant = logs + 0.5 * d * libm::log(2.0 * std::f64::consts::PI) + libm::log(self.points.len() as f64);
-        libm::log(sum) - least - constant
-    }
-
-    /// f̂(x), over the parameters' units.
-    pub fn density(&self, x: &[f64]) -> f64 {
-        libm::exp(self.log_density(x))
-    }
-
-    /// Probability that every parameter is at most that of `x`. Infinite bounds are allowed.
-    pub fn cdf(&self, x: &[f64]) -> f64 {
-        let below = vec![f64::NEG_INFINITY; x.len()];
-        self.probability(&below, x)
-    }
-
-    /// Probability of the box between two corners. Infinite bounds are allowed.
-    pub fn probability(&self, lower: &[f64], upper: &[f64]) -> f64 {
-        let spread = self.spread();
-        let inside = |point: &Vec<f64>| -> f64 {
-            let share = |j: usize| {
-                normal_cdf((upper[j] - point[j]) / spread[j]) - normal_cdf((lower[j] - point[j]) / spread[j])
-            };
-            (0..spread.len()).map(share).product()
-        };
-        self.points.iter().map(inside).sum::<f64>() / self.points.len() as f64
-    }
-
     /// The draw of an index: a kernel at random, then normal noise. Not checked for validity.
     pub fn draw(&self, stream: &Stream, index: u64) -> Vec<f64> {
         let mut draws = Draws::new(*stream, index);
         let point = &self.points[draws.below(self.points.len())];
         point.iter().zip(&self.scale).map(|(p, s)| p + s * self.bandwidth.value * draws.normal()).collect()
-    }
-
-    /// The draws of a range of indices, in order, made in parallel.
-    pub fn draws(&self, stream: &Stream, indices: std::ops::Range<u64>) -> Vec<Vec<f64>> {
-        indices.into_par_iter().map(|index| self.draw(stream, index)).collect()
     }
 }
 

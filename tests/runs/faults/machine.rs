@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::{Bench, PROGRAM, RUNS, SAMPLE, done, flat, same, shared};
+use super::{Bench, RUNS, SAMPLE, same, shared};
+use crate::common::program::{PROGRAM, done, unbroken};
 use crate::common::skipped;
 
 /// Runs a shell script with an empty disk of its own at `$DISK`; `None` where this machine allows no mounts.
@@ -45,7 +46,7 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
         let whole = shared().join(name);
         for size in ["4k", "8k", "40k"] {
             let Some(output) = on_a_disk(&bench, size, script, run) else { return };
-            let said = flat(&output.stderr);
+            let said = unbroken(&output.stderr);
             assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
             assert!(said.contains("No space left") && said.contains("the disk is full"), "{name}, {size}: {said}");
             of_journals += u32::from(said.contains(".journal") && said.contains("goes on from them"));
@@ -70,7 +71,7 @@ fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
         \"$0\" \"$@\" \"$DISK/out\"; echo freed $?\n\
         cp -r \"$DISK/out\" copy";
     let Some(output) = on_a_disk(&bench, &size, script, &synth) else { return };
-    let said = flat(&output.stderr);
+    let said = unbroken(&output.stderr);
     assert_eq!(lines(&output), ["full 6", "freed 0"], "{said}");
     assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{said}");
     same(&bench.path().join("copy"), &bench.path().join("whole"), "recordings");
@@ -89,7 +90,7 @@ fn a_disk_that_becomes_read_only_keeps_what_is_done() {
         \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo writable $?\n\
         cp -r \"$DISK/out\" copy";
     let Some(output) = on_a_disk(&bench, "64m", script, SAMPLE) else { return };
-    let said = flat(&output.stderr);
+    let said = unbroken(&output.stderr);
     assert_eq!(lines(&output), ["stopped 75", "kept 6", "new 6", "writable 0"], "{said}");
     assert_eq!(said.matches("mounted read-only").count(), 2, "{said}");
     same(&bench.path().join("copy"), &whole, "read-only");
@@ -118,7 +119,7 @@ fn a_folder_without_permission_is_told_and_left_as_it_is() {
         let Ok(output) = command.args(&args).current_dir(bench.path()).env("NO_COLOR", "1").output() else {
             return skipped("needs setpriv to be somebody else than root");
         };
-        let said = flat(&output.stderr);
+        let said = unbroken(&output.stderr);
         if said.contains("setpriv:") {
             return skipped("setpriv cannot change the user here, or that user cannot reach the program");
         }

@@ -1,0 +1,165 @@
+//! The program under test: runs of it, what is done to them while they are at work, and the results that they leave.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use super::page;
+
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_lanesweep");
+
+/// Longest wait for anything here; an unloaded machine needs a second or two.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Text without the drawing, which breaks long lines.
+pub fn flat(text: &str) -> String {
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+/// The same where a name may be broken after a hyphen or a slash.
+pub fn unbroken(text: &[u8]) -> String {
+    flat(&String::from_utf8_lossy(text)).replace("- ", "-").replace("/ ", "/")
+}
+
+/// The program in a folder.
+pub fn command(dir: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.env("NO_COLOR", "1").current_dir(dir).args(args);
+    command
+}
+
+/// Exit code, stdout and stderr.
+fn read(output: Output) -> (i32, String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
+}
+
+/// Runs the program in a folder: exit code, stdout, stderr.
+pub fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
+    read(command(dir, args).output().unwrap())
+}
+
+/// Runs it to a good end; gives its stdout.
+pub fn done(dir: &Path, args: &[&str]) -> String {
+    let (code, out, err) = lanesweep(dir, args);
+    assert_eq!(code, 0, "{args:?}: {err}");
+    out
+}
+
+/// The same under limits that a shell sets, such as `ulimit -v 400000`.
+pub fn limited(dir: &Path, limits: &str, args: &[&str]) -> (i32, String, String) {
+    let script = format!("{limits} && exec \"$0\" \"$@\"");
+    let mut shell = Command::new("sh");
+    read(shell.current_dir(dir).env("NO_COLOR", "1").args(["-c", &script, PROGRAM]).args(args).output().unwrap())
+}
+
+/// Starts the program in a folder; what it says is read at its end.
+pub fn start(dir: &Path, args: &[&str]) -> Child {
+    command(dir, args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits for the end: exit code and stderr.
+pub fn ended(child: Child) -> (i32, String) {
+    let (code, _, err) = read(child.wait_with_output().unwrap());
+    (code, err)
+}
+
+pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < PATIENCE, "{what}: not within {PATIENCE:?}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Waits for something that a run at work brings about.
+pub fn wait_for_run(run: &mut Child, what: &str, mut is_so: impl FnMut() -> bool) {
+    wait_until(what, || {
+        assert!(run.try_wait().unwrap().is_none(), "{what}: the run ended before");
+        is_so()
+    });
+}
+
+/// Kills a run as a power cut would; tells whether it was still at work.
+pub fn kill(mut run: Child) -> bool {
+    let was_at_work = run.try_wait().unwrap().is_none();
+    // Has no effect where it has ended already.
+    run.kill().unwrap();
+    run.wait().unwrap();
+    was_at_work
+}
+
+pub fn send(signal: &str, pid: u32) {
+    assert!(Command::new("kill").args([format!("-{signal}"), pid.to_string()]).status().unwrap().success());
+}
+
+/// Names of a folder's entries; none where there is no folder.
+pub fn names(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    entries.map(|entry| entry.file_name().into_string().unwrap()).collect()
+}
+
+/// Names and content of files.
+pub type Files = BTreeMap<String, Vec<u8>>;
+
+/// The files of a folder.
+pub fn files(dir: &Path) -> Files {
+    names(dir).into_iter().map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
+}
+
+const RECORDS: [&str; 5] = ["run.json", "estimate.json", "map.json", "compare.json", "dossier.json"];
+
+/// The same with records and pages changed.
+fn settled(files: Files, record: &dyn Fn(&mut serde_json::Value), page: &dyn Fn(&str) -> String) -> Files {
+    let settle = |(name, mut content): (String, Vec<u8>)| {
+        if RECORDS.contains(&name.as_str()) {
+            let mut value: serde_json::Value = serde_json::from_slice(&content).unwrap();
+            record(&mut value);
+            content = value.to_string().into_bytes();
+        }
+        if name == "report.html" {
+            content = page(&String::from_utf8(content).unwrap()).into_bytes();
+        }
+        (name, content)
+    };
+    files.into_iter().map(settle).collect()
+}
+
+/// Without the times of records and pages.
+pub fn without_times(files: Files) -> Files {
+    let record = |record: &mut serde_json::Value| {
+        for checks in ["/sweep", "/host", "/host/sweep"] {
+            for time in ["device_s", "seconds", "plan_s", "sweep_s"] {
+                record.pointer_mut(checks).and_then(|checks| checks.as_object_mut()?.remove(time));
+            }
+        }
+        for host in ["timings", "settings"] {
+            record.as_object_mut().unwrap().remove(host);
+        }
+    };
+    settled(files, &record, &page::without_times)
+}
+
+/// Without what belongs to the machine and to the way in which the run was divided.
+pub fn without_host(mut files: Files) -> Files {
+    let is_plan = |name: &str| ["plan.json", "run-plan.json", "lanesweep-files.json"].contains(&name);
+    files.retain(|name, _| !is_plan(name) && !(name.starts_with("part-") && name.ends_with(".json")));
+    let record = |record: &mut serde_json::Value| {
+        for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
+            record.as_object_mut().unwrap().remove(host);
+        }
+        // A run in one piece leaves its plan.
+        if let Some(files) = record["files"].as_array_mut() {
+            files.retain(|file| file != "run-plan.json");
+        }
+    };
+    settled(files, &record, &page::without_host)
+}
+
+pub fn same(found: &Files, expected: &Files, what: &str) {
+    assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>(), "{what}");
+    for (name, content) in found {
+        assert!(content == &expected[name], "{what}: {name} differs");
+    }
+}
