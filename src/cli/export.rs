@@ -239,9 +239,6 @@ impl Xosc {
             let problem = format!("{width} m is not a lane width");
             return Err(Error::usage(Place::item("--lane-width"), problem, "give 1 to 20 m, such as 3.5"));
         }
-        if self.worst == Some(0) {
-            return Err(Error::usage(Place::item("--worst"), "0 is out of range", "give 1 or more"));
-        }
         let side = self.side.map(|side| match side {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,

@@ -9,14 +9,9 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, ProfileFlags};
-use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
 use crate::interop::openscenario::reopen;
-use crate::model::criterion::Criterion;
-use crate::report::records;
-use crate::report::trace::{self, TraceFigure, TraceSeries};
-use crate::run::reopen::{Reopened, TracedLane};
+use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};
-use crate::support::readable::value;
 use crate::support::run_dir::is_listed;
 use crate::{Error, Place, Result};
 
@@ -77,35 +72,29 @@ pub struct Simulate {
     profile: ProfileFlags,
 }
 
-/// Lanes that have been run, and what a reader should know of all of them.
-struct Lanes {
-    traced: Vec<TracedLane>,
-    /// What they are of, in a few words.
-    origin: String,
-    synthetic: bool,
-    /// Other scenarios of the file were left out.
-    incomplete: bool,
-}
-
 impl Simulate {
     pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
-        let lanes = self.lanes()?;
-        let named: Vec<(String, &Trace)> = lanes.traced.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect();
+        let (lanes, incomplete) = self.lanes()?;
         if let Some(path) = &self.plot {
             // Before the table: a reader of stdout that ends early must not cost the figure.
             make_folder_of(path)?;
-            write_atomically(path, figure(&lanes, self.plot_end).svg().as_bytes())?;
+            write_atomically(path, lanes.figure(self.plot_end).svg().as_bytes())?;
         }
-        self.format.print(|| trace::table(&named).csv(), || document(&lanes, &named))?;
+        self.format.print(|| lanes.csv(), || lanes.json())?;
         if verbosity != Verbosity::Quiet {
-            lanes.traced.iter().for_each(|lane| console::say(&summary(lane, lanes.traced.len() > 1)));
+            console::say(&lanes.text());
         }
-        Ok(if lanes.incomplete { Exit::Incomplete } else { Exit::Ok })
+        Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    fn lanes(&self) -> Result<Lanes> {
-        let Some(key) = &self.lane else { return self.lanes_of_flags() };
+    /// The lanes, and whether others of the file were left out.
+    fn lanes(&self) -> Result<(TracedLanes, bool)> {
+        let Some(key) = &self.lane else {
+            let profile = self.profile.load()?;
+            let traced = self.flags()?.traced(&profile, self.plausibility.policy())?;
+            return Ok((traced.into_lanes(&profile), false));
+        };
         if self.case.says_a_case() {
             return Err(Error::usage(
                 Place::item("--lane"),
@@ -126,23 +115,7 @@ impl Simulate {
                 return Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help));
             }
         };
-        let traced = reopened.traced(key, self.case.named_models()?.as_deref(), &self.compare)?;
-        let arithmetic = if reopened.is_reference { "f64" } else { "f32" };
-        let data = if reopened.density().is_some() { "sampled" } else { &*reopened.data };
-        let origin = format!("profile {}, {arithmetic}, {data}", reopened.plan().profile.name);
-        Ok(Lanes { traced, origin, synthetic: reopened.is_synthetic, incomplete })
-    }
-
-    /// One case from flags or files, in f64.
-    fn lanes_of_flags(&self) -> Result<Lanes> {
-        let profile = self.profile.load()?;
-        let traced = self.flags()?.traced(&profile, self.plausibility.policy())?.traces.into_iter().map(|trace| {
-            let name = trace.model.name().to_owned();
-            TracedLane { key: name.clone(), name, trace, reference: None }
-        });
-        let traced = traced.collect();
-        let origin = format!("profile {}, f64, a case of flags", profile.name);
-        Ok(Lanes { traced, origin, synthetic: false, incomplete: false })
+        Ok((reopened.traced(key, self.case.named_models()?.as_deref(), &self.compare)?, incomplete))
     }
 
     fn flags(&self) -> Result<CaseFlags> {
@@ -185,108 +158,4 @@ impl Simulate {
         }
         Ok(())
     }
-}
-
-fn figure(lanes: &Lanes, until_s: Option<f64>) -> TraceFigure<'_> {
-    let first = &lanes.traced[0];
-    let category = first.trace.category.label();
-    let title = match lanes.traced.len() {
-        1 => format!("{category}: {}", first.key),
-        _ => match first.key.rsplitn(4, '/').collect::<Vec<_>>()[..] {
-            [_, headway, _, scenario] => format!("{category}: {scenario}, headway {headway}"),
-            _ => format!("{category}, initial gap {} m", value(first.trace.initial_gap_m)),
-        },
-    };
-    let synthetic = if lanes.synthetic && !lanes.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
-    let series = lanes.traced.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
-    TraceFigure { title, subtitle: Some(format!("{synthetic}{}", lanes.origin)), series, until_s }
-}
-
-/// Outcomes and series as one document.
-fn document(lanes: &Lanes, named: &[(String, &Trace)]) -> Result<String> {
-    let outcomes = lanes.traced.iter().map(|lane| {
-        let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
-        serde_json::json!({
-            "lane": lane.key,
-            "category": lane.trace.category.key(),
-            "model": lane.trace.model.name(),
-            "initial_gap_m": lane.trace.initial_gap_m,
-            "outcome": records::outcome(&lane.trace.outcome, lane.trace.dt_s),
-            "reference": reference,
-        })
-    });
-    records::document(&serde_json::json!({
-        "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
-        "data": lanes.origin,
-        "synthetic": lanes.synthetic,
-        "lanes": outcomes.collect::<Vec<_>>(),
-        "steps": trace::table(named).records(),
-    }))
-}
-
-/// How a lane ended, in words.
-fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
-    let TracedLane { key, trace, reference, .. } = lane;
-    let time = |step: u32| match step {
-        NO_STEP => "never".to_owned(),
-        step => format!("{} s", value(trace.time_s(step))),
-    };
-    let outcome = &trace.outcome;
-    let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
-    let mut text = format!(
-        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {} s, max BTN {}, min gap {} m\n",
-        trace.category.label(),
-        trace.model.name(),
-        value(trace.initial_gap_m),
-        verdicts(outcome),
-        time(outcome.reaction_step),
-        time(outcome.end_step),
-        end(outcome),
-        value(outcome.min_ttc),
-        value(outcome.max_btn),
-        value(outcome.min_gap)
-    );
-    if let Some(reference) = reference {
-        text.push_str(&match differences(outcome, reference, &time) {
-            list if list.is_empty() => "  f64: the same verdicts, contact and times\n".to_owned(),
-            list => format!("  f64 DIFFERS: {}\n", list.join("; ")),
-        });
-    }
-    text
-}
-
-fn verdicts(outcome: &Outcome<f64>) -> String {
-    let verdict = |c: Criterion| format!("{} {}", c.label(), if outcome.verdicts.failed(c) { "FAIL" } else { "pass" });
-    Criterion::ALL.map(verdict).join(", ")
-}
-
-fn end(outcome: &Outcome<f64>) -> String {
-    match outcome.end {
-        EndReason::Contact => format!(
-            "{}, closing at {} m/s, the ego at {} m/s",
-            outcome.contact.label(),
-            value(outcome.impact_closing_speed),
-            value(outcome.impact_speed)
-        ),
-        EndReason::Settled => "no further event is possible".to_owned(),
-        EndReason::Standstill => "the ego is stationary".to_owned(),
-        EndReason::Cap => "time cap".to_owned(),
-        EndReason::Aborted => "aborted at a large TTC (jrc-2021)".to_owned(),
-    }
-}
-
-/// What of the reference is another than in the lane arithmetic; values differ in their last digits and are not looked at.
-fn differences(ours: &Outcome<f64>, reference: &Outcome<f64>, time: &dyn Fn(u32) -> String) -> Vec<String> {
-    let mut list = Vec::new();
-    if ours.verdicts != reference.verdicts {
-        list.push(verdicts(reference));
-    }
-    if ours.reaction_step != reference.reaction_step {
-        list.push(format!("reacted: {}", time(reference.reaction_step)));
-    }
-    let how = |o: &Outcome<f64>| (o.end, o.end_step, o.contact, o.contact_with, o.contact_step);
-    if how(ours) != how(reference) {
-        list.push(format!("end: {} ({})", time(reference.end_step), end(reference)));
-    }
-    list
 }

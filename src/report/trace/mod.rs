@@ -4,6 +4,7 @@
 //! The sheet has the width of a column of a paper (two for a cut-out, whose vehicles stand side by side) and type that
 //! stays readable at that width. Series differ in colour, dashes and line width, marks in their shapes.
 
+mod lanes;
 mod panels;
 
 use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};

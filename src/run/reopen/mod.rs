@@ -10,7 +10,7 @@ mod worst;
 use std::path::Path;
 
 pub use record::SampleRecord;
-pub use traced::{TracedCase, TracedLane};
+pub use traced::{TracedCase, TracedLane, TracedLanes};
 pub use worst::WorstOptions;
 
 use crate::engine::{Headway, LaneKey, LanePlan};

@@ -22,6 +22,16 @@ pub struct TracedLane {
     pub reference: Option<Outcome<f64>>,
 }
 
+/// Lanes with every step, and what a reader should know of all of them.
+pub struct TracedLanes {
+    /// At least one.
+    pub lanes: Vec<TracedLane>,
+    /// What they are of, in a few words.
+    pub origin: String,
+    /// The program generated the data, in whole or in part.
+    pub is_synthetic: bool,
+}
+
 /// One concrete case with every step of each model, in f64.
 pub struct TracedCase {
     /// The case as lanes have it.
@@ -56,6 +66,19 @@ impl TracedCase {
         let traces = models.iter().map(trace).collect();
         Ok(TracedCase { case, tables, headway, sizes, traces })
     }
+
+    /// Its lanes under the profile that they were run with.
+    pub fn into_lanes(self, profile: &Profile) -> TracedLanes {
+        let lane = |trace: Trace| {
+            let name = trace.model.name().to_owned();
+            TracedLane { key: name.clone(), name, trace, reference: None }
+        };
+        TracedLanes {
+            lanes: self.traces.into_iter().map(lane).collect(),
+            origin: format!("profile {}, f64, a case of flags", profile.name),
+            is_synthetic: false,
+        }
+    }
 }
 
 impl Reopened {
@@ -64,20 +87,24 @@ impl Reopened {
     ///
     /// # Errors
     /// [`Error::Usage`] for a lane, variant or model that is not there.
-    pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<Vec<TracedLane>> {
+    pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<TracedLanes> {
         let key = self.find(key)?;
         let variants = variants(self.plan(), &key, compare)?;
         let models = match models {
             None => vec![key.model],
             Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<_>>()?,
         };
-        self.with_cases(&[key], |plan| {
+        let lanes = self.with_cases(&[key], |plan| {
             Ok(if self.is_reference {
                 traced::<f64>(plan, key, &variants, &models, None)
             } else {
                 traced::<f32>(plan, key, &variants, &models, Some(LaneRunner::new(plan)))
             })
-        })
+        })?;
+        let arithmetic = if self.is_reference { "f64" } else { "f32" };
+        let data = if self.density().is_some() { "sampled" } else { &*self.data };
+        let origin = format!("profile {}, {arithmetic}, {data}", self.plan().profile.name);
+        Ok(TracedLanes { lanes, origin, is_synthetic: self.is_synthetic })
     }
 }
 

@@ -46,6 +46,9 @@ impl Reopened {
     /// [`Error::Usage`] for variants, models or a criterion that the run does not have, and for too many lanes;
     /// [`Error::Io`]; [`Error::Input`] for a sampling run without such a table.
     pub fn worst(&self, dir: &Path, options: &WorstOptions) -> Result<Vec<LaneKey>> {
+        if options.count == 0 {
+            return Err(Error::usage(Place::option("worst"), "0 is out of range", "give 1 or more"));
+        }
         let models = match options.models {
             None => (0..self.plan().models.len()).collect(),
             Some(list) => list.iter().map(|id| self.model(*id)).collect::<Result<Vec<_>>>()?,

@@ -1,0 +1,134 @@
+//! Lanes step by step, as `simulate` shows them: figure, table, document and a summary of each.
+
+use super::{TraceFigure, TraceSeries, table};
+use crate::Result;
+use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
+use crate::model::criterion::Criterion;
+use crate::report::records;
+use crate::run::reopen::{TracedLane, TracedLanes};
+use crate::support::readable::value;
+
+impl TracedLanes {
+    /// The lanes on one sheet, to a time, s, or 2 s after the last change.
+    pub fn figure(&self, until_s: Option<f64>) -> TraceFigure<'_> {
+        let first = &self.lanes[0];
+        let category = first.trace.category.label();
+        let title = match self.lanes.len() {
+            1 => format!("{category}: {}", first.key),
+            _ => match first.key.rsplitn(4, '/').collect::<Vec<_>>()[..] {
+                [_, headway, _, scenario] => format!("{category}: {scenario}, headway {headway}"),
+                _ => format!("{category}, initial gap {} m", value(first.trace.initial_gap_m)),
+            },
+        };
+        let synthetic = if self.is_synthetic && !self.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
+        let series =
+            self.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
+        TraceFigure { title, subtitle: Some(format!("{synthetic}{}", self.origin)), series, until_s }
+    }
+
+    /// Every step as CSV.
+    pub fn csv(&self) -> String {
+        table(&self.named()).csv()
+    }
+
+    /// Outcomes and series as one document.
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn json(&self) -> Result<String> {
+        let outcomes = self.lanes.iter().map(|lane| {
+            let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
+            serde_json::json!({
+                "lane": lane.key,
+                "category": lane.trace.category.key(),
+                "model": lane.trace.model.name(),
+                "initial_gap_m": lane.trace.initial_gap_m,
+                "outcome": records::outcome(&lane.trace.outcome, lane.trace.dt_s),
+                "reference": reference,
+            })
+        });
+        records::document(&serde_json::json!({
+            "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            "data": self.origin,
+            "synthetic": self.is_synthetic,
+            "lanes": outcomes.collect::<Vec<_>>(),
+            "steps": table(&self.named()).records(),
+        }))
+    }
+
+    /// How the lanes ended, in words.
+    pub fn text(&self) -> String {
+        self.lanes.iter().map(|lane| summary(lane, self.lanes.len() > 1)).collect()
+    }
+
+    fn named(&self) -> Vec<(String, &Trace)> {
+        self.lanes.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect()
+    }
+}
+
+/// How a lane ended, in words.
+fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
+    let TracedLane { key, trace, reference, .. } = lane;
+    let time = |step: u32| match step {
+        NO_STEP => "never".to_owned(),
+        step => format!("{} s", value(trace.time_s(step))),
+    };
+    let outcome = &trace.outcome;
+    let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
+    let mut text = format!(
+        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {} s, max BTN {}, min gap {} m\n",
+        trace.category.label(),
+        trace.model.name(),
+        value(trace.initial_gap_m),
+        verdicts(outcome),
+        time(outcome.reaction_step),
+        time(outcome.end_step),
+        end(outcome),
+        value(outcome.min_ttc),
+        value(outcome.max_btn),
+        value(outcome.min_gap)
+    );
+    if let Some(reference) = reference {
+        text.push_str(&match differences(outcome, reference, &time) {
+            list if list.is_empty() => "  f64: the same verdicts, contact and times\n".to_owned(),
+            list => format!("  f64 DIFFERS: {}\n", list.join("; ")),
+        });
+    }
+    text
+}
+
+fn verdicts(outcome: &Outcome<f64>) -> String {
+    let verdict = |c: Criterion| format!("{} {}", c.label(), if outcome.verdicts.failed(c) { "FAIL" } else { "pass" });
+    Criterion::ALL.map(verdict).join(", ")
+}
+
+fn end(outcome: &Outcome<f64>) -> String {
+    match outcome.end {
+        EndReason::Contact => format!(
+            "{}, closing at {} m/s, the ego at {} m/s",
+            outcome.contact.label(),
+            value(outcome.impact_closing_speed),
+            value(outcome.impact_speed)
+        ),
+        EndReason::Settled => "no further event is possible".to_owned(),
+        EndReason::Standstill => "the ego is stationary".to_owned(),
+        EndReason::Cap => "time cap".to_owned(),
+        EndReason::Aborted => "aborted at a large TTC (jrc-2021)".to_owned(),
+    }
+}
+
+/// What of the reference is another than in the lane arithmetic; values differ in their last digits and are not looked at.
+fn differences(ours: &Outcome<f64>, reference: &Outcome<f64>, time: &dyn Fn(u32) -> String) -> Vec<String> {
+    let mut list = Vec::new();
+    if ours.verdicts != reference.verdicts {
+        list.push(verdicts(reference));
+    }
+    if ours.reaction_step != reference.reaction_step {
+        list.push(format!("reacted: {}", time(reference.reaction_step)));
+    }
+    let how = |o: &Outcome<f64>| (o.end, o.end_step, o.contact, o.contact_with, o.contact_step);
+    if how(ours) != how(reference) {
+        list.push(format!("end: {} ({})", time(reference.end_step), end(reference)));
+    }
+    list
+}
