@@ -145,8 +145,8 @@ fn plan_file(folder: &Path, study: &StudyCases) {
     let path = folder.join("plan.json");
     let start = Instant::now();
     let (head, _) = seal("plan", study.head()).unwrap();
-    let pages: Vec<Vec<u8>> = study.pages().unwrap().map(|page| page.unwrap()).collect();
-    let bytes = [head, pages.concat()].concat();
+    let mut bytes = Vec::new();
+    study.write_file(&head, &mut bytes).unwrap();
     std::fs::write(&path, &bytes).unwrap();
     let written = start.elapsed().as_secs_f64();
     let start = Instant::now();

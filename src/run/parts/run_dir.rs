@@ -1,7 +1,7 @@
 //! A run or one of its parts in a folder: the lock, the journal, the part file, the plan that all parts share.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -155,79 +155,50 @@ impl<T: Countable> RunState<T> {
 }
 
 /// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once. A plan is told by its
-/// first line, which holds the checksums of the pages that follow. One with this line and other bytes behind it was damaged
-/// and is written again.
+/// first line, which holds the checksums of all that follows. One with this line and other bytes behind it was damaged
+/// and is written again. `write` writes the whole plan.
 ///
 /// # Errors
 /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
-pub fn leave_plan(
-    out: &Path,
-    line: &[u8],
-    mut pages: impl Iterator<Item = std::io::Result<Vec<u8>>> + Clone,
-) -> Result<()> {
+pub fn leave_plan(out: &Path, line: &[u8], write: impl Fn(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
-    if let Some(mut there) = open_plan(&path, line)? {
-        if is_rest(&mut there, pages.clone()).map_err(|e| Error::io(&path, "read", e))? {
-            return Ok(());
+    let io = |e| Error::io(&path, "read", e);
+    match input_file::open(&path) {
+        Ok(mut there) => {
+            let mut begin = vec![0; line.len()];
+            if there.read_exact(&mut begin).is_err() || begin != line {
+                let help = "give another option `out`, or the flags that the plan was made with; or move the plan and \
+                            its parts away";
+                return Err(Error::input(Place::file(&path), "this folder holds the plan of another run", help));
+            }
+            there.rewind().map_err(io)?;
+            let mut same = SameAs { file: BufReader::new(there), is_same: true };
+            write(&mut same).map_err(io)?;
+            if same.is_same && same.file.fill_buf().map_err(io)?.is_empty() {
+                return Ok(());
+            }
+            tracing::warn!("{} was damaged: it is written again", path.display());
         }
-        tracing::warn!("{} was damaged: it is written again", path.display());
-    }
-    write_inside(&path, |file| {
-        file.write_all(line)?;
-        pages.try_for_each(|page| file.write_all(&page?))
-    })
-}
-
-/// Copies a plan file into a run's folder, or finds the same one there. A shard reads neither in whole: readers find
-/// damage in what they use.
-///
-/// # Errors
-/// As [`leave_plan`].
-pub fn copy_plan(out: &Path, from: &Path) -> Result<()> {
-    let read = |e| Error::io(from, "read", e);
-    let (mut plan, mut line) = (BufReader::new(input_file::open(from)?), Vec::new());
-    plan.read_until(b'\n', &mut line).map_err(read)?;
-    let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
-    if let Some(there) = open_plan(&path, &line)? {
-        let length = there.get_ref().metadata().map_err(|e| Error::io(&path, "read", e))?.len();
-        if length == plan.get_ref().metadata().map_err(read)?.len() {
-            return Ok(());
-        }
-        tracing::warn!("{} was damaged: it is written again", path.display());
-    }
-    write_inside(&path, |file| {
-        file.write_all(&line)?;
-        std::io::copy(&mut plan, file).map(drop)
-    })
-}
-
-/// The plan file of a folder, behind this first line; `None` without a plan.
-fn open_plan(path: &Path, line: &[u8]) -> Result<Option<BufReader<File>>> {
-    let mut file = match input_file::open(path) {
-        Ok(file) => BufReader::new(file),
-        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {}
         Err(e) => return Err(e),
-    };
-    let mut there = vec![0; line.len()];
-    if file.read_exact(&mut there).is_ok() && there == line {
-        return Ok(Some(file));
     }
-    let problem = "this folder holds the plan of another run";
-    let help =
-        "give another option `out`, or the flags that the plan was made with; or move the plan and its parts away";
-    Err(Error::input(Place::file(path), problem, help))
+    write_inside(&path, write)
 }
 
-/// Whether a file ends with exactly these pages.
-fn is_rest(file: &mut BufReader<File>, pages: impl Iterator<Item = std::io::Result<Vec<u8>>>) -> std::io::Result<bool> {
-    let mut there = Vec::new();
-    for page in pages {
-        let page = page?;
-        there.clear();
-        file.take(page.len() as u64).read_to_end(&mut there)?;
-        if there != page {
-            return Ok(false);
-        }
+/// Compares what is written with a file.
+struct SameAs {
+    file: BufReader<File>,
+    is_same: bool,
+}
+
+impl Write for SameAs {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut there = vec![0; bytes.len()];
+        self.is_same &= self.file.read_exact(&mut there).is_ok() && there == bytes;
+        Ok(bytes.len())
     }
-    Ok(file.fill_buf()?.is_empty())
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }

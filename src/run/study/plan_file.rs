@@ -23,6 +23,11 @@ pub(super) const PAGE: u64 = 64;
 pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
     let mut stripped = Scenario {
         recording: String::new(),
+        ego_id: 0,
+        target_id: 0,
+        lead_id: None,
+        frame0: 0,
+        frame1: 0,
         reason: String::new(),
         lane_width: 3.5,
         thw0: None,

@@ -1,5 +1,7 @@
 //! A planned study: made from scenarios by a builder, or read from a plan file.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -11,10 +13,11 @@ use super::plan::{StudyOptions, outline_study};
 use super::plan_file::StudyHead;
 use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
-use crate::run::parts::{Shard, copy_plan, leave_plan, read_sealed_line, seal, units_of};
+use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::hex::sha256;
+use crate::support::input_file;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::{Error, Place, Result};
@@ -221,11 +224,14 @@ impl Study {
     /// # Errors
     /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
     pub fn write_plan(&self, out: &Path) -> Result<()> {
-        match &self.file {
-            // The file as it is: of a shard's scenarios alone the plan could not be written.
-            Some((path, _)) => copy_plan(out, path),
-            None => leave_plan(out, &self.seal()?.0, self.cases.pages()?),
-        }
+        let Some((path, _)) = &self.file else {
+            let line = self.seal()?.0;
+            return leave_plan(out, &line, |file| self.cases.write_file(&line, file));
+        };
+        // The file as it is: of a shard's scenarios alone the plan could not be written.
+        let mut line = Vec::new();
+        BufReader::new(input_file::open(path)?).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+        leave_plan(out, &line, |file| std::io::copy(&mut File::open(path)?, file).map(drop))
     }
 
     /// Adds the plan file to the results, unless it would be larger than so many bytes; tells whether it did.
@@ -233,15 +239,12 @@ impl Study {
     /// # Errors
     /// [`Error::Io`].
     pub(crate) fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
-        let (head, mut pages) = (self.seal()?.0, self.cases.pages()?);
-        if head.len() as u64 + self.cases.head().scenario_bytes() > max_bytes {
-            return Ok(false);
+        let line = self.seal()?.0;
+        let is_kept = line.len() as u64 + self.cases.head().scenario_bytes() <= max_bytes;
+        if is_kept {
+            results.add_with(name, |file| self.cases.write_file(&line, file))?;
         }
-        results.add_with(name, |out| {
-            out.write_all(&head)?;
-            pages.try_for_each(|page| out.write_all(&page?))
-        })?;
-        Ok(true)
+        Ok(is_kept)
     }
 
     /// Reads a plan file; of a shard, its scenarios only.

@@ -236,8 +236,9 @@ impl Seeds {
             parts: parts.into(),
             plans: vec![{
                 let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
-                let pages: Vec<Vec<u8>> = outlined.pages().unwrap().map(|page| page.unwrap()).collect();
-                [seal("plan", outlined.head()).unwrap().0, pages.concat()].concat()
+                let (head, mut plan) = (seal("plan", outlined.head()).unwrap().0, Vec::new());
+                outlined.write_file(&head, &mut plan).unwrap();
+                plan
             }],
             journals: journals.into(),
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
