@@ -5,30 +5,26 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
+use super::dry_run::dry_run;
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, fit, lists};
-use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
+use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::report::compare::{CompareFile, rates};
 use crate::report::html::PageFigure;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
-use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
 use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
-
-/// Memory of the counts of sampled lanes and of the figures, bytes, measured.
-const BYTES_OF_COUNTS: u64 = 8 << 20;
 
 /// Which parameterizations give the right risk, not only the right labels?
 ///
@@ -131,7 +127,7 @@ impl Compare {
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;
         let plan = compare.lane_plan();
         if self.dry_run {
-            return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
+            return dry_run(&compare, &opened.executor(), Some(started.elapsed().as_secs_f64()), "", self.format);
         }
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
@@ -171,43 +167,6 @@ impl Compare {
         };
         self.write(&mut file, folder.results()?)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
-    }
-
-    /// What the run would be. Sampled lanes are taken to cost what those of their category's scenarios do.
-    fn forecast(
-        &self,
-        data: &str,
-        plan: &LanePlan,
-        ids: &[Parameterization],
-        opened: &Opened,
-        before_s: f64,
-    ) -> Result<Exit> {
-        let per_sample = (plan.headways.len() * plan.models.len()) as u64;
-        let mut parts = dry_run::parts(plan);
-        let mut whole = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
-            Partial::from_chunk(plan, &chunk).map(drop)
-        })?;
-        let per_lane_s = whole.seconds / whole.lanes.max(1) as f64;
-        for id in ids {
-            let lanes = self.samples.saturating_mul(per_sample);
-            let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
-            parts.push(ForecastPart { of, what, units: self.samples, lanes });
-            whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
-        }
-        DryRun {
-            data: data.to_owned(),
-            parts,
-            units: "cases",
-            is_at_most: false,
-            more_bytes: BYTES_OF_COUNTS,
-            more: "counts per scenario and figures",
-            forecast: Some(whole),
-            backend: opened.backend().describe(),
-            before: Some((before_s, "reading, mining and planning")),
-            besides: "fitting the densities",
-        }
-        .print(self.format)?;
-        Ok(Exit::Ok)
     }
 
     /// Tables, figures and record.

@@ -1,123 +1,94 @@
 //! `--dry-run`: how many lanes, how much memory, how long; nothing is written.
 
-use std::time::Duration;
-
+use super::Exit;
 use super::format::FormatFlag;
 use crate::Result;
-use crate::engine::{Block, Forecast, LanePlan};
+use crate::engine::Executor;
 use crate::report::records::document;
+use crate::run::forecast::{DryRun, ForecastPart, RunForecast};
 use crate::support::readable::{count, value};
 
-/// Time that lanes are run for to know their speed.
-pub(super) const BUDGET: Duration = Duration::from_millis(200);
-
-/// One line of the table of lanes.
-pub(super) struct ForecastPart {
-    pub of: String,
-    pub what: String,
-    pub units: u64,
-    pub lanes: u64,
+/// Prints what a run would be. `before_s` is the time that was taken for what the run does again, s; the flags cost time
+/// that is not counted.
+///
+/// # Errors
+/// As [`DryRun::forecast`]; [`crate::Error::Io`] where standard output cannot be written.
+pub(super) fn dry_run(
+    run: &impl DryRun,
+    executor: &Executor,
+    before_s: Option<f64>,
+    flags: &'static str,
+    format: FormatFlag,
+) -> Result<Exit> {
+    let printed = Printed { run: run.forecast(executor)?, before_s, flags };
+    format.print(|| printed.text(peak_bytes()), || printed.json(peak_bytes()))?;
+    Ok(Exit::Ok)
 }
 
-/// What a run would be.
-pub(super) struct DryRun {
-    /// What it would run on.
-    pub data: String,
-    pub parts: Vec<ForecastPart>,
-    /// What a part's units are: `scenarios`, `samples`, `cells`.
-    pub units: &'static str,
-    /// All lanes, or the most that there can be.
-    pub is_at_most: bool,
-    /// Bytes that the run will hold beyond what is held now.
-    pub more_bytes: u64,
-    /// What those are.
-    pub more: &'static str,
-    /// None where the lanes follow from one another.
-    pub forecast: Option<Forecast>,
-    pub backend: String,
-    /// Seconds that this dry run took for what the run does again, and what that is.
-    pub before: Option<(f64, &'static str)>,
-    /// What comes on top of the lanes' time.
-    pub besides: &'static str,
+struct Printed {
+    run: RunForecast,
+    before_s: Option<f64>,
+    flags: &'static str,
 }
 
-/// The lanes of a plan by category and variant.
-pub(super) fn parts(plan: &LanePlan) -> Vec<ForecastPart> {
-    let of_block = |block: &'_ Block| {
-        let lanes = block.units.len() * (plan.headways.len() * plan.models.len()) as u64;
-        let (of, units) = (block.category.label().to_owned(), block.units.len());
-        let part = move |what: &String| ForecastPart { of: of.clone(), what: what.clone(), units, lanes };
-        block.variants.iter().map(part).collect::<Vec<_>>()
-    };
-    plan.blocks.iter().flat_map(of_block).collect()
-}
-
-impl DryRun {
-    /// Prints it.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] where standard output cannot be written.
-    pub fn print(&self, format: FormatFlag) -> Result<()> {
-        format.print(|| self.text(peak_bytes()), || self.json(peak_bytes()))
-    }
-
+impl Printed {
     fn json(&self, now: Option<u64>) -> Result<String> {
         let part = |ForecastPart { of, what, units, lanes }: &ForecastPart| serde_json::json!({"of": of, "what": what, "units": units, "lanes": lanes});
         document(&serde_json::json!({
-            "data": self.data,
-            "lanes": self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add),
-            "at_most": self.is_at_most,
-            "parts": self.parts.iter().map(part).collect::<Vec<_>>(),
-            "peak_bytes": now.map(|now| now + self.more_bytes),
-            "lanes_s": self.forecast.as_ref().map(|forecast| forecast.seconds),
-            "measured_lanes": self.forecast.as_ref().map(|forecast| forecast.measured_lanes),
-            "before_s": self.before.map(|(seconds, _)| seconds),
-            "backend": self.backend,
+            "data": self.run.data,
+            "lanes": self.run.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add),
+            "at_most": self.run.is_at_most,
+            "parts": self.run.parts.iter().map(part).collect::<Vec<_>>(),
+            "peak_bytes": now.map(|now| now + self.run.more_bytes),
+            "lanes_s": self.run.time.map(|time| time.seconds),
+            "measured_lanes": self.run.time.map(|time| time.measured_lanes),
+            "before_s": self.before_s,
+            "backend": self.run.backend,
         }))
     }
 
     fn text(&self, now: Option<u64>) -> String {
-        let mut text = format!("Dry run: nothing is written.\nData    {}\n", self.data);
-        let lanes: u64 = self.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
-        let most = if self.is_at_most { "at most " } else { "" };
+        let mut text = format!("Dry run: nothing is written.\nData    {}\n", self.run.data);
+        let lanes: u64 = self.run.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
+        let most = if self.run.is_at_most { "at most " } else { "" };
         text += &format!("Lanes   {most}{}\n", count(lanes));
-        let wide = |of: &dyn Fn(&ForecastPart) -> usize| self.parts.iter().map(of).max().unwrap_or(0);
+        let wide = |of: &dyn Fn(&ForecastPart) -> usize| self.run.parts.iter().map(of).max().unwrap_or(0);
         let (a, b) = (wide(&|part| part.of.chars().count()), wide(&|part| part.what.chars().count()));
         let c = wide(&|part| count(part.units).len());
         let d = wide(&|part| count(part.lanes).len());
-        for ForecastPart { of, what, units, lanes } in &self.parts {
+        for ForecastPart { of, what, units, lanes } in &self.run.parts {
             let (count, lanes) = (count(*units), count(*lanes));
-            text += &format!("        {of:a$}  {what:b$}  {count:>c$} {}  {lanes:>d$} lanes\n", self.units);
+            text += &format!("        {of:a$}  {what:b$}  {count:>c$} {}  {lanes:>d$} lanes\n", self.run.units);
         }
-        let more = size(self.more_bytes);
+        let more = size(self.run.more_bytes);
         text += &match now {
             Some(now) => format!(
                 "Memory  about {} at the peak: {} resident so far (with the plan and some of its lanes run), {more} for {}\n",
-                size(now + self.more_bytes),
+                size(now + self.run.more_bytes),
                 size(now),
-                self.more
+                self.run.more
             ),
-            None => format!("Memory  {more} for {}, beside the program and the plan\n", self.more),
+            None => format!("Memory  {more} for {}, beside the program and the plan\n", self.run.more),
         };
-        text += &match &self.forecast {
+        text += &match &self.run.time {
             Some(forecast) => format!(
                 "Time    {most}{} for the lanes, from {} of them run just now ({:.3} \u{b5}s each): an estimate, on this \
                  machine as it is loaded now\n        on {}\n",
                 time(forecast.seconds),
                 count(forecast.measured_lanes),
                 1e6 * forecast.seconds / forecast.lanes.max(1) as f64,
-                self.backend
+                self.run.backend
             ),
             None => format!(
                 "Time    not estimated: each step of this estimator follows from the last\n        on {}\n",
-                self.backend
+                self.run.backend
             ),
         };
-        if let Some((seconds, what)) = self.before {
-            text += &format!("        {what} took {}, and will again\n", time(seconds));
+        if let Some(seconds) = self.before_s {
+            text += &format!("        reading, mining and planning took {}, and will again\n", time(seconds));
         }
-        if !self.besides.is_empty() {
-            text += &format!("        not counted: {}\n", self.besides);
+        if !self.run.not_counted.is_empty() {
+            text += &format!("        not counted: {}{}\n", self.run.not_counted, self.flags);
         }
         text
     }

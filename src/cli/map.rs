@@ -7,18 +7,18 @@ use clap::Args;
 
 use super::backend_flags::BackendFlags;
 use super::console::{self, Verbosity};
-use super::dry_run::{BUDGET, DryRun, ForecastPart};
+use super::dry_run::dry_run;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
-use crate::engine::{Backend, CpuBackend, Executor, Forecast, Verdicts, Wanted, forecast};
+use crate::engine::{Backend, CpuBackend, Executor};
 use crate::interop::openscenario::{Names, Rename, read_distribution, variations};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::{
-    self, Against, CaseStyle, Grid, GridAxis, GridParts, GridPlan, MAX_PANELS, MapGrids, MapOptions, MapParameter,
+    self, Against, CaseStyle, Grid, GridAxis, GridParts, MAX_PANELS, MapGrids, MapOptions, MapParameter,
     MapResult, PARAMETERS, presets::Presets,
 };
 use crate::scenario::Category;
@@ -29,9 +29,6 @@ use crate::{Error, Place, Result};
 
 /// Seed of the choice of lanes of a device that the CPU computes again.
 const RECHECK_SEED: u64 = 1;
-
-/// Memory of the sheets that are being drawn, bytes: those of the presets, measured.
-const BYTES_OF_SHEETS: u64 = 3 << 20;
 
 /// Map outcomes over two parameters, and where two models or profiles differ
 ///
@@ -158,7 +155,7 @@ impl Map {
             None => opened.backend(),
         };
         if self.dry_run {
-            return forecast_map(&map, backend, self.format);
+            return dry_run(&map, &Executor::new(backend), None, "", self.format);
         }
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = Executor::new(backend).with_fallback(opened.fallback()).with_recheck(RECHECK_SEED);
@@ -331,38 +328,6 @@ impl Map {
             panel_rows: Some(rows),
         })
     }
-}
-
-/// What the maps would be.
-fn forecast_map(map: &grid::Map, backend: &dyn Backend, format: FormatFlag) -> Result<Exit> {
-    let all = map.lane_count();
-    let mut whole = Forecast::default();
-    for plan in map.lane_plans() {
-        let budget = BUDGET.mul_f64(plan.lane_count() as f64 / all.max(1) as f64);
-        whole.add(&forecast(plan, backend, Wanted::Verdicts, budget, |_| Ok(()))?);
-    }
-    let part = |(other, plan): (Option<&str>, &GridPlan)| ForecastPart {
-        of: plan.grid.name().to_owned(),
-        what: other.map_or(String::new(), |name| format!("under {name}")),
-        units: plan.grid.cell_count() as u64,
-        lanes: plan.lane_count(),
-    };
-    let parts = map.plans().map(part).collect();
-    DryRun {
-        data: "the grids' own cases".to_owned(),
-        parts,
-        units: "cells",
-        is_at_most: false,
-        // A verdict per cell and model, and the sheets drawn of them.
-        more_bytes: all * (size_of::<Verdicts>() as u64 + 1) + BYTES_OF_SHEETS,
-        more: "verdicts and sheets",
-        forecast: Some(whole),
-        backend: backend.describe(),
-        before: None,
-        besides: "drawing and writing the sheets",
-    }
-    .print(format)?;
-    Ok(Exit::Ok)
 }
 
 fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {

@@ -31,7 +31,6 @@ mod rerun;
 mod sample;
 mod sample_checks;
 mod sample_distribution;
-mod sample_forecast;
 mod sample_lanes;
 mod sample_options;
 mod sample_run;

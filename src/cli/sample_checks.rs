@@ -4,12 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::source::file_of;
+use crate::run::sampling::MAX_HELD;
 use crate::support::repeats::refuse_repeats;
 use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
-
-/// Points that an adaptive estimator holds at once, at most.
-pub(super) const MAX_HELD: u64 = 10_000_000;
 
 /// Samples of a run that can be split and resumed, at most: as of `compare`.
 const MAX_SPLIT: u64 = (1 << 48) - 1;

@@ -6,11 +6,11 @@ use super::Exit;
 use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::dry_run::dry_run;
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_checks::{guard, only_crude};
 use super::sample_distribution;
-use super::sample_forecast::forecast_sample;
 use super::sample_lanes::{self, RowTable};
 use crate::engine::Executor;
 use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
@@ -87,7 +87,7 @@ impl Sample {
         verbosity: Verbosity,
     ) -> Result<Exit> {
         if self.dry_run {
-            return forecast_sample(&sample, opened, self.format);
+            return dry_run(&sample, &opened.executor(), None, "; --rows", self.format);
         }
         if self.shards.plan_only || self.shards.is_part() {
             sample.write_plan(&self.out)?;

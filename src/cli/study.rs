@@ -8,7 +8,7 @@ use clap::Args;
 use super::backend_flags::{BackendFlags, Opened};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{self, BUDGET, DryRun};
+use super::dry_run::dry_run;
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
 use super::source::{self, PlausibilityFlag, Source};
@@ -16,21 +16,20 @@ use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_f
 use super::synth::GeneratorFlags;
 use super::{Exit, ProfileFlags, lists};
 use crate::Result;
-use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
-use crate::model::criterion::Criterion;
+use crate::engine::{Backend, CpuBackend, Executor, Headway};
 use crate::model::profile::Profile;
 use crate::report::lanes::Digits;
 use crate::report::run_record::Timings;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, StudyOptions, StudyResult, WINDOW};
+use crate::run::study::{self, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::counts_text;
 
-/// Series that a dry run makes, beside one scenario of each category: enough to know the speed of the lanes.
-const FORECAST_BYTES: u64 = 64 << 20;
+/// Flags whose time a dry run does not count.
+const FLAGS: &str = "; --rows and --compare-reference";
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -143,7 +142,7 @@ impl Study {
                 self.backend.none_but("--reference")?;
             }
             if self.dry_run {
-                return self.forecast(&study, &opened, None);
+                return dry_run(&study, &opened.executor(), None, FLAGS, self.format);
             }
             return self.sweep(&study, &opened, configured, Timings::default(), verbosity);
         }
@@ -160,7 +159,7 @@ impl Study {
         let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
-            return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
+            return dry_run(&study, &opened.executor(), Some(timings.mine_s + timings.plan_s), FLAGS, self.format);
         }
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
@@ -223,37 +222,6 @@ impl Study {
             tracing::warn!("{left_out}; {}", left_out.help().unwrap_or_default());
         }
         Ok((study, timings))
-    }
-
-    /// What the run would be.
-    fn forecast(&self, study: &study::Study, opened: &Opened, before_s: Option<f64>) -> Result<Exit> {
-        let plan = study.plan();
-        let reference = CpuBackend::reference();
-        let backend: &dyn Backend = if study.facts().reference { &reference } else { opened.backend() };
-        let some = study.cases().thinned(WINDOW, FORECAST_BYTES)?;
-        let mut forecast =
-            forecast(&some, backend, Wanted::Verdicts, BUDGET, |chunk| Partial::from_chunk(&some, &chunk).map(drop))?;
-        forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
-        forecast.lanes = plan.lane_count();
-        // The counts of every unit, in the ledger and joined.
-        let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
-        let of_unit = size_of::<Confusion<u32>>() as u64;
-        let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
-        DryRun {
-            data: study.facts().data.clone(),
-            parts: dry_run::parts(plan),
-            units: "scenarios",
-            is_at_most: false,
-            more_bytes: plan.blocks.iter().map(counts).sum::<u64>()
-                + study.cases().window_bytes().saturating_sub(2 * FORECAST_BYTES),
-            more: "counts and the series of a window",
-            forecast: Some(forecast),
-            backend: backend.describe(),
-            before: before_s.map(|seconds| (seconds, "reading, mining and planning")),
-            besides: "scores, figures, the plan file; --rows and --compare-reference",
-        }
-        .print(self.format)?;
-        Ok(Exit::Ok)
     }
 
     /// From a plan to a report, or to a part of one.

@@ -65,10 +65,10 @@ pub struct CompareOptions {
 /// ```
 pub struct Compare<'a> {
     scenarios: &'a [Scenario],
-    facts: &'a DataFacts,
+    pub(super) facts: &'a DataFacts,
     profile: Profile,
-    options: CompareOptions,
-    plan: LanePlan,
+    pub(super) options: CompareOptions,
+    pub(super) plan: LanePlan,
 }
 
 /// What a comparison gave.

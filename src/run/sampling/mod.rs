@@ -48,6 +48,7 @@ pub use risk::{Risk, RiskRate};
 pub use rows::{EstimateRow, crude_rows, headway_name};
 pub use sample::Sample;
 pub(crate) use sample::SampleKind;
+pub(crate) use sample_options::MAX_HELD;
 pub use sample_options::{Estimator, SampleOptions};
 pub use sample_result::{Levels, SampleResult};
 pub use sample_run::{EachChunk, SampleRun};

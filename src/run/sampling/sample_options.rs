@@ -10,6 +10,9 @@ use crate::stats::density::Mixture;
 use crate::stats::estimate::{BinomialInterval, Pilot, StopRule};
 use crate::{Error, Place, Result};
 
+/// Points that an adaptive estimator holds at once, at most.
+pub(crate) const MAX_HELD: u64 = 10_000_000;
+
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Estimator {
