@@ -2,6 +2,7 @@
 
 use clap::Args;
 
+use super::signals::CANCEL;
 use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::{Error, Place, Result};
 
@@ -24,7 +25,7 @@ impl BackendFlags {
     /// # Errors
     /// As [`OpenBackend::open`].
     pub fn open(&self) -> Result<OpenBackend> {
-        OpenBackend::open(self.backend, self.device.as_ref())
+        Ok(OpenBackend::open(self.backend, self.device.as_ref())?.with_cancel(CANCEL.clone()))
     }
 
     /// Opens what is to be verified.
@@ -44,6 +45,6 @@ impl BackendFlags {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
             return Err(Error::usage(Place::item("--reference"), problem, "leave out --backend and --device"));
         }
-        Ok(OpenBackend::reference())
+        Ok(OpenBackend::reference().with_cancel(CANCEL.clone()))
     }
 }

@@ -33,7 +33,7 @@ pub enum Exit {
     /// A defect of the program.
     Internal = 70,
     /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
-    Interrupted = crate::support::interrupt::EXIT_STATUS,
+    Interrupted = crate::cli::signals::EXIT_STATUS,
 }
 
 impl Exit {

@@ -32,6 +32,7 @@ mod sample_run;
 pub mod settings;
 mod shard_flags;
 mod shell;
+pub mod signals;
 mod simulate;
 mod slurm;
 mod source;
@@ -150,7 +151,7 @@ pub fn main() -> ExitCode {
     if let Ok(common) = Common::from_arg_matches(&matches) {
         console::start_log(common.verbosity());
     }
-    crate::support::interrupt::install();
+    signals::install();
     told(|| {
         let (cli, configured) = Configured::of(&matches, &words)?;
         run(&cli, &configured)

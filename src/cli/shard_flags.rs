@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::signals::CANCEL;
 use crate::run::parts::Shard;
-use crate::support::interrupt;
 use crate::{Error, Place, Result};
 
 /// Flags of every verb that can be split.
@@ -38,7 +38,7 @@ impl ShardFlags {
             let problem = format!("{seconds} s is out of range");
             return Err(Error::usage(Place::item("--stop-after"), problem, "give seconds above 0"));
         }
-        interrupt::stop_after(seconds);
+        CANCEL.stop_after(seconds);
         Ok(())
     }
 

@@ -108,6 +108,18 @@ pub trait Backend: Send + Sync {
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>>;
 }
 
+impl<B: Backend + ?Sized> Backend for &B {
+    fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
+        (**self).rechecked_by(wanted)
+    }
+    fn describe(&self) -> String {
+        (**self).describe()
+    }
+    fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        (**self).prepare(plan)
+    }
+}
+
 /// A backend at work on one plan.
 pub trait Session {
     /// Computes all lanes of an interval of units. On an error the interval can be given to another session.

@@ -2,6 +2,7 @@
 //! CPU, and gives a failed chunk to another backend.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -10,22 +11,26 @@ use super::cpu::runner::LaneRunner;
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
 use super::watch::Watch;
+use crate::support::cancel::Cancel;
 use crate::{Error, Result};
 
 /// Lanes of one task that values marked lanes.
 const VALUING_TASK: usize = 4096;
 
-/// What computes the lanes of a run, what stands in where it fails, and which lanes are computed again.
-#[derive(Clone, Copy)]
+/// What computes the lanes of a run, what stands in where it fails, and which lanes are computed again. `Executor<'static>`
+/// owns its backends; one of a borrowed backend (`Executor::new(&backend)`) lives as long as that.
+#[derive(Clone)]
 pub struct Executor<'a> {
     /// Computes the lanes.
-    pub backend: &'a dyn Backend,
+    pub backend: Arc<dyn Backend + 'a>,
     /// Computes what the backend cannot.
-    pub fallback: Option<&'a dyn Backend>,
+    pub fallback: Option<Arc<dyn Backend + 'a>>,
     /// The lanes that the CPU computes again, as [`Backend::rechecked_by`] says; `None` checks none.
     pub recheck: Option<RecheckOptions>,
     /// Maximum lanes of a chunk; `None` leaves it to the backend. A run is journalled and interrupted between chunks.
     pub chunk_lanes: Option<u64>,
+    /// Ends a sweep after the chunk at which it is requested.
+    pub cancel: Cancel,
 }
 
 /// How a sweep went.
@@ -56,13 +61,24 @@ impl SweepSummary {
 
 impl<'a> Executor<'a> {
     /// A backend without fallback or check.
-    pub fn new(backend: &'a dyn Backend) -> Self {
-        Executor { backend, fallback: None, recheck: None, chunk_lanes: None }
+    pub fn new(backend: impl Backend + 'a) -> Self {
+        Executor {
+            backend: Arc::new(backend),
+            fallback: None,
+            recheck: None,
+            chunk_lanes: None,
+            cancel: Cancel::default(),
+        }
     }
 
     /// The same with a fallback, where there is one.
-    pub fn with_fallback(self, fallback: Option<&'a dyn Backend>) -> Self {
-        Executor { fallback, ..self }
+    pub fn with_fallback(self, fallback: impl Backend + 'a) -> Self {
+        Executor { fallback: Some(Arc::new(fallback)), ..self }
+    }
+
+    /// The same, ended by this token.
+    pub fn with_cancel(self, cancel: Cancel) -> Self {
+        Executor { cancel, ..self }
     }
 
     /// The same with one lane in [`ONE_IN`](super::ONE_IN) computed again; the seed chooses which.
@@ -70,12 +86,23 @@ impl<'a> Executor<'a> {
         Executor { recheck: Some(RecheckOptions::of_seed(seed)), ..self }
     }
 
+    /// Ends a run of which so many units are done, where that is requested and there are more.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(crate) fn check_cancelled(&self, done: u64, of: u64) -> Result<()> {
+        if done < of && self.cancel.requested() {
+            return Err(Error::Interrupted { done: format!("{done} of {of} units are done"), is_kept: false });
+        }
+        Ok(())
+    }
+
     /// Computes an interval of units and gives every chunk, in order, to `each`. A chunk that the backend cannot
     /// compute is computed by the fallback, where there is one.
     ///
     /// # Errors
     /// Of the backend where there is no fallback, of the fallback, of `each`; [`Error::Verification`] where a
-    /// checked lane differs.
+    /// checked lane differs; [`Error::Interrupted`] between chunks once [`Executor::cancel`] is requested.
     pub fn sweep(
         &self,
         plan: &LanePlan,
@@ -96,7 +123,8 @@ impl<'a> Executor<'a> {
         recheck: Option<&Recheck>,
         mut each: impl FnMut(Chunk) -> Result<()>,
     ) -> Result<SweepSummary> {
-        let &Executor { backend, fallback, chunk_lanes, .. } = self;
+        let Executor { backend, fallback, chunk_lanes, .. } = self;
+        let fallback = fallback.as_deref();
         let most = chunk_lanes.unwrap_or(u64::MAX);
         let mut summary = SweepSummary::default();
         let mut redo: Option<Box<dyn Session + '_>> = None;
@@ -122,7 +150,9 @@ impl<'a> Executor<'a> {
             summary.redone_lanes += redone * chunk.lanes();
             summary.rechecked_lanes += rechecked;
             summary.lanes += chunk.lanes();
-            each(chunk)
+            let done = chunk.units.end - units.start;
+            each(chunk)?;
+            self.check_cancelled(done, units.end - units.start)
         };
         let mut from = units.start;
         // The backend is not asked for units before this one.
@@ -132,7 +162,7 @@ impl<'a> Executor<'a> {
                 let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
                 match (compute(plan, session.as_mut(), &range, wanted), fallback) {
                     (Ok(chunk), _) => {
-                        deliver(chunk, backend, 0)?;
+                        deliver(chunk, &**backend, 0)?;
                         from = range.end;
                         continue;
                     }

@@ -7,6 +7,7 @@ use super::backend::Backend;
 use super::cpu::backend::CpuBackend;
 use super::device_choice::{BackendChoice, DeviceName};
 use super::executor::Executor;
+use crate::support::cancel::Cancel;
 use crate::{Error, Result};
 
 /// A device that computes lanes.
@@ -35,15 +36,15 @@ impl DeviceRecord {
 
 /// What computes the lanes, open.
 pub struct OpenBackend {
-    backend: Box<dyn Backend>,
-    /// A device, and the processor in the lane arithmetic, which stands in for it.
-    device: Option<(DeviceRecord, CpuBackend<f32>)>,
+    /// The processor in the lane arithmetic stands in for a device.
+    executor: Executor<'static>,
+    device: Option<DeviceRecord>,
 }
 
 impl OpenBackend {
     /// The processor in binary64.
     pub fn reference() -> OpenBackend {
-        OpenBackend { backend: Box::new(CpuBackend::reference()), device: None }
+        OpenBackend { executor: Executor::new(CpuBackend::reference()), device: None }
     }
 
     /// Opens what computes as the processor does: where a device does not promise it, the self-check decides.
@@ -52,7 +53,7 @@ impl OpenBackend {
     /// [`Error::Usage`] for a device that does not exist or contradicts the backend, [`Error::Device`] where a GPU is
     /// asked for and there is none, or where it does not compute as the processor does.
     pub fn open(choice: BackendChoice, device: Option<&DeviceName>) -> Result<OpenBackend> {
-        let cpu = || OpenBackend { backend: Box::new(CpuBackend::lane_arithmetic()), device: None };
+        let cpu = || OpenBackend { executor: Executor::new(CpuBackend::lane_arithmetic()), device: None };
         if choice == BackendChoice::Cpu && device.is_none() {
             return Ok(cpu());
         }
@@ -72,18 +73,22 @@ impl OpenBackend {
 
     /// What computes.
     pub fn backend(&self) -> &dyn Backend {
-        &*self.backend
+        &*self.executor.backend
     }
 
     /// The device, where one computes.
     pub fn device(&self) -> Option<&DeviceRecord> {
-        self.device.as_ref().map(|(record, _)| record)
+        self.device.as_ref()
     }
 
     /// What computes, with what stands in for a device.
-    pub fn executor(&self) -> Executor<'_> {
-        let fallback = self.device.as_ref().map(|(_, cpu)| cpu as &dyn Backend);
-        Executor::new(self.backend()).with_fallback(fallback)
+    pub fn executor(&self) -> Executor<'static> {
+        self.executor.clone()
+    }
+
+    /// The same, whose runs end by this token.
+    pub fn with_cancel(self, cancel: Cancel) -> Self {
+        OpenBackend { executor: self.executor.with_cancel(cancel), ..self }
     }
 }
 
@@ -97,9 +102,9 @@ fn open_device(choice: BackendChoice, device: Option<&DeviceName>, is_checked: b
     let opened = GpuBackend::open(&adapters, index, GpuOptions::default());
     match opened.and_then(|gpu| if is_checked { checked(gpu) } else { Ok(gpu) }) {
         Ok(gpu) => {
-            let record = gpu.record();
-            let device = Some((record, CpuBackend::lane_arithmetic()));
-            Ok(Some(OpenBackend { backend: Box::new(gpu), device }))
+            let device = Some(gpu.record());
+            let executor = Executor::new(gpu).with_fallback(CpuBackend::lane_arithmetic());
+            Ok(Some(OpenBackend { executor, device }))
         }
         // Nobody named it: the CPU computes the same.
         Err(error) if is_checked && choice == BackendChoice::Auto && device.is_none() => {

@@ -202,7 +202,7 @@ impl Sample {
                 let (plan, counting) = (&planned.plan, planned.counting());
                 // Few lanes are valued.
                 let verdicts = TallyOptions { worst: 0, ..counting.clone() };
-                let forecast = forecast(plan, executor.backend, Wanted::Verdicts, BUDGET, |chunk| {
+                let forecast = forecast(plan, &*executor.backend, Wanted::Verdicts, BUDGET, |chunk| {
                     SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
                 })?;
                 let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };

@@ -157,11 +157,13 @@ pub enum Error {
     /// A defect of this program, caught before it could become a wrong number.
     #[error("internal error: {0}")]
     Internal(String),
-    /// The run was asked to end early, by a signal or a time limit; what is done is kept.
+    /// The run was asked to end early, by its owner, a signal or a time limit.
     #[error("interrupted: {done}")]
     Interrupted {
-        /// How far it came, and where that is kept.
+        /// How far it came.
         done: String,
+        /// What is done is kept, and the same run continues from there.
+        is_kept: bool,
     },
 }
 
@@ -227,7 +229,8 @@ impl Error {
             Error::Internal(_) => {
                 Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
             }
-            Error::Interrupted { .. } => Some("run the same command again: it continues".to_owned()),
+            Error::Interrupted { is_kept: true, .. } => Some("run the same command again: it continues".to_owned()),
+            Error::Interrupted { is_kept: false, .. } => Some("run it again: nothing was kept".to_owned()),
         }
     }
 }

@@ -4,12 +4,12 @@
 //! and the ranges of plausible input. Every room uses it; it uses none.
 
 pub(crate) mod atomic_file;
+pub mod cancel;
 pub mod error;
 mod file_list;
 pub mod files;
 pub(crate) mod hex;
 pub(crate) mod input_file;
-pub mod interrupt;
 pub(crate) mod live_files;
 pub(crate) mod lock;
 pub(crate) mod near_name;

@@ -21,7 +21,7 @@ fn plan() -> LanePlan {
 fn swept(plan: &LanePlan, gpu: &GpuBackend) -> (Vec<Verdicts>, SweepSummary) {
     let cpu = CpuBackend::lane_arithmetic();
     let recheck = Some(RecheckOptions { seed: 157, one_in: 100 });
-    let executor = Executor { recheck, ..Executor::new(gpu).with_fallback(Some(&cpu)) };
+    let executor = Executor { recheck, ..Executor::new(gpu).with_fallback(&cpu) };
     let mut verdicts = Vec::new();
     let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
         Partial::from_chunk(plan, &chunk)?;
@@ -121,7 +121,7 @@ fn a_wrong_lane_stops_the_run_and_is_named() {
     let (right, wrong) = ("select(0u, 2u, state.record.ttc.failed)", "select(2u, 0u, state.record.ttc.failed)");
     let Some(gpu) = patched(right, wrong) else { return };
     let cpu = CpuBackend::lane_arithmetic();
-    let executor = Executor::new(&gpu).with_fallback(Some(&cpu)).with_recheck(1);
+    let executor = Executor::new(&gpu).with_fallback(&cpu).with_recheck(1);
     for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
         let error = executor.sweep(&plan, 0..plan.unit_count(), wanted, |_| Ok(())).unwrap_err();
         assert!(matches!(&error, Error::Verification(_)), "{error}");

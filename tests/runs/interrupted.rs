@@ -8,10 +8,12 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::program::{self, PATIENCE, done, kill, limited, send, start, wait_for_run, wait_until};
+use lanesweep::Error;
+use lanesweep::cli::signals;
 use lanesweep::engine::verify::{RandomOptions, random_plan};
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, Session, Verdicts, Wanted};
 use lanesweep::model::profile::Profile;
-use lanesweep::support::interrupt;
+use lanesweep::support::cancel::Cancel;
 
 /// The hidden, unfinished files of a folder.
 fn unfinished(dir: &Path) -> Vec<PathBuf> {
@@ -213,34 +215,54 @@ fn the_resumable_run() {
     if std::env::var_os(RESUMABLE_RUN).is_none() {
         return;
     }
-    interrupt::install();
-    let _guard = interrupt::resumable();
-    assert!(!interrupt::requested());
+    signals::install();
+    let _guard = signals::CANCEL.resumable();
+    assert!(!signals::CANCEL.requested());
     eprintln!("at work");
-    wait_until("the first signal", interrupt::requested);
+    wait_until("the first signal", || signals::CANCEL.requested());
     eprintln!("noted");
     std::thread::sleep(PATIENCE);
 }
 
 #[test]
 fn a_time_limit_and_a_request_are_seen_until_they_are_withdrawn() {
-    assert!(!interrupt::requested());
-    interrupt::stop_after(0.05);
-    wait_until("the time limit", interrupt::requested);
-    interrupt::withdraw();
-    assert!(!interrupt::requested());
+    let cancel = Cancel::default();
+    assert!(!cancel.requested());
+    cancel.stop_after(0.05);
+    wait_until("the time limit", || cancel.requested());
+    cancel.withdraw();
+    assert!(!cancel.requested());
     for never in [1e9, f64::MAX, f64::INFINITY] {
-        interrupt::stop_after(never);
-        assert!(!interrupt::requested(), "{never}");
+        cancel.stop_after(never);
+        assert!(!cancel.requested(), "{never}");
     }
     for now in [0.0, -1.0, f64::NAN] {
-        interrupt::stop_after(now);
-        assert!(interrupt::requested(), "{now}");
+        cancel.stop_after(now);
+        assert!(cancel.requested(), "{now}");
     }
-    interrupt::withdraw();
-    interrupt::request();
-    assert!(interrupt::requested());
-    interrupt::withdraw();
+    cancel.withdraw();
+    cancel.request();
+    assert!(cancel.requested());
+    cancel.withdraw();
+}
+
+#[test]
+fn a_sweep_whose_owner_cancels_it_ends_after_the_chunk_and_keeps_nothing() {
+    let options = RandomOptions { lanes_per_model_and_category: 200, ..Default::default() };
+    let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
+    let executor = Executor { chunk_lanes: Some(100), ..Executor::new(CpuBackend::lane_arithmetic()) };
+    let (cancel, mut chunks) = (executor.cancel.clone(), 0);
+    let swept = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| {
+        chunks += 1;
+        if chunks == 3 {
+            cancel.request();
+        }
+        Ok(())
+    });
+    assert!(matches!(swept, Err(Error::Interrupted { is_kept: false, .. })));
+    assert_eq!(chunks, 3);
+    cancel.withdraw();
+    assert!(executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |_| Ok(())).is_ok());
 }
 
 /// Says what it was asked for and computes nothing; its chunks are those of the CPU.

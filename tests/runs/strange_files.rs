@@ -412,8 +412,10 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
         let mut reader = csv::Reader::from_path(dir.join("lanes.csv")).unwrap();
         assert!(reader.records().any(|row| row.unwrap()[0] == format!("'{id}")), "{id} stands in one field");
         // Our readers take the apostrophe away: of lanes, and of scenarios.
-        let (code, _, err) =
-            program::lanesweep(dir, &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"]);
+        let (code, _, err) = program::lanesweep(
+            dir,
+            &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"],
+        );
         assert_eq!(code, 0, "{id}: {err}");
         let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
         std::fs::write(dir.join("cases.csv"), row).unwrap();

@@ -6,7 +6,6 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
-use crate::support::interrupt;
 use crate::{Error, Place, Result};
 
 /// Counts over a set of units of one plan that join in any order.
@@ -130,7 +129,7 @@ impl<T: Countable> Ledger<T> {
     /// journal.
     ///
     /// # Errors
-    /// [`Error::Io`] of the journal; [`Error::Interrupted`] once an end was asked for: then everything is in it.
+    /// [`Error::Io`] of the journal.
     pub fn add(&mut self, counts: T, redone_and_rechecked: [u64; 2]) -> Result<()> {
         let start = |counts: &T| counts.covered().first().map(|range| range.start);
         let is_same = match (self.pending.as_ref().and_then(|pending| start(&pending.counts)), start(&counts)) {
@@ -150,19 +149,21 @@ impl<T: Countable> Ledger<T> {
         if self.journal.as_ref().is_some_and(Journal::is_due) {
             self.flush()?;
         }
-        self.check_interrupted()
+        Ok(())
     }
 
-    /// Ends the run where an end was asked for; needs a journal, else there is nothing to go on from.
-    fn check_interrupted(&mut self) -> Result<()> {
-        if self.journal.is_none() || !interrupt::requested() {
-            return Ok(());
-        }
-        self.flush()?;
-        let total = self.units.end - self.units.start;
-        match self.done() {
-            done if done == total => Ok(()),
-            done => Err(Error::Interrupted { done: format!("{done} of {total} units are done and kept") }),
+    /// What came of a sweep, after an interruption with everything counted in the journal, where there is one.
+    ///
+    /// # Errors
+    /// Of the sweep, of the journal.
+    pub fn kept<R>(&mut self, swept: Result<R>) -> Result<R> {
+        match swept {
+            Err(Error::Interrupted { .. }) if self.journal.is_some() => {
+                self.flush()?;
+                let done = format!("{} of {} units are done and kept", self.done(), self.units.end - self.units.start);
+                Err(Error::Interrupted { done, is_kept: true })
+            }
+            swept => swept,
         }
     }
 

@@ -149,9 +149,10 @@ pub fn sample_into(
             let part = executor.sweep(plan, missing, wanted, |chunk| {
                 each(&chunk)?;
                 ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?, chunk.redone_and_rechecked)
-            })?;
-            summary.add(&part);
+            });
+            summary.add(&ledger.kept(part)?);
         }
+        ledger.kept(executor.check_cancelled(next - range.start, range.end - range.start))?;
         // What earlier processes checked is in the journal.
         [summary.redone_lanes, summary.rechecked_lanes] = ledger.redone_and_rechecked();
         if let Some(counts) = ledger.counts(at..next)? {

@@ -32,7 +32,7 @@ impl LimitState for LaneLimitState<'_> {
         if plan.headways.len() != 1 {
             return Err(Error::Internal("a limit state has one headway".to_owned()));
         }
-        let executor = Executor { recheck: None, ..self.executor };
+        let executor = Executor { recheck: None, ..self.executor.clone() };
         let mut values = Vec::with_capacity(points.len());
         executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
             values.extend(chunk.outcomes.iter().map(|o| limit_state(self.profile, self.criterion, o)));

@@ -12,7 +12,6 @@ use super::weighted_tally::WeightedTally;
 use crate::engine::{Chunk, Executor};
 use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
 use crate::stats::estimate::StopRule;
-use crate::support::interrupt;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 
@@ -185,7 +184,7 @@ impl SampleRun<'_> {
         progress: &mut dyn FnMut(u64),
         mut chunks: Option<&mut EachChunk>,
     ) -> Result<()> {
-        let _resumable = self.is_journalled.then(interrupt::resumable);
+        let _resumable = self.is_journalled.then(|| executor.cancel.resumable());
         match (&mut self.state, &self.sample.0) {
             (State::Crude(state), SampleKind::Crude(planned, stop)) => {
                 if state.units.is_empty() {

@@ -55,7 +55,7 @@ impl Sequential {
                 model,
                 criterion: options.criterion,
                 headway: options.headways.clone(),
-                executor: *executor,
+                executor: executor.clone(),
             };
             let (estimate, level, proposal) = self.estimate(&nominal, &lanes)?;
             let of = |proposal| scenario_shares(&lanes, proposal, defence, options.seed);

@@ -12,6 +12,7 @@ use crate::stats::estimate::{
     BlockSums, Defended, Pilot, PilotCheck, StopReason, WeightSums, defended, from_weight_sums, importance_sums,
     pilot_proposal,
 };
+use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
 
 /// Samples that are judged between two looks at the journal, at most.
@@ -59,7 +60,7 @@ impl WeightedPlan {
         let fit = |points: &[Vec<f64>]| fitted(&self.density, points);
         let search = |&model: &ModelId| {
             tracing::info!("pilot of {} on {}", model.name(), executor.backend.describe());
-            pilot_proposal(&nominal, &self.limit_state(model, *executor), &fit, pilot, self.facts.seed)
+            pilot_proposal(&nominal, &self.limit_state(model, executor.clone()), &fit, pilot, self.facts.seed)
         };
         let found: Vec<(Mixture, PilotCheck)> = self.facts.models.iter().map(search).collect::<Result<_>>()?;
         Ok(found.into_iter().unzip())
@@ -77,19 +78,22 @@ impl WeightedPlan {
         let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, facts.defence);
         let proposals: Vec<Defended> = self.proposals.iter().map(prepared).collect::<Result<_>>()?;
         let (units, chunk) = (ledger.units(), self.chunk_samples());
-        for missing in ledger.missing(units)? {
+        // The samples of a chunk are drawn, judged and weighed together or not at all.
+        let whole = executor.clone().with_cancel(Cancel::default());
+        for missing in ledger.missing(units.clone())? {
             let mut at = missing.start;
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
                 // One proposal serves all models, or each has its own.
                 let sums_of = |(&model, proposal): (&ModelId, &Defended)| {
-                    let lanes = self.limit_state(model, *executor);
+                    let lanes = self.limit_state(model, whole.clone());
                     Ok((model, importance_sums(&nominal, proposal, &lanes, facts.seed, at..next)?))
                 };
                 let pairs = facts.models.iter().zip(proposals.iter().cycle());
                 ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? }, [0; 2])?;
                 progress(next - at);
                 at = next;
+                ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
             }
         }
         Ok(())

@@ -159,9 +159,11 @@ impl StudyCases {
     ) -> Result<SweepSummary> {
         let window = if executor.fallback.is_some() { DEVICE_WINDOW } else { WINDOW };
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        let (from, to) = (units.start, units.end);
         self.in_windows(units, window, |plan, units| {
+            let end = units.end;
             summary.add(&executor.sweep(plan, units, wanted, |chunk| each(plan, chunk))?);
-            Ok(())
+            executor.check_cancelled(end - from, to - from)
         })?;
         Ok(summary)
     }

@@ -43,7 +43,6 @@ struct StudyPlanFile {
 /// # use lanesweep::model::profile::Profile;
 /// use lanesweep::run::parts::Shard;
 /// use lanesweep::run::study::Study;
-/// use lanesweep::support::interrupt;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 ///
@@ -56,10 +55,10 @@ struct StudyPlanFile {
 /// let backend = CpuBackend::lane_arithmetic();
 /// // Small chunks, as the run ends early only between them.
 /// let executor = Executor { chunk_lanes: Some(1000), ..Executor::new(&backend) };
-/// interrupt::request();
+/// executor.cancel.request();
 /// let first = study.run_shard(folder, Shard { index: 0, of: 2 }, &executor);
 /// assert!(matches!(first, Err(Error::Interrupted { .. })));
-/// interrupt::withdraw();
+/// executor.cancel.withdraw();
 /// // The plan in the folder is enough from now on, in another process too.
 /// for index in 0..2 {
 ///     let shard = Shard { index, of: 2 };

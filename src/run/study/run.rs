@@ -6,7 +6,6 @@ use std::path::Path;
 use super::planned::Study;
 use crate::engine::{Executor, Partial, SweepSummary, Wanted};
 use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
-use crate::support::interrupt;
 use crate::support::run_dir::{Results, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
@@ -129,14 +128,14 @@ impl StudyRun<'_> {
     /// # Errors
     /// As [`Study::run`]; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
     pub fn sweep(&mut self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<SweepSummary> {
-        let _resumable = interrupt::resumable();
+        let _resumable = executor.cancel.resumable();
         let ledger = &mut self.state.ledger;
         for range in ledger.missing(self.state.units.clone())? {
             let part = self.study.cases.sweep(range, Wanted::Verdicts, executor, |plan, chunk| {
                 progress(chunk.units.end - chunk.units.start);
                 ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
-            })?;
-            self.summary.add(&part);
+            });
+            self.summary.add(&ledger.kept(part)?);
         }
         // What earlier processes checked is in the journal.
         [self.summary.redone_lanes, self.summary.rechecked_lanes] = ledger.redone_and_rechecked();

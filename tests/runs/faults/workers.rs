@@ -110,7 +110,7 @@ fn a_device_that_is_lost_in_mid_run_is_stood_in_for_and_the_counts_are_the_same(
     let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
     let cpu = CpuBackend::lane_arithmetic();
     let counted = |backend: &dyn Backend| {
-        let executor = Executor::new(backend).with_fallback(Some(&cpu));
+        let executor = Executor::new(backend).with_fallback(&cpu);
         let mut partial = Partial::empty(&plan);
         let summary = executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
             partial = partial.clone().merge(Partial::from_chunk(&plan, &chunk)?)?;
