@@ -121,14 +121,14 @@ impl Compare {
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(self.seed);
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
-        let (counts, mut swept) = compare.replay(&executor, |units| bar.inc(units))?;
+        let (counts, mut swept) = compare.replay(&executor.clone().with_progress(console::inc(&bar)))?;
         bar.finish_and_clear();
         let bar = console::progress(
             verbosity,
             compare.options().parameterizations.len() as u64 * self.samples,
             "fitting and sampling",
         );
-        let result = compare.sample(&counts, &executor, |samples| bar.inc(samples));
+        let result = compare.sample(&counts, &executor.with_progress(console::inc(&bar)));
         bar.finish_and_clear();
         let CompareResult { categories, left_out, failed, summary } = result?;
         swept.add(&summary);

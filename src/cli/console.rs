@@ -90,6 +90,12 @@ pub fn command_line() -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
+/// What moves a bar with the units of a run.
+pub fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
+    let bar = bar.clone();
+    move |units| bar.inc(units)
+}
+
 /// A progress bar on stderr; silent unless stderr is a terminal.
 pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);

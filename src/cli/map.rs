@@ -151,9 +151,9 @@ impl Map {
         }
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
-        let bar = console::progress(verbosity, map.cell_count(), "sweeping");
+        let bar = console::progress(verbosity, map.unit_count(), "sweeping");
         let started = Instant::now();
-        let MapResult { grids, summary } = map.run(&executor, |cells| bar.inc(cells))?;
+        let MapResult { grids, summary } = map.run(&executor.with_progress(console::inc(&bar)))?;
         bar.finish_and_clear();
         let host = MapHost {
             backend: opened.backend().describe(),

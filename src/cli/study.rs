@@ -245,7 +245,7 @@ impl Study {
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
         let bar = console::progress(verbosity, run.missing()?, "sweeping");
-        timed(&mut timings.sweep_s, || run.sweep(&executor, |units| bar.inc(units)))?;
+        timed(&mut timings.sweep_s, || run.sweep(&executor.clone().with_progress(console::inc(&bar))))?;
         bar.finish_and_clear();
         if self.shards.is_part() {
             run.write_part()?;

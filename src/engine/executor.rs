@@ -31,6 +31,8 @@ pub struct Executor<'a> {
     pub chunk_lanes: Option<u64>,
     /// Ends a sweep after the chunk at which it is requested.
     pub cancel: Cancel,
+    /// Is told the units of every chunk that is done.
+    pub progress: Option<Arc<dyn Fn(u64) + Send + Sync>>,
 }
 
 /// How a sweep went.
@@ -68,6 +70,7 @@ impl<'a> Executor<'a> {
             recheck: None,
             chunk_lanes: None,
             cancel: Cancel::default(),
+            progress: None,
         }
     }
 
@@ -84,6 +87,11 @@ impl<'a> Executor<'a> {
     /// The same with one lane in [`ONE_IN`](super::ONE_IN) computed again; the seed chooses which.
     pub fn with_recheck(self, seed: u64) -> Self {
         Executor { recheck: Some(RecheckOptions::of_seed(seed)), ..self }
+    }
+
+    /// The same, which tells the units of every chunk that is done.
+    pub fn with_progress(self, progress: impl Fn(u64) + Send + Sync + 'static) -> Self {
+        Executor { progress: Some(Arc::new(progress)), ..self }
     }
 
     /// Ends a run of which so many units are done, where that is requested and there are more.
@@ -150,8 +158,11 @@ impl<'a> Executor<'a> {
             summary.redone_lanes += redone * chunk.lanes();
             summary.rechecked_lanes += rechecked;
             summary.lanes += chunk.lanes();
-            let done = chunk.units.end - units.start;
+            let (of_chunk, done) = (chunk.units.end - chunk.units.start, chunk.units.end - units.start);
             each(chunk)?;
+            if let Some(progress) = &self.progress {
+                progress(of_chunk);
+            }
             self.check_cancelled(done, units.end - units.start)
         };
         let mut from = units.start;

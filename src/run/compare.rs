@@ -131,28 +131,26 @@ impl<'a> Compare<'a> {
     /// # Errors
     /// As [`Compare::replay`] and [`Compare::sample`].
     pub fn run(&self, executor: &Executor) -> Result<CompareResult> {
-        let (counts, summary) = self.replay(executor, |_| ())?;
-        let mut result = self.sample(&counts, executor, |_| ())?;
+        let (counts, summary) = self.replay(executor)?;
+        let mut result = self.sample(&counts, executor)?;
         result.summary.add(&summary);
         Ok(result)
     }
 
-    /// Runs every lane of S and S'; `progress` is told the units of every chunk.
+    /// Runs every lane of S and S'.
     ///
     /// # Errors
     /// As [`Executor::sweep`].
-    pub fn replay(&self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<(Partial, SweepSummary)> {
+    pub fn replay(&self, executor: &Executor) -> Result<(Partial, SweepSummary)> {
         let (plan, mut parts) = (&self.plan, Vec::new());
         let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-            progress(chunk.units.end - chunk.units.start);
             parts.push(Partial::from_chunk(plan, &chunk)?);
             Ok(())
         })?;
         Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
     }
 
-    /// Fits and samples every density and sets its rates beside those of the counts of S and S'; `progress` is told the
-    /// samples of every chunk.
+    /// Fits and samples every density and sets its rates beside those of the counts of S and S'.
     ///
     /// # Errors
     /// Of the lanes; of the densities where there is none.
@@ -160,7 +158,6 @@ impl<'a> Compare<'a> {
         &self,
         counts: &Partial,
         executor: &Executor,
-        mut progress: impl FnMut(u64),
     ) -> Result<CompareResult> {
         let recorded = (0..self.plan.blocks.len()).map(|block| self.recorded(counts, block));
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
@@ -169,7 +166,7 @@ impl<'a> Compare<'a> {
         for id in &self.options.parameterizations {
             let mut sampled = || -> Result<ComparedParameterization> {
                 let Fitted { model, left_out, .. } = self.fit(id, false)?;
-                let cells = self.sample_density(&model, counts, executor, &mut result.summary, &mut progress)?;
+                let cells = self.sample_density(&model, counts, executor, &mut result.summary)?;
                 result.left_out.extend(left_out);
                 Ok(cells)
             };
@@ -233,7 +230,6 @@ impl<'a> Compare<'a> {
         counts: &Partial,
         executor: &Executor,
         summary: &mut SweepSummary,
-        progress: impl FnMut(u64),
     ) -> Result<ComparedParameterization> {
         let (options, id) = (&self.options, density.space.id());
         let find = |(at, block): (usize, &Block)| {
@@ -257,7 +253,7 @@ impl<'a> Compare<'a> {
         let kernels = kernel_scenarios(density, self.scenarios)?;
         let scenarios = self.plan.blocks[block].units.len() as usize;
         let exposure = density.exposure.as_ref();
-        let sampled = sample_by_scenario(&plan, &kernels, scenarios, executor, exposure, Self::LEVEL, progress)?;
+        let sampled = sample_by_scenario(&plan, &kernels, scenarios, executor, exposure, Self::LEVEL)?;
         summary.add(&sampled.summary);
         Ok(ComparedParameterization {
             key: id.key.to_string(),

@@ -210,7 +210,7 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
             let plan = plan_samples(&narrow, &narrow.mixture().unwrap(), &profile, &options).unwrap();
             let executor = Executor::new(&cpu);
             let units = replayed.lanes.len();
-            let sampled = sample_by_scenario(&plan, &kernels, units, &executor, None, 0.95, |_| ()).unwrap();
+            let sampled = sample_by_scenario(&plan, &kernels, units, &executor, None, 0.95).unwrap();
             // Samples by scenario add up to the estimate.
             for (cell, row) in sampled.rows.iter().enumerate() {
                 assert_eq!(sampled.counts.cell(cell).rate(), row.estimate.probability);

@@ -1,5 +1,7 @@
 //! Maps: the grids of a category under a profile, and what they are compared with; planned, then swept.
 
+use std::sync::Arc;
+
 use super::grid::Grid;
 use super::map::GridMap;
 use super::plan::GridPlan;
@@ -65,7 +67,7 @@ pub struct MapOptions {
 /// };
 /// let map = Map::plan(options, &Profile::load("jrc-2021")?)?;
 /// assert_eq!(map.lane_count(), 209);
-/// let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic()), |_| ())?;
+/// let result = map.run(&Executor::new(CpuBackend::lane_arithmetic()))?;
 /// assert_eq!(result.grids[0].map.failures(0, Criterion::Collision), 4);
 /// # Ok(())
 /// # }
@@ -203,9 +205,10 @@ impl Map {
         self.plans().flat_map(|(_, plan)| plan.parts.iter().flat_map(|part| [&part.plan, &part.unreacting]))
     }
 
-    /// Cells of all grids.
-    pub fn cell_count(&self) -> u64 {
-        self.grids.iter().map(|grid| grid.plan.grid.cell_count() as u64).sum()
+    /// Units that the run sweeps, those of the unreacting ego too.
+    pub fn unit_count(&self) -> u64 {
+        let parts = self.plans().flat_map(|(_, plan)| &plan.parts);
+        parts.map(|part| part.plan.unit_count() + part.unreacting.unit_count()).sum()
     }
 
     /// Lanes of driver models in all plans.
@@ -213,14 +216,14 @@ impl Map {
         self.plans().map(|(_, plan)| plan.lane_count()).sum()
     }
 
-    /// Sweeps every grid; `progress` receives the number of cells of each.
+    /// Sweeps every grid.
     ///
     /// # Errors
     /// As [`GridMap::sweep`].
-    pub fn run(self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<MapResult> {
+    pub fn run(self, executor: &Executor) -> Result<MapResult> {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let reference = CpuBackend::reference();
-        let binary64 = Executor { chunk_lanes: executor.chunk_lanes, ..Executor::new(&reference) };
+        let binary64 = Executor { backend: Arc::new(&reference), fallback: None, recheck: None, ..executor.clone() };
         let mut swept = |plan: &GridPlan, perturbed: &[(Perturbation, GridPlan)]| -> Result<GridMap> {
             let mut sweep = |plan: &GridPlan, executor: &Executor| -> Result<GridMap> {
                 let (map, of_map) = GridMap::sweep(plan, executor)?;
@@ -243,7 +246,6 @@ impl Map {
                 }
                 None => None,
             };
-            progress(plan.grid.cell_count() as u64);
             grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other });
         }
         Ok(MapResult { grids, summary })

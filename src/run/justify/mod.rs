@@ -196,7 +196,7 @@ pub fn justify(
         Ok(fitted) => {
             coverage = Some(Coverage::of(&fitted));
             left_out = fitted.left_out;
-            match replay.compare.sample_density(&fitted.model, &replay.counts, executor, &mut summary, |_| ()) {
+            match replay.compare.sample_density(&fitted.model, &replay.counts, executor, &mut summary) {
                 Ok(of) => {
                     density_sha256 = Some(of.density_sha256);
                     compared = of.cells.into_iter().find(|cell| cell.criterion == options.criterion);

@@ -149,7 +149,6 @@ pub fn sample_by_scenario(
     executor: &Executor,
     exposure: Option<&Exposure>,
     level: f64,
-    mut progress: impl FnMut(u64),
 ) -> Result<SampledScenarios> {
     let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
     let options = CrudeOptions {
@@ -161,7 +160,6 @@ pub fn sample_by_scenario(
     };
     let mut counts = ScenarioCounts::empty(scenarios, plan.models.len() * Criterion::ALL.len());
     let run = sample_crude(plan, 0..plan.unit_count(), executor, &counting, &options, |chunk| {
-        progress(chunk.units.end - chunk.units.start);
         counts.add(plan, chunk, kernels)
     })?;
     let is_over_all = |row: &EstimateRow| plan.headways.len() == 1 || row.headway == "all";

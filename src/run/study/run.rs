@@ -73,7 +73,7 @@ impl Study {
     pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
         self.write_plan(out)?;
         let Some(mut run) = self.open(out, Some(shard))? else { return Ok(()) };
-        run.sweep(executor, |_| ())?;
+        run.sweep(executor)?;
         run.write_part()
     }
 
@@ -123,16 +123,15 @@ impl StudyRun<'_> {
         Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
     }
 
-    /// Runs the lanes that are missing; `progress` is told the units of every chunk.
+    /// Runs the lanes that are missing.
     ///
     /// # Errors
     /// As [`Study::run`]; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
-    pub fn sweep(&mut self, executor: &Executor, mut progress: impl FnMut(u64)) -> Result<SweepSummary> {
+    pub fn sweep(&mut self, executor: &Executor) -> Result<SweepSummary> {
         let _resumable = executor.cancel.resumable();
         let ledger = &mut self.state.ledger;
         for range in ledger.missing(self.state.units.clone())? {
             let part = self.study.cases.sweep(range, Wanted::Verdicts, executor, |plan, chunk| {
-                progress(chunk.units.end - chunk.units.start);
                 ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
             });
             self.summary.add(&ledger.kept(part)?);
