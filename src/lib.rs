@@ -3,7 +3,8 @@
 //! Rooms, each importing only those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria, profile,
 //! case), [`scenario`] (what was found, and its parameterizations), [`traffic`] (recordings, mining), [`stats`] (random
 //! numbers, densities, estimators), [`engine`] (lanes on CPUs and GPUs), [`run`] (studies, samples, maps, scores),
-//! [`report`] (tables, figures, pages), [`interop`] (other programs) and [`cli`].
+//! [`report`] (tables, figures, pages), [`interop`] (other programs) and `cli` (feature `cli`). [`prelude`] has the names
+//! that most users need; `examples/library.rs` uses nothing else.
 //!
 //! A cut-in against one driver, in binary64:
 //!
@@ -42,19 +43,13 @@
 //! A study: recordings → scenarios → plan → counts → scores.
 //!
 //! ```
-//! use lanesweep::engine::{CpuBackend, Executor};
-//! use lanesweep::model::profile::Profile;
-//! use lanesweep::run::score::f1;
-//! use lanesweep::run::study::Study;
-//! use lanesweep::traffic::mining::{MiningOptions, mine_generated};
-//! use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+//! use lanesweep::prelude::*;
 //!
 //! # fn main() -> lanesweep::Result<()> {
 //! let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
 //! let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
 //! let study = Study::builder(&mined, Profile::load("paper")?).plan()?;
-//! let backend = CpuBackend::lane_arithmetic();
-//! let result = study.run(&Executor::new(&backend))?;
+//! let result = study.run(&Executor::new(CpuBackend::lane_arithmetic()))?;
 //! assert_eq!(result.summary.lanes, study.plan().lane_count());
 //! for cell in study.score(&result.counts)?.categories.iter().flat_map(|category| &category.cells) {
 //!     // Undefined (0/0) where neither S nor S' fails.
@@ -73,6 +68,7 @@ pub mod model;
 pub mod cli;
 pub mod engine;
 pub mod interop;
+pub mod prelude;
 pub mod report;
 pub mod run;
 pub mod scenario;

@@ -154,11 +154,7 @@ impl<'a> Compare<'a> {
     ///
     /// # Errors
     /// Of the lanes; of the densities where there is none.
-    pub fn sample(
-        &self,
-        counts: &Partial,
-        executor: &Executor,
-    ) -> Result<CompareResult> {
+    pub fn sample(&self, counts: &Partial, executor: &Executor) -> Result<CompareResult> {
         let recorded = (0..self.plan.blocks.len()).map(|block| self.recorded(counts, block));
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let mut result =
