@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn the_worst_lanes_of_a_study_are_those_that_all_values_give() {
-        let generated = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
+        let generated = GeneratorOptions { recordings: 10, ..GeneratorOptions::default() };
         let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap();
         let study = Study::builder(&mined, Profile::load("paper").unwrap()).plan().unwrap();
         let plan = study.plan();
