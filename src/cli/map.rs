@@ -18,8 +18,8 @@ use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
 use crate::report::run_record::SweepRecord;
 use crate::run::grid::{
-    self, Against, CaseStyle, Grid, GridAxis, GridParts, MAX_PANELS, MapGrids, MapOptions, MapParameter,
-    MapResult, PARAMETERS, presets::Presets,
+    self, Against, CaseStyle, Grid, GridAxis, GridParts, MAX_PANELS, MapGrids, MapOptions, MapParameter, MapResult,
+    PARAMETERS, presets::Presets,
 };
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
