@@ -70,7 +70,7 @@ pub struct Study {
     seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
     ///
-    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 115,000
+    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 135,000
     /// scenarios.
     #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
     keep_plan: KeepPlan,

@@ -7,9 +7,8 @@ use std::sync::Arc;
 /// Units of one block, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Units {
-    /// Scenarios by their keys.
-    Named(Vec<String>),
-    /// Scenarios of which this process holds an interval: total number, index of the first held, keys of those held.
+    /// Scenarios or cells, of which this process holds an interval: total number, index of the first held, keys of those
+    /// held.
     Held(u64, u64, Arc<[String]>),
     /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ of them keeps no names.
     Numbered(u64),
@@ -19,7 +18,6 @@ impl Units {
     /// Number of units.
     pub fn len(&self) -> u64 {
         match self {
-            Units::Named(names) => names.len() as u64,
             Units::Held(count, ..) | Units::Numbered(count) => *count,
         }
     }
@@ -28,7 +26,7 @@ impl Units {
     pub fn held(&self) -> Range<u64> {
         match self {
             Units::Held(_, first, names) => *first..first + names.len() as u64,
-            _ => 0..self.len(),
+            Units::Numbered(count) => 0..*count,
         }
     }
 
@@ -40,7 +38,6 @@ impl Units {
     /// Name of a unit below [`Units::len`].
     pub fn name(&self, unit: u64) -> Cow<'_, str> {
         match self {
-            Units::Named(names) => Cow::Borrowed(&names[unit as usize]),
             Units::Held(_, first, names) => match unit.checked_sub(*first).and_then(|at| names.get(at as usize)) {
                 Some(name) => Cow::Borrowed(name.as_str()),
                 None => Cow::Owned(format!("#{unit}")),
@@ -52,7 +49,6 @@ impl Units {
     /// The unit that a name stands for.
     pub fn find(&self, name: &str) -> Option<u64> {
         match self {
-            Units::Named(names) => names.iter().position(|n| n == name).map(|at| at as u64),
             Units::Held(_, first, names) => names.iter().position(|n| n == name).map(|at| first + at as u64),
             Units::Numbered(count) => name.strip_prefix('#')?.parse().ok().filter(|unit| unit < count),
         }
@@ -61,7 +57,8 @@ impl Units {
 
 impl FromIterator<String> for Units {
     fn from_iter<I: IntoIterator<Item = String>>(names: I) -> Self {
-        Units::Named(names.into_iter().collect())
+        let names: Arc<[String]> = names.into_iter().collect();
+        Units::Held(names.len() as u64, 0, names)
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::Tables;
@@ -144,7 +144,7 @@ impl GridPart {
         }
         let block = Block {
             category: grid.category(),
-            units: Units::Named(names),
+            units: names.into_iter().collect(),
             variants: vec![VARIANT.to_owned()],
             first_unit: 0,
             first_lane: 0,

@@ -42,20 +42,24 @@ pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
         ..scenario.clone()
     };
     if scenario.category == Category::Lvd {
-        stripped.target.y.fill(0.0);
+        stripped.target.y = Vec::new();
     }
     if scenario.category != Category::CutOut {
         (stripped.lead, stripped.lead_gap) = (None, None);
     }
-    stripped.lead.iter_mut().for_each(|lead| lead.y.fill(0.0));
+    stripped.lead.iter_mut().for_each(|lead| lead.y = Vec::new());
     stripped
 }
 
-/// The lines of a page.
+/// The lines of a page. Series that decide no lane take no memory, but a scenario file has them: they are 0 there.
 pub(super) fn lines(scenarios: &[Scenario]) -> std::io::Result<Vec<u8>> {
     let mut text = Vec::new();
     for scenario in scenarios {
-        serde_json::to_writer(&mut text, scenario)?;
+        let mut whole = scenario.clone();
+        for other in std::iter::once(&mut whole.target).chain(&mut whole.lead) {
+            other.y.resize(other.v.len(), 0.0);
+        }
+        serde_json::to_writer(&mut text, &whole)?;
         text.push(b'\n');
     }
     Ok(text)

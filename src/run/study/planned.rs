@@ -15,7 +15,6 @@ use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
 use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
-use crate::scenario::parameterization::Parameterization;
 use crate::support::hex::sha256;
 use crate::support::input_file;
 use crate::support::run_dir::Results;
@@ -261,7 +260,6 @@ impl Study {
         let place = Place::file(path);
         facts.score.validate()?;
         let cases = plan.read(&mut scenarios, &place, wanted)?;
-        check_variants(cases.outline(), &place)?;
         if facts.categories.len() != cases.outline().blocks.len() {
             let problem = "it does not have the facts of every category";
             return Err(Error::input(place, problem, AGAIN));
@@ -270,40 +268,4 @@ impl Study {
     }
 }
 
-/// A checksum tells damage, not forgery: what reaches a page and a terminal must be what this program writes.
-fn check_variants(plan: &LanePlan, place: &Place) -> Result<()> {
-    for block in &plan.blocks {
-        for (at, name) in block.variants.iter().enumerate() {
-            let is_known = if at == 0 { name == "S" } else { Parameterization::find(block.category, name).is_some() };
-            if !is_known || block.variants[..at].contains(name) {
-                let problem = format!("`{name}` is no variant {at} of a {} study", block.category.label());
-                return Err(crate::Error::input(place.clone(), problem, AGAIN));
-            }
-        }
-    }
-    Ok(())
-}
-
 const AGAIN: &str = "make it by `study` of this version, with option `plan_only`";
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::profile::Profile;
-    use crate::run::study::{StudyOptions, plan_study};
-    use crate::traffic::mining::mine_generated;
-    use crate::traffic::trajectory::generator::GeneratorOptions;
-
-    #[test]
-    fn a_plan_with_variants_that_no_study_has_is_refused_before_they_are_printed() {
-        let generated = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-        let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap().scenarios;
-        let made = || plan_study(&mined, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap();
-        assert!(check_variants(&made(), &Place::item("plan")).is_ok());
-        for (at, forged) in [(0, "1"), (1, "\u{1b}]0;owned\u{7}"), (1, "<script>"), (1, "S"), (2, "1")] {
-            let mut plan = made();
-            plan.blocks[0].variants[at] = forged.to_owned();
-            assert!(check_variants(&plan, &Place::item("plan")).is_err(), "{forged} as variant {at}");
-        }
-    }
-}
