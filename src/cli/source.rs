@@ -67,26 +67,16 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
 /// Flags of the generator.
 #[derive(Debug, Clone, Args)]
 pub struct GeneratorFlags {
-    /// Seed of the generator
-    #[arg(long, hide = true, value_name = "N")]
-    pub synth_seed: u64,
     /// Number of generated recordings
     #[arg(long, value_name = "N")]
     pub synth_recordings: usize,
-    /// Length of each generated recording
-    #[arg(long, hide = true, value_name = "s")]
-    pub synth_duration: f64,
 }
 
 impl GeneratorFlags {
     /// The flags, over what is configured of the rest.
     pub fn options(&self, configured: &Configured) -> Result<GeneratorOptions> {
-        let options = GeneratorOptions {
-            seed: self.synth_seed,
-            recordings: self.synth_recordings,
-            duration_s: self.synth_duration,
-            ..configured.settings.generator.clone()
-        };
+        let generator = configured.settings.generator.clone();
+        let options = GeneratorOptions { recordings: self.synth_recordings, ..generator };
         options.validate()?;
         Ok(options)
     }
