@@ -206,8 +206,6 @@ fn counts_that_contradict_themselves_are_an_error_and_no_score() {
         assert!(error.to_string().contains(said), "should say `{said}`: {error}");
         assert!(error.help().is_some());
     }
-    let beyond = crafted(&good, |p| p["worst"] = serde_json::json!([[1.0, u64::MAX]]));
-    assert!(scored(&beyond).unwrap_err().to_string().contains("is beyond the plan"));
 }
 
 #[test]
