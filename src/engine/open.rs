@@ -155,6 +155,6 @@ fn nothing_to_verify() -> Error {
 /// What a program without GPUs says where one is asked for.
 #[cfg(not(feature = "gpu"))]
 pub(crate) fn no_gpu(asked: &str) -> Error {
-    let help = "use option `backend = cpu`, or build it with the feature `gpu` (`cargo build --release`)";
+    let help = "use option `backend = cpu`, or build it with the feature `gpu`";
     Error::device(asked, "this program was built without the feature `gpu`", help)
 }
