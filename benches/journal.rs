@@ -12,12 +12,10 @@ use std::time::{Duration, Instant};
 use common::paper_size_scenarios;
 use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, Wanted};
 use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::run::sampling::{
-    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, cuts, plan_samples,
-    sample_into,
+    CrudeOptions, Estimator, SampleHeadways, SampleOptions, SampleTally, TallyOptions, cuts, plan_samples, sample_into,
 };
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::Parameterization;
@@ -43,12 +41,9 @@ fn main() {
 
 fn sampling(folder: &Path) {
     let samples = 2_000_000;
-    let options = SamplePlanOptions {
-        samples,
+    let options = SampleOptions {
         seed: 157,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let density = density();
     let plan = plan_samples(&density, &density.mixture().unwrap(), &Profile::load("paper").unwrap(), &options).unwrap();

@@ -15,7 +15,7 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
+    CrudeOptions, Estimator, SampleHeadways, SampleOptions, TallyOptions, plan_samples, sample_crude,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -72,12 +72,10 @@ fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityMode
 }
 
 fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {
-    let options = SamplePlanOptions {
-        samples,
+    let options = SampleOptions {
         seed: 157,
-        source: SampleSource::Random,
         models: models.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let profile = Profile::load("paper").unwrap();
     let plan = plan_samples(density, &density.mixture().unwrap(), &profile, &options).unwrap();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::rerun::worst_sha256;
+use super::rerun::record_of;
 use super::simulate_lanes::{find, model};
 use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted};
 use crate::model::criterion::Criterion;
@@ -113,7 +113,7 @@ pub(super) fn worst_of_sample(
         return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
     }
     let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
-    if worst_sha256(dir)?.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
+    if record_of(dir)?.worst_sha256.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
         let problem = "checksum mismatch with estimate.json: the table was changed or damaged";
         return Err(Error::input(
             Place::file(&path),

@@ -14,11 +14,12 @@ use super::sample_checks::only_crude;
 use super::sample_lanes;
 use crate::engine::{Headway, LanePlan, LaneRunner};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
-use crate::model::profile::Profile;
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, RunFacts};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile};
 use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::grid::MapParameter;
-use crate::run::sampling::{CrudeOptions, CrudeRun, TallyOptions, sample_crude};
+use crate::run::sampling::{
+    CrudeOptions, CrudeRun, Estimator, SampleHeadways, SampleOptions, TallyOptions, sample_crude,
+};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::hex::sha256;
@@ -130,19 +131,14 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         Ok(())
     })?;
     bar.finish_and_clear();
-    let facts = RunFacts {
-        estimator: "mc",
-        profile,
+    let asked = SampleOptions {
         models,
-        headways: plan.headways.clone(),
-        points: "random",
-        samples: count,
         seed,
-        given: Vec::new(),
+        ..SampleOptions::new(Estimator::CRUDE, count, SampleHeadways::Each(plan.headways.clone()))
     };
     let host = opened.host(crude.summary.rechecked_lanes, started);
     let record = record(&kept, &samples, path);
-    let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
+    let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &asked), crude.rows.clone(), host);
     file.plan_sha256 = Some(plan.hash().to_owned());
     let mut draws = DrawRecord::of(&crude.tally, &plan);
     if draws.samples == count {
@@ -256,12 +252,11 @@ pub(super) fn plan_of(dir: &Path) -> Result<(LanePlan, String)> {
     if kept.lanesweep_distribution != 1 {
         return Err(wrong(format!("its version is {}, this program reads 1", kept.lanesweep_distribution)));
     }
-    let (facts, plan_sha256) = record_of(dir)?;
-    let profile: &Profile = &facts.profile;
-    profile.check(&Place::file(dir.join("estimate.json")))?;
+    let run = record_of(dir)?;
+    run.profile.check(&Place::file(dir.join("estimate.json")))?;
     let samples = kept.samples()?;
-    let (plan, _) = samples.plan((facts.samples, facts.seed), profile, &facts.models, &facts.headways)?;
-    if plan_sha256.as_deref() != Some(plan.hash()) {
+    let (plan, _) = samples.plan((run.samples, run.seed), &run.profile, &run.models, &run.plan_headways)?;
+    if run.plan_sha256.as_deref() != Some(plan.hash()) {
         return Err(wrong("its plan does not match the distributions and the profile beside it".to_owned()));
     }
     let file = Path::new(&kept.file).file_name().unwrap_or_default().to_string_lossy().into_owned();

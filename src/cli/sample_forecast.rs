@@ -8,14 +8,11 @@ use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::sample_checks::MAX_HELD;
 use crate::Result;
-use crate::engine::{Forecast, Outcome, Wanted, forecast};
+use crate::engine::{Forecast, LanePlan, Outcome, Wanted, forecast};
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
-use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::weighted_plan::WeightedPlan;
-use crate::run::sampling::{Estimator, Sample, SampleKind, SampleTally, TallyOptions};
-use crate::stats::density::DensityModel;
-use crate::stats::estimate::{CrossEntropy, StopRule, Subset};
+use crate::run::sampling::{Estimator, Proposals, Sample, SampleKind, SampleOptions, SampleTally, TallyOptions};
+use crate::stats::estimate::{CrossEntropy, Subset};
 
 /// Memory of the counts of every checkpoint and of the figures, bytes, measured.
 const BYTES_OF_COUNTS: u64 = 6 << 20;
@@ -25,48 +22,43 @@ const BYTES_PER_SAMPLE: u64 = 280;
 
 /// Prints what the run would be.
 pub(super) fn forecast_sample(sample: &Sample, opened: &Opened, format: FormatFlag) -> Result<Exit> {
-    let (estimator, lanes, models) = match &sample.0 {
-        SampleKind::Crude(planned, stop) => return forecast_crude(planned, opened, stop, format),
-        SampleKind::Weighted(planned) => return forecast_weighted(planned, opened, format),
-        SampleKind::Pilot(planned, pilot) => {
-            ("is", planned.facts.samples.saturating_add(pilot.runs), &planned.facts.models)
+    match &sample.kind {
+        SampleKind::Crude(plan) => forecast_crude(sample, plan, opened, format),
+        SampleKind::Weighted(proposals) => forecast_weighted(sample, proposals, opened, format),
+        SampleKind::Pilot(_) | SampleKind::Sequential => forecast_adaptive(sample, opened, format),
+    }
+}
+
+/// Lanes of a driver model, at most.
+fn lanes_at_most(options: &SampleOptions) -> u64 {
+    let (samples, seed) = (options.stop.samples, options.seed);
+    match &options.estimator {
+        Estimator::Subset => {
+            let subset = Subset::new(seed, samples);
+            subset.samples_per_level.saturating_mul(subset.levels as u64)
         }
-        SampleKind::Sequential(run) => {
-            let (samples, seed) = (run.options.stop.samples, run.options.seed);
-            let lanes = match &run.options.estimator {
-                Estimator::Subset => {
-                    let options = Subset::new(seed, samples);
-                    options.samples_per_level.saturating_mul(options.levels as u64)
-                }
-                Estimator::CrossEntropy { .. } => {
-                    let options = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
-                    samples.saturating_add(options.samples_per_level.saturating_mul(options.levels as u64))
-                }
-                Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
-                Estimator::Crude { .. } | Estimator::Given { .. } => samples,
-            };
-            (run.options.estimator.key(), lanes, &run.options.models)
+        Estimator::CrossEntropy { .. } => {
+            let levels = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
+            samples.saturating_add(levels.samples_per_level.saturating_mul(levels.levels as u64))
         }
-    };
-    forecast_adaptive(sample.density(), (estimator, lanes, models), opened, format)
+        Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
+        Estimator::Crude { .. } | Estimator::Given { .. } => samples,
+    }
 }
 
 /// At most: how many levels there are is seen on the way.
-fn forecast_adaptive(
-    density: &DensityModel,
-    (estimator, lanes, models): (&str, u64, &[ModelId]),
-    opened: &Opened,
-    format: FormatFlag,
-) -> Result<Exit> {
+fn forecast_adaptive(sample: &Sample, opened: &Opened, format: FormatFlag) -> Result<Exit> {
+    let (density, options) = (&sample.density, &sample.options);
+    let lanes = lanes_at_most(options);
     let part = |model: &ModelId| ForecastPart {
         of: model.name().to_owned(),
-        what: format!("estimator {estimator}"),
+        what: format!("estimator {}", options.estimator.key()),
         units: lanes,
         lanes,
     };
     DryRun {
         data: density.provenance.data.clone(),
-        parts: models.iter().map(part).collect(),
+        parts: options.models.iter().map(part).collect(),
         units: "samples",
         is_at_most: true,
         // The points of a level or pilot, with their limit states and the fit's responsibilities.
@@ -82,8 +74,8 @@ fn forecast_adaptive(
 }
 
 /// What the run would be.
-fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format: FormatFlag) -> Result<Exit> {
-    let (plan, counting) = (&planned.plan, planned.counting());
+fn forecast_crude(sample: &Sample, plan: &LanePlan, opened: &Opened, format: FormatFlag) -> Result<Exit> {
+    let counting = sample.counting();
     // Few lanes are valued.
     let verdicts = TallyOptions { worst: 0, ..counting.clone() };
     let forecast = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
@@ -91,10 +83,10 @@ fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format:
     })?;
     let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
     DryRun {
-        data: planned.density.provenance.data.clone(),
+        data: sample.density.provenance.data.clone(),
         parts: dry_run::parts(plan),
         units: "samples",
-        is_at_most: stop.relative_half_width.is_some() || stop.time_limit.is_some(),
+        is_at_most: !sample.options.stop.is_fixed(),
         more_bytes: BYTES_OF_COUNTS + forecast.lanes_at_once * bytes_of_lane,
         more: "lanes at once, counts and figures, however many samples",
         forecast: Some(forecast),
@@ -107,36 +99,35 @@ fn forecast_crude(planned: &CrudePlan, opened: &Opened, stop: &StopRule, format:
 }
 
 /// What the run would be: drawing and weighing cost more than the lanes, so all of it is measured.
-fn forecast_weighted(planned: &WeightedPlan, opened: &Opened, format: FormatFlag) -> Result<Exit> {
-    let (facts, density) = (&planned.facts, &planned.density);
-    let most = facts.samples.min(planned.chunk_samples());
+fn forecast_weighted(sample: &Sample, proposals: &Proposals, opened: &Opened, format: FormatFlag) -> Result<Exit> {
+    let (all, models) = (sample.samples(), &sample.options.models);
+    let most = all.min(sample.chunk_samples());
     let (mut samples, mut took) = (most.min(256), 0.0);
     loop {
         let started = Instant::now();
-        planned.sample(&mut Ledger::new(0..samples, &[]), &opened.executor(), |_| ())?;
+        sample.sample_weighted(proposals, &mut Ledger::new(0..samples, &[]), &opened.executor(), |_| ())?;
         let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
         if samples >= most || took + last >= BUDGET.as_secs_f64() / 2.0 {
             break;
         }
         samples = (2 * samples).min(most);
     }
-    let models = facts.models.len() as u64;
-    let lanes = facts.samples.saturating_mul(models);
-    let seconds = took / samples as f64 * facts.samples as f64;
+    let (lanes, measured_lanes) = (sample.lane_count(), samples * models.len() as u64);
+    let seconds = took / samples as f64 * all as f64;
     let part = |model: &ModelId| ForecastPart {
         of: model.name().to_owned(),
-        what: format!("headway {}", planned.headway_name()),
-        units: facts.samples,
-        lanes: facts.samples,
+        what: format!("headway {}", sample.options.headway_name()),
+        units: all,
+        lanes: all,
     };
     DryRun {
-        data: density.provenance.data.clone(),
-        parts: facts.models.iter().map(part).collect(),
+        data: sample.density.provenance.data.clone(),
+        parts: models.iter().map(part).collect(),
         units: "samples",
         is_at_most: false,
         more_bytes: most * BYTES_PER_SAMPLE,
         more: "the samples that are judged at once",
-        forecast: Some(Forecast { lanes, seconds, measured_lanes: samples * models, lanes_at_once: most }),
+        forecast: Some(Forecast { lanes, seconds, measured_lanes, lanes_at_once: most }),
         backend: opened.backend().describe(),
         before: None,
         besides: "",

@@ -47,6 +47,10 @@ impl Sample {
             stop: self.stop(samples),
             given: self.given.clone(),
             worst: self.worst(),
+            source: match self.points {
+                PointsFlag::Random => SampleSource::Random,
+                PointsFlag::Sobol => SampleSource::Sobol,
+            },
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         })
@@ -67,13 +71,7 @@ impl Sample {
 
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
         Ok(match self.estimator {
-            EstimatorFlag::Mc => Estimator::Crude {
-                points: match self.points {
-                    PointsFlag::Random => SampleSource::Random,
-                    PointsFlag::Sobol => SampleSource::Sobol,
-                },
-                interval: self.interval(),
-            },
+            EstimatorFlag::Mc => Estimator::Crude { interval: self.interval() },
             EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
                 worst: self.elite_fraction,
                 broad: self.broad_weight,

@@ -13,10 +13,9 @@ use super::sample_distribution;
 use super::sample_forecast::forecast_sample;
 use super::sample_lanes::{self, RowTable};
 use crate::engine::Executor;
-use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling::{DrawRecord, EstimateFile, HostRecord};
 use crate::run::parts::{PLAN_FILE, Shard};
-use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::{self, SampleKind, SampleResult, conditional, proposal_text};
+use crate::run::sampling::{self, Estimator, SampleKind, SampleResult, SampleSource, conditional, proposal_text};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
@@ -96,14 +95,14 @@ impl Sample {
             self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(Exit::Ok);
         }
-        let executor = opened.executor().with_recheck(sample.seed());
-        if matches!(sample.0, SampleKind::Sequential(_)) {
+        let executor = opened.executor().with_recheck(sample.options.seed);
+        if matches!(sample.kind, SampleKind::Sequential) {
             let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
             return write(&sample, result, opened.host(0, started), results, self.format);
         }
-        let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
+        let sample = if matches!(sample.kind, SampleKind::Pilot(_)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
             let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             sample.searched(&executor, Some(&self.out))?
@@ -122,9 +121,7 @@ impl Sample {
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        if let SampleKind::Crude(planned, _) = &sample.0 {
-            warn(planned)?;
-        }
+        warn(sample)?;
         // Rows are written on the way: a run that writes them begins anew.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
@@ -160,13 +157,14 @@ impl Sample {
 }
 
 /// What limits the estimates of crude Monte Carlo.
-fn warn(planned: &CrudePlan) -> Result<()> {
-    if planned.facts.sobol {
+fn warn(sample: &sampling::Sample) -> Result<()> {
+    let (density, options) = (&sample.density, &sample.options);
+    if options.source == SampleSource::Sobol {
         tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
     }
-    if !planned.facts.given.is_empty() {
-        let left = conditional(&planned.density, &planned.facts.given)?.effective_scenarios;
-        let of = planned.density.kde.points().len();
+    if !options.given.is_empty() {
+        let left = conditional(density, &options.given)?.effective_scenarios;
+        let of = density.kde.points().len();
         if left < FEW_SCENARIOS {
             tracing::warn!(
                 "only {left:.1} of {of} scenarios are near the given values: results depend on the kernels, not on data"
@@ -194,15 +192,15 @@ fn write(
     format: FormatFlag,
 ) -> Result<Exit> {
     let (out, density) = (results.dir().to_path_buf(), sample.density());
-    let mut file = EstimateFile::new(density, RunFacts::of(sample), result.rows, host)?;
+    let mut file = EstimateFile::new(sample, result.rows, host)?;
     let mut figures = Vec::new();
-    if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
-        figures = sample_lanes::write(&mut results, &planned.plan, density, crude, &planned.counting(), &mut file)?;
-        file.plan_sha256 = Some(planned.plan.hash().to_owned());
-        file.draws = Some(DrawRecord::of(&crude.tally, &planned.plan));
+    if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
+        figures = sample_lanes::write(&mut results, plan, density, crude, &sample.counting(), &mut file)?;
+        file.plan_sha256 = Some(plan.hash().to_owned());
+        file.draws = Some(DrawRecord::of(&crude.tally, plan));
     }
     file.levels = result.levels;
-    if sample.has_given_proposals() {
+    if matches!(sample.options.estimator, Estimator::Given { .. }) {
         // A proposal in this folder may be one that was given.
         results.keep(|name| name.starts_with("proposal-"))?;
     }

@@ -11,7 +11,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::run::sampling::crude_plan::{self, CrudePlan};
+use crate::run::sampling::{Sample, SampleKind};
 use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::support::input_file;
@@ -120,7 +120,7 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
         return Ok(Run::Distribution(Box::new(plan), data));
     }
     if estimate.exists() {
-        let (_, plan, density) = super::rerun::run_of(dir)?;
+        let (plan, density) = super::rerun::run_of(dir)?;
         return Ok(Run::Sample(Box::new(plan), Box::new(density)));
     }
     let plan = dir.join(PLAN_FILE);
@@ -129,10 +129,13 @@ pub(super) fn find_run(dir: &Path, key: &str) -> Result<Run> {
         return Err(Error::input(Place::file(dir), "there is no run here", help));
     }
     match kind_of(&plan)?.as_str() {
-        crude_plan::KIND => {
-            let sample = CrudePlan::read(&plan)?.0;
-            Ok(Run::Sample(Box::new(sample.plan), Box::new(sample.density)))
-        }
+        kind if Sample::is_kind(kind) => match Sample::read(&plan)? {
+            Sample { kind: SampleKind::Crude(plan), density, .. } => Ok(Run::Sample(plan, Box::new(density))),
+            _ => {
+                let help = "give the folder of a run of crude Monte Carlo";
+                Err(Error::input(Place::file(&plan), "importance sampling has no numbered lanes", help))
+            }
+        },
         // Its reader refuses every other kind.
         _ => Ok(Run::Study(Box::new(Study::read(&plan, None)?))),
     }

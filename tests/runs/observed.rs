@@ -10,9 +10,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::close_following::{CloseFollowing, close_units};
 use lanesweep::run::parts::Shard;
-use lanesweep::run::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
-};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, TallyOptions, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -161,12 +159,10 @@ fn a_density_with_headways_draws_its_own_and_counts_those_below_half_a_second() 
         let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };
         DensityModel::fit(id.clone(), &data.scenarios, &facts, &options).unwrap().model
     };
-    let options = |headways| SamplePlanOptions {
-        samples: 3000,
+    let options = |headways| SampleOptions {
         seed: 5,
-        source: SampleSource::Random,
         models: vec![ModelId::Cchdm, ModelId::Fsm],
-        headways,
+        ..SampleOptions::new(Estimator::CRUDE, 3000, headways)
     };
     let paper = Profile::load("paper").unwrap();
     let plan_of = |density: &DensityModel, headways| {

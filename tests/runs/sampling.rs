@@ -9,11 +9,11 @@ use std::sync::OnceLock;
 use assert_cmd::Command;
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, Headway, LanePlan, RecheckOptions, Wanted};
 use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
-    sample_crude,
+    CrudeOptions, Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, SampleTally, TallyOptions,
+    plan_samples, sample_crude,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -52,12 +52,13 @@ fn lanesweep(dir: &Path, args: &[&str]) -> (i32, String, String) {
 }
 
 fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
-    let options = SamplePlanOptions {
-        samples,
+    let options = SampleOptions {
         seed: 5,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]),
+        ..SampleOptions::new(
+            Estimator::CRUDE,
+            samples,
+            SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]),
+        )
     };
     plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap()
 }

@@ -12,8 +12,8 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, LaneLimitState, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
-    sample_crude, truncated,
+    CrudeOptions, Estimator, LaneLimitState, SampleHeadways, SampleOptions, TallyOptions, plan_samples, sample_crude,
+    truncated,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -35,12 +35,10 @@ fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
 }
 
 fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, samples: u64) -> Estimate {
-    let options = SamplePlanOptions {
-        samples,
+    let options = SampleOptions {
         seed: 99,
-        source: SampleSource::Random,
         models: vec![model],
-        headways: SampleHeadways::Each(vec![Headway::ThwS(thw_s)]),
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
     };
     let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
