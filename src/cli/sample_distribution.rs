@@ -17,9 +17,7 @@ use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_dis
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile};
 use crate::report::sampling_tables::{WorstRow, convergence_csv};
 use crate::run::grid::MapParameter;
-use crate::run::sampling::{
-    CrudeOptions, CrudeRun, Estimator, SampleHeadways, SampleOptions, TallyOptions, sample_crude,
-};
+use crate::run::sampling::{CrudeRun, Estimator, SampleHeadways, SampleOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::hex::sha256;
@@ -115,30 +113,31 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let folder = OutputDir::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let executor = opened.executor().with_recheck(seed);
-    let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
-    let options = CrudeOptions {
+    let headways = match samples.has_distance() {
+        true => SampleHeadways::Sampled,
+        false => SampleHeadways::Each(plan.headways.clone()),
+    };
+    let options = SampleOptions {
         stop: flags.stop(count),
-        interval: flags.interval(),
+        models,
+        criterion,
+        seed,
         level: flags.level,
-        // Nobody said how often such scenarios occur.
-        exposure: None,
-        is_sampled_headway: samples.has_distance(),
+        worst: flags.worst(),
+        ..SampleOptions::new(Estimator::Crude { interval: flags.interval() }, count, headways)
     };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
-    let crude = sample_crude(&plan, 0..count, &executor, &counting, &options, |chunk| {
+    // Nobody said how often such scenarios occur: no exposure.
+    let crude = sample_crude(&plan, 0..count, &executor, &options, None, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         Ok(())
     })?;
     bar.finish_and_clear();
-    let asked = SampleOptions {
-        models,
-        seed,
-        ..SampleOptions::new(Estimator::CRUDE, count, SampleHeadways::Each(plan.headways.clone()))
-    };
     let host = opened.host(crude.summary.rechecked_lanes, started);
     let record = record(&kept, &samples, path);
-    let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &asked), crude.rows.clone(), host);
+    let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
+    file.plan_headways = plan.headways.clone();
     file.plan_sha256 = Some(plan.hash().to_owned());
     let mut draws = DrawRecord::of(&crude.tally, &plan);
     if draws.samples == count {
@@ -146,7 +145,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         draws.rejected_share = (tries - count) as f64 / tries as f64;
     }
     file.draws = Some(draws);
-    write(folder.results()?, &kept, &samples, &plan, &crude, &counting, &mut file)?;
+    write(folder.results()?, &kept, &samples, &plan, &crude, &options, &mut file)?;
     flags.format.print(|| file.text(), || file.json())?;
     tracing::info!("results written to {}", flags.out.display());
     Ok(Exit::Ok)
@@ -197,11 +196,11 @@ fn write(
     samples: &DistributionSamples,
     plan: &LanePlan,
     crude: &CrudeRun,
-    counting: &TallyOptions,
+    options: &SampleOptions,
     file: &mut EstimateFile,
 ) -> Result<()> {
     results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
-    if counting.worst > 0 {
+    if options.worst > 0 {
         let runner = LaneRunner::<f32>::new(plan);
         let missing = |lane: u64| Error::Internal(format!("lane {lane} is not in the plan"));
         let mut found = Vec::new();
@@ -228,7 +227,7 @@ fn write(
             });
         }
         let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        sample_lanes::add_worst(&mut results, &rows, &names, counting.criterion, file)?;
+        sample_lanes::add_worst(&mut results, &rows, &names, options.criterion, file)?;
     }
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
     results.add(KEPT, &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;

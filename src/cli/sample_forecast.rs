@@ -11,7 +11,7 @@ use crate::Result;
 use crate::engine::{Forecast, LanePlan, Outcome, Wanted, forecast};
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
-use crate::run::sampling::{Estimator, Proposals, Sample, SampleKind, SampleOptions, SampleTally, TallyOptions};
+use crate::run::sampling::{Estimator, Proposals, Sample, SampleKind, SampleOptions, SampleTally};
 use crate::stats::estimate::{CrossEntropy, Subset};
 
 /// Memory of the counts of every checkpoint and of the figures, bytes, measured.
@@ -75,18 +75,18 @@ fn forecast_adaptive(sample: &Sample, opened: &Opened, format: FormatFlag) -> Re
 
 /// What the run would be.
 fn forecast_crude(sample: &Sample, plan: &LanePlan, opened: &Opened, format: FormatFlag) -> Result<Exit> {
-    let counting = sample.counting();
+    let options = &sample.options;
     // Few lanes are valued.
-    let verdicts = TallyOptions { worst: 0, ..counting.clone() };
+    let verdicts = SampleOptions { worst: 0, ..options.clone() };
     let forecast = forecast(plan, opened.backend(), Wanted::Verdicts, BUDGET, |chunk| {
         SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
     })?;
-    let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
+    let bytes_of_lane = if options.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
     DryRun {
         data: sample.density.provenance.data.clone(),
         parts: dry_run::parts(plan),
         units: "samples",
-        is_at_most: !sample.options.stop.is_fixed(),
+        is_at_most: !options.stop.is_fixed(),
         more_bytes: BYTES_OF_COUNTS + forecast.lanes_at_once * bytes_of_lane,
         more: "lanes at once, counts and figures, however many samples",
         forecast: Some(forecast),

@@ -12,7 +12,7 @@ use crate::report::html::PageFigure;
 use crate::report::lanes;
 use crate::report::sampling::EstimateFile;
 use crate::report::sampling_tables::{WorstRow, convergence_csv, worst_csv};
-use crate::run::sampling::{CrudeRun, TallyOptions};
+use crate::run::sampling::{CrudeRun, SampleOptions};
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
 use crate::support::hex::hex;
@@ -55,7 +55,7 @@ pub(super) fn write(
     plan: &LanePlan,
     density: &DensityModel,
     run: &CrudeRun,
-    counting: &TallyOptions,
+    options: &SampleOptions,
     file: &mut EstimateFile,
 ) -> Result<Vec<PageFigure>> {
     let mut figures = Vec::new();
@@ -68,7 +68,7 @@ pub(super) fn write(
         figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
-    if counting.worst > 0 {
+    if options.worst > 0 {
         let runner = LaneRunner::<f32>::new(plan);
         let mut rows: Vec<(WorstRow, Outcome<f64>)> = Vec::new();
         let Some(generator) = plan.generator() else {
@@ -101,11 +101,11 @@ pub(super) fn write(
             rows.push((row, *outcome));
         }
         let rows: Vec<WorstRow> = rows.into_iter().map(|(row, _)| row).collect();
-        add_worst(results, &rows, &names, counting.criterion, file)?;
+        add_worst(results, &rows, &names, options.criterion, file)?;
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
-            let figure = FailureMap::of(density, map, model, *id, counting.criterion);
+            let figure = FailureMap::of(density, map, model, *id, options.criterion);
             let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
             results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
             results.add(&format!("{name}.svg"), svg.as_bytes())?;

@@ -195,7 +195,7 @@ fn write(
     let mut file = EstimateFile::new(sample, result.rows, host)?;
     let mut figures = Vec::new();
     if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
-        figures = sample_lanes::write(&mut results, plan, density, crude, &sample.counting(), &mut file)?;
+        figures = sample_lanes::write(&mut results, plan, density, crude, &sample.options, &mut file)?;
         file.plan_sha256 = Some(plan.hash().to_owned());
         file.draws = Some(DrawRecord::of(&crude.tally, plan));
     }

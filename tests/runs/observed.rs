@@ -10,7 +10,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::close_following::{CloseFollowing, close_units};
 use lanesweep::run::parts::Shard;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, TallyOptions, plan_samples};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -172,7 +172,7 @@ fn a_density_with_headways_draws_its_own_and_counts_those_below_half_a_second() 
     assert!(error.help().unwrap_or_default().contains("with_thw"), "{error}");
     let density = fit(true);
     let plan = plan_of(&density, SampleHeadways::Sampled).unwrap();
-    let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
+    let counting = options(SampleHeadways::Sampled);
     let backend = CpuBackend::lane_arithmetic();
     let mut tally = SampleTally::empty(&plan, &counting);
     let mut expected = CloseFollowing { failures: vec![[0; 2]; 6], ..Default::default() };

@@ -12,15 +12,14 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, Estimator, LaneLimitState, SampleHeadways, SampleOptions, TallyOptions, plan_samples, sample_crude,
-    truncated,
+    Estimator, LaneLimitState, SampleHeadways, SampleOptions, plan_samples, sample_crude, truncated,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
-    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
-    balance_heuristic, cross_entropy, defended, from_pilot_with_proposal, subset, wilson,
+    CrossEntropy, Estimate, Importance, Pilot, Subset, Technique, Verdict, balance_heuristic, cross_entropy, defended,
+    from_pilot_with_proposal, subset, wilson,
 };
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -38,20 +37,13 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
     let options = SampleOptions {
         seed: 99,
         models: vec![model],
+        level: LEVEL,
         ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
     };
     let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
-    let crude = CrudeOptions {
-        stop: StopRule::samples(samples),
-        interval: BinomialInterval::Wilson,
-        level: LEVEL,
-        exposure: None,
-        is_sampled_headway: false,
-    };
-    let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &options, None, |_| Ok(())).unwrap();
     run.rows.into_iter().find(|r| r.criterion == Criterion::Collision).unwrap().estimate
 }
 

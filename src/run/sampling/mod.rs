@@ -33,9 +33,7 @@ pub use compare::{
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
 pub use conditional::{Conditional, conditional, mixture_of};
-pub use crude::{
-    Checkpoint, CheckpointRow, CrudeOptions, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into,
-};
+pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub use lanes::{LaneLimitState, scenario_shares, truncated};
@@ -50,5 +48,5 @@ pub(crate) use sample::{Proposals, SampleKind};
 pub use sample_options::{Estimator, SampleOptions};
 pub use sample_result::{Levels, SampleResult};
 pub use sample_run::{EachChunk, SampleRun};
-pub use tally::{SampleTally, TallyOptions, WorstSample};
+pub use tally::{SampleTally, WorstSample};
 pub use weighted_tally::WeightedTally;

@@ -3,17 +3,16 @@
 use std::path::Path;
 
 use super::conditional::mixture_of;
-use super::crude::CrudeOptions;
 use super::plan::{plan_points, plan_samples};
 use super::plan_file::KIND;
 use super::sample_options::{Estimator, SampleOptions};
-use super::tally::{SampleTally, TallyOptions};
+use super::tally::SampleTally;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
 use crate::run::parts::leave_plan;
-use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{BinomialInterval, Pilot, PilotCheck};
+use crate::stats::density::{DensityModel, Exposure, Mixture};
+use crate::stats::estimate::{Pilot, PilotCheck};
 use crate::{Error, Place, Result};
 
 /// A sampling run ready to be run: whole, or one shard of it where its samples are independent.
@@ -172,28 +171,9 @@ impl Sample {
         self.lane_plan().map_or_else(by_models, LanePlan::lane_count)
     }
 
-    /// What crude Monte Carlo counts.
-    pub(crate) fn counting(&self) -> TallyOptions {
-        let SampleOptions { worst, criterion, map, .. } = &self.options;
-        TallyOptions { worst: *worst, criterion: *criterion, map: map.clone() }
-    }
-
-    /// How estimates are made of its counts.
-    pub(super) fn crude_options(&self) -> CrudeOptions<'_> {
-        let SampleOptions { estimator, stop, level, given, .. } = &self.options;
-        let interval = match estimator {
-            Estimator::Crude { interval } => *interval,
-            _ => BinomialInterval::Wilson,
-        };
-        // How often scenarios with given values occur is not known.
-        let exposure = self.density.exposure.as_ref().filter(|_| given.is_empty());
-        CrudeOptions {
-            stop: *stop,
-            interval,
-            level: *level,
-            exposure,
-            is_sampled_headway: self.density.space.has_thw(),
-        }
+    /// The exposure that risks follow from: how often scenarios with given values occur is not known.
+    pub(super) fn exposure(&self) -> Option<&Exposure> {
+        self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
     }
 
     /// Whether counts that were read from a file can be those of a plan of crude Monte Carlo.
@@ -201,7 +181,7 @@ impl Sample {
     /// # Errors
     /// What differs.
     pub(super) fn check_tally(&self, plan: &LanePlan, tally: &SampleTally) -> std::result::Result<(), String> {
-        let joined = SampleTally::empty(plan, &self.counting()).merge(tally.clone());
+        let joined = SampleTally::empty(plan, &self.options).merge(tally.clone());
         joined.map(drop).map_err(|error| error.to_string())
     }
 

@@ -54,6 +54,14 @@ impl Estimator {
         }
     }
 
+    /// Kind of interval of crude Monte Carlo.
+    pub(super) fn interval(&self) -> BinomialInterval {
+        match self {
+            Estimator::Crude { interval } => *interval,
+            _ => BinomialInterval::Wilson,
+        }
+    }
+
     /// Defensive mixture weight: the density's share in each proposal.
     pub fn defence(&self) -> f64 {
         match self {
@@ -87,7 +95,7 @@ pub struct SampleOptions {
     pub level: f64,
     /// Parameters that are given, with their values (crude).
     pub given: Vec<(String, f64)>,
-    /// Worst lanes to list per model (crude).
+    /// Worst lanes to list per model (crude); 0 needs verdicts only.
     pub worst: usize,
     /// Axes of the failure map (crude).
     pub map: Option<MapAxes>,

@@ -51,9 +51,9 @@ impl Sample {
         };
         match &self.kind {
             SampleKind::Crude(plan) => {
-                let (mut ledger, counting) = (Ledger::new(units.clone(), &cuts(units.end, &units)), self.counting());
-                let options = self.crude_options();
-                let run = sample_into(plan, &mut ledger, executor, &counting, &options, false, |_| Ok(()))?;
+                let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
+                let (options, exposure) = (&self.options, self.exposure());
+                let run = sample_into(plan, &mut ledger, executor, options, exposure, false, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
             }
             SampleKind::Weighted(proposals) => weighted(proposals),
@@ -124,7 +124,7 @@ impl Sample {
                 let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
                 let count = parts.len();
                 let segments = parts.into_iter().flat_map(|part| part.segments).collect();
-                let crude = crude_of_segments(plan, segments, &sample.counting(), &sample.crude_options())?;
+                let crude = crude_of_segments(plan, segments, &sample.options, sample.exposure())?;
                 if crude.tally.samples() != plan.unit_count() {
                     let problem = "the parts do not hold every sample that their names stand for";
                     return Err(Error::input(Place::file(out), problem, "make them again"));
@@ -187,13 +187,13 @@ impl SampleRun<'_> {
                 if state.units.is_empty() {
                     return Ok(());
                 }
-                let (counting, options) = (self.sample.counting(), self.sample.crude_options());
+                let (options, exposure) = (&self.sample.options, self.sample.exposure());
                 let every_value = chunks.is_some();
                 let each = |chunk: &Chunk| {
                     progress(chunk.units.end - chunk.units.start);
                     chunks.as_mut().map_or(Ok(()), |each| each(chunk))
                 };
-                let run = sample_into(plan, &mut state.ledger, executor, &counting, &options, every_value, each)?;
+                let run = sample_into(plan, &mut state.ledger, executor, options, exposure, every_value, each)?;
                 self.crude = Some(run);
                 Ok(())
             }

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::limit_state::MAX_BTN;
-use super::tally::{SampleTally, TallyOptions};
+use super::sample_options::SampleOptions;
+use super::tally::SampleTally;
 use crate::engine::{LanePlan, Marks, Wanted, Watch};
 use crate::model::criterion::Criterion;
 use crate::model::driver::MODELS;
@@ -25,7 +26,7 @@ pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
 
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
 /// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
-pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions) -> Wanted {
+pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
     let mut marks = [Marks::Nothing; MODELS];
     let mut share = 0.0;
     for (at, model) in plan.models.iter().enumerate() {
@@ -38,7 +39,7 @@ pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &TallyOption
 
 /// The marks of one model, and the share of its lanes that have them, apart from the few that enter a list. `None`
 /// where every lane's value is needed.
-fn marks_of(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions, model: usize) -> Option<(Marks, f64)> {
+fn marks_of(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions, model: usize) -> Option<(Marks, f64)> {
     let last = tally.worst[model].get(options.worst - 1)?.value;
     let criteria = &plan.profile.criteria;
     let share = |criterion: Criterion| {

@@ -130,7 +130,7 @@ impl Sample {
 
     /// A row of an estimator that weighs.
     pub(super) fn row(&self, model: ModelId, estimate: Estimate, shares: Option<&KernelShares>) -> EstimateRow {
-        let (exposure, options) = (self.density.exposure.as_ref(), &self.options);
+        let (exposure, options) = (self.exposure(), &self.options);
         let row = EstimateRow::of_draws(model, options.criterion, options.headway_name(), estimate, exposure);
         row.with_data(shares, exposure)
     }

@@ -10,7 +10,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Counted, Journal, Ledger, read_part, read_sealed_line, seal};
 use lanesweep::run::sampling::{
-    Estimator, SampleHeadways, SampleOptions, SampleTally, TallyOptions, WeightedTally, plan_samples, read_proposal,
+    Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
@@ -243,7 +243,8 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
         tally.samples();
         tally.valid();
         let axes = tally.map.as_ref().map(|map| map.axes.clone());
-        let options = TallyOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes };
+        let asked = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
+        let options = SampleOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes, ..asked };
         let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
         let joined = SampleTally::empty(&plan, &options).merge(tally.clone())?;
         let back = tally.clone().merge(SampleTally::empty(&plan, &options))?;
