@@ -12,10 +12,10 @@ use super::rerun::record_of;
 use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
 use super::sample_lanes;
-use crate::engine::{Headway, LanePlan, LaneRunner};
+use crate::engine::{Headway, LanePlan};
 use crate::interop::openscenario::{DistributionSamples, Names, Rename, parse_distribution};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile};
-use crate::report::sampling_tables::{WorstRow, convergence_csv};
+use crate::report::sampling_tables::convergence_csv;
 use crate::run::grid::MapParameter;
 use crate::run::sampling::{CrudeRun, Estimator, SampleHeadways, SampleOptions, sample_crude};
 use crate::scenario::Category;
@@ -201,33 +201,12 @@ fn write(
 ) -> Result<()> {
     results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
     if options.worst > 0 {
-        let runner = LaneRunner::<f32>::new(plan);
-        let missing = |lane: u64| Error::Internal(format!("lane {lane} is not in the plan"));
-        let mut found = Vec::new();
-        for (model, lanes) in crude.tally.worst.iter().enumerate() {
-            for (at, &lane) in lanes.iter().enumerate() {
-                let key = plan.key(lane.lane).ok_or_else(|| missing(lane.lane))?;
-                let point = samples.draw(file.seed, key.unit, &plan.profile)?.values;
-                found.push((model, at + 1, lane, key, point, runner.run(&key).widen()));
-            }
-        }
-        let mut rows: Vec<WorstRow> = Vec::new();
-        for (model, rank, lane, key, point, outcome) in &found {
-            let headway =
-                if samples.has_distance() { "sampled".to_owned() } else { plan.headways[key.headway].to_string() };
-            rows.push(WorstRow {
-                rank: *rank,
-                lane: *lane,
-                key: plan.key_text(key),
-                sample: key.unit,
-                model: plan.models[*model],
-                headway,
-                point: Vec::clone(point),
-                outcome,
-            });
-        }
+        let drawn = |sample: u64| {
+            let point = samples.draw(options.seed, sample, &plan.profile)?.values;
+            Ok((point, samples.has_distance().then(|| "sampled".to_owned())))
+        };
         let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-        sample_lanes::add_worst(&mut results, &rows, &names, options.criterion, file)?;
+        sample_lanes::add_worst(&mut results, plan, crude, (&names, &drawn), options.criterion, file)?;
     }
     let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
     results.add(KEPT, &serde_json::to_vec_pretty(kept).map_err(unwritten)?)?;

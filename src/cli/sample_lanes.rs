@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::engine::{Chunk, LanePlan, LaneRunner, Outcome};
+use crate::engine::{Chunk, LanePlan, LaneRunner};
 use crate::model::criterion::Criterion;
 use crate::report::convergence::ConvergenceFigure;
 use crate::report::failure_map::FailureMap;
@@ -69,39 +69,15 @@ pub(super) fn write(
     }
     let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
     if options.worst > 0 {
-        let runner = LaneRunner::<f32>::new(plan);
-        let mut rows: Vec<(WorstRow, Outcome<f64>)> = Vec::new();
         let Some(generator) = plan.generator() else {
             return Err(Error::Internal("the plan has no generator".to_owned()));
         };
-        let mut listed = Vec::new();
-        for (model, lanes) in run.tally.worst.iter().enumerate() {
-            for (at, &lane) in lanes.iter().enumerate() {
-                let key = plan
-                    .key(lane.lane)
-                    .ok_or_else(|| Error::Internal(format!("lane {} is not in the plan", lane.lane)))?;
-                listed.push((plan.models[model], at + 1, lane, key, runner.run(&key).widen()));
-            }
-        }
-        for (model, rank, lane, key, outcome) in &listed {
-            let drawn = generator.draw(key.unit);
-            let point: Vec<f64> = drawn.values[..names.len()].iter().map(|&v| f64::from(v)).collect();
-            let headway =
-                density.space.thw_s(&point).map_or(plan.headways[key.headway].to_string(), |t| format!("{t}s"));
-            let row = WorstRow {
-                rank: *rank,
-                lane: *lane,
-                key: plan.key_text(key),
-                sample: key.unit,
-                model: *model,
-                headway,
-                point,
-                outcome,
-            };
-            rows.push((row, *outcome));
-        }
-        let rows: Vec<WorstRow> = rows.into_iter().map(|(row, _)| row).collect();
-        add_worst(results, &rows, &names, options.criterion, file)?;
+        let drawn = |sample: u64| {
+            let point: Vec<f64> = generator.draw(sample).values[..names.len()].iter().map(|&v| f64::from(v)).collect();
+            let headway = density.space.thw_s(&point).map(|thw_s| format!("{thw_s}s"));
+            Ok((point, headway))
+        };
+        add_worst(results, plan, run, (&names, &drawn), options.criterion, file)?;
     }
     if let Some(map) = &run.tally.map {
         for (model, id) in plan.models.iter().enumerate() {
@@ -115,15 +91,38 @@ pub(super) fn write(
     Ok(figures)
 }
 
+/// The point of a sample, and its headway where that is a parameter.
+type DrawnPoint<'d> = dyn Fn(u64) -> Result<(Vec<f64>, Option<String>)> + 'd;
+
 /// Adds the table of the worst lanes, and its checksum to the record.
 pub(super) fn add_worst(
     results: &mut Results,
-    rows: &[WorstRow],
-    names: &[String],
+    plan: &LanePlan,
+    run: &CrudeRun,
+    (names, drawn): (&[String], &DrawnPoint),
     criterion: Criterion,
     file: &mut EstimateFile,
 ) -> Result<()> {
-    let table = worst_csv(rows, names, criterion)?;
+    let runner = LaneRunner::<f32>::new(plan);
+    let mut rows = Vec::new();
+    for (&model, lanes) in plan.models.iter().zip(&run.tally.worst) {
+        for (at, &lane) in lanes.iter().enumerate() {
+            let missing = || Error::Internal(format!("lane {} is not in the plan", lane.lane));
+            let key = plan.key(lane.lane).ok_or_else(missing)?;
+            let (point, headway) = drawn(key.unit)?;
+            rows.push(WorstRow {
+                rank: at + 1,
+                lane,
+                key: plan.key_text(&key),
+                sample: key.unit,
+                model,
+                headway: headway.unwrap_or_else(|| plan.headways[key.headway].to_string()),
+                point,
+                outcome: runner.run(&key).widen(),
+            });
+        }
+    }
+    let table = worst_csv(&rows, names, criterion)?;
     file.worst_sha256 = Some(hex(&Sha256::digest(&table)));
     results.add("worst.csv", &table)
 }

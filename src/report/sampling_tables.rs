@@ -132,7 +132,7 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> Result<Vec<u8>> {
 }
 
 /// One of the worst lanes, with what it was.
-pub struct WorstRow<'a> {
+pub struct WorstRow {
     /// Place among the model's worst, from 1.
     pub rank: usize,
     /// The lane and its limit state.
@@ -148,7 +148,7 @@ pub struct WorstRow<'a> {
     /// Its point.
     pub point: Vec<f64>,
     /// Its outcome.
-    pub outcome: &'a Outcome<f64>,
+    pub outcome: Outcome<f64>,
 }
 
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
@@ -174,7 +174,7 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
     header.extend(parameters.iter().cloned());
     let mut table = vec![header];
     for row in rows {
-        let o = row.outcome;
+        let o = &row.outcome;
         let mut fields = vec![
             row.model.name().to_owned(),
             row.rank.to_string(),

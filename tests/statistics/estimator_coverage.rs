@@ -125,6 +125,7 @@ fn importance_sampling_intervals_hold() {
         let row = repeat(name, truth, REPEATS, |seed| {
             from_pilot(density, &limit, &silverman, &Pilot::guarded(5000), &Importance::new(seed, 5000))
                 .expect("an estimate")
+                .0
         });
         misses.want(row.coverage >= 0.92, &row, "92 %");
     };

@@ -19,7 +19,7 @@ use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{BandwidthRule, DataFacts, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
     CrossEntropy, Estimate, Importance, Pilot, Subset, Technique, Verdict, balance_heuristic, cross_entropy, defended,
-    from_pilot_with_proposal, subset, wilson,
+    from_pilot, subset, wilson,
 };
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -67,7 +67,7 @@ fn estimates(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f
     for (name, pilot) in
         [("importance, guarded", Pilot::guarded(10_000)), ("importance, author's", Pilot::author(10_000))]
     {
-        let (estimate, proposal) = from_pilot_with_proposal(&nominal, &lanes, &fit, &pilot, &importance).unwrap();
+        let (estimate, proposal) = from_pilot(&nominal, &lanes, &fit, &pilot, &importance).unwrap();
         all.push((name.to_owned(), estimate));
         proposals.push(proposal);
     }

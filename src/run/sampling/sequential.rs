@@ -9,7 +9,7 @@ use crate::engine::Executor;
 use crate::stats::density::Mixture;
 use crate::stats::estimate::{
     CrossEntropy, Defended, Density, Estimate, Importance, Subset, Technique, balance_heuristic, cross_entropy,
-    defended, importance, subset,
+    defended, from_pilot, importance, subset,
 };
 
 /// Draws that the valid share of each of several proposals is counted on.
@@ -60,11 +60,9 @@ impl Sample {
                 Ok((run.estimate, Some(Levels::CrossEntropy(run.steps)), Some(run.proposal)))
             }
             Estimator::Pilot(pilot) => {
-                let (found, check) = self.pilot(lanes, pilot)?;
-                let proposal = defended(found.clone(), nominal, pilot.defence)?;
-                let mut estimate = importance(nominal, &proposal, lanes, &importance_options)?;
-                check.add_to(&mut estimate);
-                Ok((estimate, None, Some(found)))
+                let fit = |points: &[Vec<f64>]| self.kernels_over(points);
+                let (estimate, proposal) = from_pilot(nominal, lanes, &fit, pilot, &importance_options)?;
+                Ok((estimate, None, Some(proposal)))
             }
             Estimator::Given { proposals, defence } => {
                 let share = 1.0 / proposals.len() as f64;

@@ -44,18 +44,18 @@ impl Sample {
         LaneLimitState { density, profile, model, criterion, headway, executor }
     }
 
-    /// The proposal of a driver model that a pilot finds, with what the pilot counted.
-    pub(super) fn pilot(&self, lanes: &LaneLimitState, pilot: &Pilot) -> Result<(Mixture, PilotCheck)> {
+    /// The kernels of a pilot's worst points.
+    pub(super) fn kernels_over(&self, points: &[Vec<f64>]) -> Result<Mixture> {
         let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-        let kernels = |points: &[Vec<f64>]| Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture();
-        pilot_proposal(&truncated(&self.density)?, lanes, &kernels, pilot, self.options.seed)
+        Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
     }
 
     /// The proposal of every driver model, with what its pilot counted.
     pub(super) fn pilots(&self, pilot: &Pilot, executor: &Executor) -> Result<Proposals> {
+        let (nominal, fit) = (truncated(&self.density)?, |points: &[Vec<f64>]| self.kernels_over(points));
         let search = |&model: &ModelId| {
             tracing::info!("pilot of {} on {}", model.name(), executor.backend.describe());
-            self.pilot(&self.limit_state(model, *executor), pilot)
+            pilot_proposal(&nominal, &self.limit_state(model, *executor), &fit, pilot, self.options.seed)
         };
         let found: Vec<(Mixture, PilotCheck)> = self.options.models.iter().map(search).collect::<Result<_>>()?;
         let (mixtures, pilots) = found.into_iter().unzip();

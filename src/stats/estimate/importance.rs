@@ -320,25 +320,11 @@ impl Pilot {
 }
 
 /// The author's form: a pilot drawn from the density, its worst share fitted, then importance sampling. The estimate
-/// is checked against the pilot.
+/// is checked against the pilot. Gives the proposal too, without its defensive share, so that others can sample it again.
 ///
 /// # Errors
 /// The limit state's and the fit's; [`Error::Usage`] where the pilot has no valid point or a share is outside [0, 1].
 pub fn from_pilot(
-    nominal: &dyn Density,
-    limit_state: &dyn LimitState,
-    fit: &dyn FitProposal,
-    pilot: &Pilot,
-    options: &Importance,
-) -> Result<Estimate> {
-    Ok(from_pilot_with_proposal(nominal, limit_state, fit, pilot, options)?.0)
-}
-
-/// [`from_pilot`] with the proposal that it found, without its defensive share, so that others can sample it again.
-///
-/// # Errors
-/// As [`from_pilot`].
-pub fn from_pilot_with_proposal(
     nominal: &dyn Density,
     limit_state: &dyn LimitState,
     fit: &dyn FitProposal,

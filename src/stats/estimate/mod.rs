@@ -28,8 +28,8 @@ pub use blocks::{BLOCK, BlockSums, Join};
 pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
-    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_pilot_with_proposal,
-    from_weight_sums, importance, importance_sums, pilot_proposal, worst_share,
+    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
+    importance_sums, pilot_proposal, worst_share,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
