@@ -155,11 +155,6 @@ impl Sample {
         }
     }
 
-    /// What the run is asked for.
-    pub fn options(&self) -> &SampleOptions {
-        &self.options
-    }
-
     /// Samples, at most; of subset simulation per level.
     pub fn samples(&self) -> u64 {
         self.options.stop.samples
